@@ -21,19 +21,43 @@ const STEP: f64 = 1e-7;
 const STEPS: u64 = 100_000;
 
 fn run(parameters: &Parameters, solver: Solver, end_time: f64) -> u64 {
-    let limits = Limits { end_time, events: u64::MAX, interrupt: None };
-    let mut observer = SlipObserver::new(parameters, &Recording { slips: u64::MAX, ..Recording::default() });
-    simulate(parameters, solver, limits, &mut observer).expect("the simulation must not fail").steps
+    let limits = Limits {
+        end_time,
+        events: u64::MAX,
+        interrupt: None,
+    };
+    let mut observer = SlipObserver::new(
+        parameters,
+        &Recording {
+            slips: u64::MAX,
+            ..Recording::default()
+        },
+    );
+    simulate(parameters, solver, limits, &mut observer)
+        .expect("the simulation must not fail")
+        .steps
 }
 
 /// Time per step = time / items. The drive is fast, so that slips are under way.
 #[divan::bench(args = [70, 1000])]
 fn fixed_step(bencher: Bencher<'_, '_>, blocks: usize) {
-    let parameters = Parameters { blocks, drive_velocity: 1e-3, ..Parameters::default() };
-    let steps = run(&parameters, Solver::FixedStep { time_step: STEP }, STEP * STEPS as f64);
-    bencher
-        .counter(ItemsCount::new(steps))
-        .bench(|| run(&parameters, Solver::FixedStep { time_step: STEP }, STEP * STEPS as f64));
+    let parameters = Parameters {
+        blocks,
+        drive_velocity: 1e-3,
+        ..Parameters::default()
+    };
+    let steps = run(
+        &parameters,
+        Solver::FixedStep { time_step: STEP },
+        STEP * STEPS as f64,
+    );
+    bencher.counter(ItemsCount::new(steps)).bench(|| {
+        run(
+            &parameters,
+            Solver::FixedStep { time_step: STEP },
+            STEP * STEPS as f64,
+        )
+    });
 }
 
 /// The same physics by both solvers: 0.6 s at V0 = 1e-4 m/s.

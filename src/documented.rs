@@ -28,25 +28,45 @@ fn assert_rows_documented(page: &str, heading: &str, table: &str) {
     let text = std::fs::read_to_string(file(page)).unwrap();
     let start = text.find(&format!("\n{heading}\n")).unwrap();
     let start = start + text[start..].find("\n|").unwrap() + 1;
-    let end = text[start..].find("\n\n").map_or(text.len(), |end| start + end + 1);
+    let end = text[start..]
+        .find("\n\n")
+        .map_or(text.len(), |end| start + end + 1);
     assert_documented(page, &format!("{}{table}{}", &text[..start], &text[end..]));
 }
 
 fn file(page: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(page)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("docs")
+        .join(page)
 }
 
 fn table(fields: &[(Description, Value)]) -> String {
-    let mut text = "| key | symbol | meaning | default | allowed |\n|---|---|---|---|---|\n".to_owned();
+    let mut text =
+        "| key | symbol | meaning | default | allowed |\n|---|---|---|---|---|\n".to_owned();
     for (field, default) in fields {
-        let Description { key, symbol, meaning, .. } = field;
+        let Description {
+            key,
+            symbol,
+            meaning,
+            ..
+        } = field;
         // Shorter than in messages: most values are finite numbers.
-        let allowed = field.requirement().replace("a finite number ", "").replace("a whole number from", "whole,");
-        writeln!(text, "| `{key}` | {symbol} | {meaning} | {default} | {allowed} |").unwrap();
+        let allowed = field
+            .requirement()
+            .replace("a finite number ", "")
+            .replace("a whole number from", "whole,");
+        writeln!(
+            text,
+            "| `{key}` | {symbol} | {meaning} | {default} | {allowed} |"
+        )
+        .unwrap();
     }
     // A column that is empty everywhere says nothing.
     if fields.iter().all(|(field, _)| field.symbol.is_empty()) {
-        text = text.replace("| symbol ", "").replacen("|---", "", 1).replace("` |  |", "` |");
+        text = text
+            .replace("| symbol ", "")
+            .replacen("|---", "", 1)
+            .replace("` |  |", "` |");
     }
     text
 }
@@ -55,16 +75,29 @@ fn table(fields: &[(Description, Value)]) -> String {
 /// share a line, and so do the ends of an interval; a unit with `?` is that of a column that may be null.
 pub(crate) fn markdown<T: Table>() -> String {
     let is_parameter = |column: &Column| {
-        Symbol::from_key(&column.name).is_some_and(|symbol| symbol.description().meaning == column.meaning)
+        Symbol::from_key(&column.name)
+            .is_some_and(|symbol| symbol.description().meaning == column.meaning)
     };
     let share_a_line = |one: &Column, next: &Column| {
-        let is_pair = one.name.strip_suffix("_low").is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
+        let is_pair = one
+            .name
+            .strip_suffix("_low")
+            .is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
         (is_parameter(one) && is_parameter(next)) || (is_pair && one.meaning.starts_with(LOWER_END))
     };
     let line = |columns: &[Column]| {
-        let names: Vec<String> = columns.iter().map(|column| format!("`{}`", column.name)).collect();
+        let names: Vec<String> = columns
+            .iter()
+            .map(|column| format!("`{}`", column.name))
+            .collect();
         let names = names.join(" ");
-        let Column { unit, meaning, kind, nullable, .. } = &columns[0];
+        let Column {
+            unit,
+            meaning,
+            kind,
+            nullable,
+            ..
+        } = &columns[0];
         if is_parameter(&columns[0]) {
             return format!("| {names} | | [parameters](model.md#parameters) |\n");
         }
@@ -74,11 +107,18 @@ pub(crate) fn markdown<T: Table>() -> String {
             kind => kind.word(),
         };
         let nullable = if *nullable { "?" } else { "" };
-        let meaning = meaning.replace(LOWER_END, "ends of").replace('|', "\\|").replace('<', "\\<");
+        let meaning = meaning
+            .replace(LOWER_END, "ends of")
+            .replace('|', "\\|")
+            .replace('<', "\\<");
         format!("| {names} | {unit}{nullable} | {meaning} |\n")
     };
     let rows: String = T::columns().chunk_by(share_a_line).map(line).collect();
-    format!("## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}", T::NAME, T::MEANING)
+    format!(
+        "## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}",
+        T::NAME,
+        T::MEANING
+    )
 }
 
 /// How the meaning of the lower end of an interval begins.

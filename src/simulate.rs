@@ -3,8 +3,8 @@
 use crate::model::theory::typical_interval;
 use crate::model::{ContactEvent, Parameters};
 use crate::observe::{
-    AttachedMap, ContactLog, ContactRow, MapRow, Measurements, Observers, Profile, ProfileRow, Recording, SlipObserver,
-    Trace, TraceRow,
+    AttachedMap, ContactLog, ContactRow, MapRow, Measurements, Observers, Profile, ProfileRow,
+    Recording, SlipObserver, Trace, TraceRow,
 };
 use crate::solver::{self, Observer, SimulationError};
 use crate::sweep::{Change, Job, Mistake, Sweep};
@@ -31,7 +31,9 @@ pub enum RequestError {
     NotOneJob { name: String, jobs: usize },
     #[error("sample {0}: must be a finite number > 0, in s")]
     BadSample(f64),
-    #[error("sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one")]
+    #[error(
+        "sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one"
+    )]
     TooManySamples { sample: f64, time: f64 },
 }
 
@@ -46,7 +48,8 @@ pub fn sweep_text(changes: &[Change]) -> String {
     };
     let of = |section: &str| {
         let own = changes.iter().filter(|change| change.section == section);
-        own.flat_map(|Change { key, value, .. }| [key, " = ", value, "\n"]).collect::<String>()
+        own.flat_map(|Change { key, value, .. }| [key, " = ", value, "\n"])
+            .collect::<String>()
     };
     let [model, record, solver] = ["model", "record", "solver"].map(of);
     format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
@@ -60,7 +63,10 @@ pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
         format!("{start}{end}").replace(" in [model]", "")
     });
     let between = if mistakes.len() > 1 { "\n  " } else { " " };
-    format!("in the {source}:{between}{}", problems.collect::<Vec<_>>().join(between))
+    format!(
+        "in the {source}:{between}{}",
+        problems.collect::<Vec<_>>().join(between)
+    )
 }
 
 /// The job of a sweep that has one.
@@ -68,13 +74,19 @@ pub fn only_job(sweep: &Sweep) -> Result<Job, RequestError> {
     let mut jobs = sweep.jobs_of_grid();
     match (jobs.next(), jobs.count()) {
         (Some(job), 0) => Ok(job),
-        (_, others) => Err(RequestError::NotOneJob { name: sweep.name().to_owned(), jobs: others + 1 }),
+        (_, others) => Err(RequestError::NotOneJob {
+            name: sweep.name().to_owned(),
+            jobs: others + 1,
+        }),
     }
 }
 
 /// What to record beside slips.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::struct_excessive_bools, reason = "one for each table that may be recorded")]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "one for each table that may be recorded"
+)]
 pub struct Request {
     /// Time between samples of trace and map, in s.
     pub sample: f64,
@@ -89,14 +101,23 @@ pub struct Request {
 
 impl Request {
     /// Makes sure that what is recorded fits into memory.
-    pub fn check(&self, parameters: &Parameters, recording: &Recording) -> Result<(), RequestError> {
+    pub fn check(
+        &self,
+        parameters: &Parameters,
+        recording: &Recording,
+    ) -> Result<(), RequestError> {
         let sample = self.sample;
         if !(sample > 0.0 && sample.is_finite()) {
             return Err(RequestError::BadSample(sample));
         }
-        let cells = if self.map { parameters.blocks } else { usize::from(self.trace) };
+        let cells = if self.map {
+            parameters.blocks
+        } else {
+            usize::from(self.trace)
+        };
         let slips = recording.slips as f64 + recording.discard as f64;
-        let time = (slips * typical_interval(parameters)).min(recording.max_time.unwrap_or(f64::INFINITY));
+        let time =
+            (slips * typical_interval(parameters)).min(recording.max_time.unwrap_or(f64::INFINITY));
         if time / sample * cells as f64 > MAX_SAMPLES {
             return Err(RequestError::TooManySamples { sample, time });
         }
@@ -134,14 +155,25 @@ pub fn simulate(
         (request.profile, &mut profile),
         (request.contacts, &mut log),
     ];
-    let others = all.into_iter().filter_map(|(wanted, observer)| wanted.then_some(observer)).collect();
-    let observer = &mut Observers { lead: &mut slips, others };
+    let others = all
+        .into_iter()
+        .filter_map(|(wanted, observer)| wanted.then_some(observer))
+        .collect();
+    let observer = &mut Observers {
+        lead: &mut slips,
+        others,
+    };
     let (limits, solver) = (recording.limits(interrupt), sweep.solver());
     let summary = if recording.energies {
         solver::simulate_audited(parameters, solver, limits, observer)?.0
     } else {
         solver::simulate(parameters, solver, limits, observer)?
     };
-    let records = Records { trace: trace.rows, map: map.rows, profile: profile.rows, contacts: log.events };
+    let records = Records {
+        trace: trace.rows,
+        map: map.rows,
+        profile: profile.rows,
+        contacts: log.events,
+    };
     Ok((Measurements::new(slips, summary), records))
 }

@@ -12,8 +12,18 @@ create_exception!(
     PyValueError,
     "A sweep, or a key of a simulation, that says nothing that can run."
 );
-create_exception!(stickslip, ResultsError, PyRuntimeError, "A results directory that cannot be used, read or written.");
-create_exception!(stickslip, SimulationError, PyRuntimeError, "A simulation that cannot continue.");
+create_exception!(
+    stickslip,
+    ResultsError,
+    PyRuntimeError,
+    "A results directory that cannot be used, read or written."
+);
+create_exception!(
+    stickslip,
+    SimulationError,
+    PyRuntimeError,
+    "A simulation that cannot continue."
+);
 
 /// Why something ended.
 pub enum Error {
@@ -50,7 +60,9 @@ impl From<stickslip::sweep::SweepError> for Error {
 /// A text that Python wrote has no lines that its author knows.
 pub fn in_text(error: stickslip::sweep::SweepError, source: &str) -> Error {
     match error {
-        stickslip::sweep::SweepError::Invalid { mistakes, .. } => Error::Sweep(mistakes_in(source, &mistakes)),
+        stickslip::sweep::SweepError::Invalid { mistakes, .. } => {
+            Error::Sweep(mistakes_in(source, &mistakes))
+        }
         error @ stickslip::sweep::SweepError::Unreadable { .. } => error.into(),
     }
 }

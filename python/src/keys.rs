@@ -12,24 +12,60 @@ const SOLVER: &str = "solver";
 
 /// Keys that stand for others, and those of the solver: section, key, meaning, what is allowed.
 const OTHERS: [(&str, &str, &str, &str); 6] = [
-    (MODEL, "eta", "2 pi Delta / (T V0), in place of T", "a number > 0"),
-    (MODEL, "frequency", "1/T, in place of T", "a number > 0, in Hz"),
-    (SOLVER, "method", "solver", "\"event-driven\" or \"fixed-step\""),
-    (SOLVER, "tolerance", "tolerance of the event-driven solver, relative to fs/k", "a number"),
-    (SOLVER, "resolve", "how the event-driven solver resolves motion", "\"auto\", \"grid\" or \"taylor\""),
-    (SOLVER, "dt", "step of the fixed-step solver", "a number > 0, in s"),
+    (
+        MODEL,
+        "eta",
+        "2 pi Delta / (T V0), in place of T",
+        "a number > 0",
+    ),
+    (
+        MODEL,
+        "frequency",
+        "1/T, in place of T",
+        "a number > 0, in Hz",
+    ),
+    (
+        SOLVER,
+        "method",
+        "solver",
+        "\"event-driven\" or \"fixed-step\"",
+    ),
+    (
+        SOLVER,
+        "tolerance",
+        "tolerance of the event-driven solver, relative to fs/k",
+        "a number",
+    ),
+    (
+        SOLVER,
+        "resolve",
+        "how the event-driven solver resolves motion",
+        "\"auto\", \"grid\" or \"taylor\"",
+    ),
+    (
+        SOLVER,
+        "dt",
+        "step of the fixed-step solver",
+        "a number > 0, in s",
+    ),
 ];
 
 /// Every key, with its section.
 fn sections() -> impl Iterator<Item = (&'static str, &'static str)> {
     (Symbol::ALL.into_iter().map(|symbol| (symbol.key(), MODEL)))
-        .chain(RecordingKey::ALL.into_iter().map(|record| (record.key(), RECORD)))
+        .chain(
+            RecordingKey::ALL
+                .into_iter()
+                .map(|record| (record.key(), RECORD)),
+        )
         .chain(OTHERS.map(|(section, other, ..)| (other, section)))
 }
 
 /// The section of a key.
 pub fn section(key: &str) -> Option<&'static str> {
-    sections().find(|(known, _)| *known == key).map(|(_, section)| section)
+    sections()
+        .find(|(known, _)| *known == key)
+        .map(|(_, section)| section)
 }
 
 /// What was probably meant by an unknown key.
@@ -49,7 +85,10 @@ pub fn keys(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let model = Symbol::ALL.map(|symbol| (symbol.description(), parameters.get(symbol)));
     let record = RecordingKey::ALL.map(|key| (key.description(), recording.get(key)));
     for (field, default) in model.into_iter().chain(record) {
-        keys.set_item(field.key, (field.meaning, field.requirement(), object(py, default)?))?;
+        keys.set_item(
+            field.key,
+            (field.meaning, field.requirement(), object(py, default)?),
+        )?;
     }
     for (_, key, meaning, allowed) in OTHERS {
         keys.set_item(key, (meaning, allowed, py.None()))?;

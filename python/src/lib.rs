@@ -12,7 +12,10 @@
 //!
 //! Words, defaults and plots are Python's, in `python/stickslip`. Contract: nothing here panics, or crashes the interpreter.
 
-#![expect(clippy::needless_pass_by_value, reason = "arguments come from Python by value")]
+#![expect(
+    clippy::needless_pass_by_value,
+    reason = "arguments come from Python by value"
+)]
 
 mod errors;
 mod keys;

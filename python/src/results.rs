@@ -32,7 +32,10 @@ const JOB_ID: &str = "job_id";
 pub fn sweep_of(py: Python<'_>, directory: PathBuf) -> PyResult<(String, String)> {
     let sweep = py.detach(|| {
         let results = Results::read(&Layout::new(&Disk, &directory))?;
-        Ok::<_, Error>((results.sweep().name().to_owned(), results.sweep().text().to_owned()))
+        Ok::<_, Error>((
+            results.sweep().name().to_owned(),
+            results.sweep().text().to_owned(),
+        ))
     });
     Ok(sweep?)
 }
@@ -64,14 +67,24 @@ pub fn read(
 ) -> PyResult<Table> {
     let layout = Layout::new(&Disk, &directory);
     let results = py.detach(|| Results::read(&layout)).map_err(Error::from)?;
-    let known = [SLIPS, PRECURSORS, JOBS].into_iter().find(|known| *known == table);
+    let known = [SLIPS, PRECURSORS, JOBS]
+        .into_iter()
+        .find(|known| *known == table);
     let own = match known {
         Some(known) => (known, recorded_schema(known, results.sweep().recording())),
-        None if table == SetRow::NAME && results.round().is_some() => (SetRow::NAME, schema::<SetInRounds>()),
-        None => reduced_schema(table).ok_or_else(|| PyValueError::new_err(format!("there is no table {table}")))?,
+        None if table == SetRow::NAME && results.round().is_some() => {
+            (SetRow::NAME, schema::<SetInRounds>())
+        }
+        None => reduced_schema(table)
+            .ok_or_else(|| PyValueError::new_err(format!("there is no table {table}")))?,
     };
     let wanted = Wanted::new(own, columns.as_deref(), join)?;
-    let found = watched::<_, ()>(py, |stop, _| wanted.read(&results, stop), |()| (), |_| Ok(()));
+    let found = watched::<_, ()>(
+        py,
+        |stop, _| wanted.read(&results, stop),
+        |()| (),
+        |_| Ok(()),
+    );
     Ok(found?)
 }
 
@@ -79,7 +92,13 @@ fn reduced_schema(table: &str) -> Option<(&'static str, SchemaRef)> {
     fn of<R: TableRow>() -> (&'static str, SchemaRef) {
         (R::NAME, schema::<R>())
     }
-    let all = [of::<SetRow>(), of::<EdgeRow>(), of::<HistogramBin>(), of::<BackboneBin>(), of::<Point>()];
+    let all = [
+        of::<SetRow>(),
+        of::<EdgeRow>(),
+        of::<HistogramBin>(),
+        of::<BackboneBin>(),
+        of::<Point>(),
+    ];
     all.into_iter().find(|(name, _)| *name == table)
 }
 
@@ -94,32 +113,70 @@ struct Wanted {
 }
 
 impl Wanted {
-    fn new((table, own): (&'static str, SchemaRef), columns: Option<&[String]>, join: bool) -> PyResult<Self> {
+    fn new(
+        (table, own): (&'static str, SchemaRef),
+        columns: Option<&[String]>,
+        join: bool,
+    ) -> PyResult<Self> {
         let has_jobs = [SLIPS, PRECURSORS].contains(&table);
-        let jobs = if has_jobs { schema::<JobRow>() } else { Arc::new(Schema::empty()) };
+        let jobs = if has_jobs {
+            schema::<JobRow>()
+        } else {
+            Arc::new(Schema::empty())
+        };
         let is_own = |name: &str| own.field_with_name(name).is_ok();
-        let others = || jobs.fields().iter().map(|field| field.name()).filter(|name| !is_own(name));
+        let others = || {
+            jobs.fields()
+                .iter()
+                .map(|field| field.name())
+                .filter(|name| !is_own(name))
+        };
         let names: Vec<String> = match columns {
             Some(columns) => columns.to_vec(),
-            None => own.fields().iter().map(|field| field.name()).cloned().collect(),
+            None => own
+                .fields()
+                .iter()
+                .map(|field| field.name())
+                .cloned()
+                .collect(),
         };
-        let joined = others().filter(|name| join && !names.contains(name)).cloned().collect();
+        let joined = others()
+            .filter(|name| join && !names.contains(name))
+            .cloned()
+            .collect();
         let names = [names, joined].concat();
         let mut fields = Vec::new();
         for name in &names {
-            let field = own.field_with_name(name).or_else(|_| jobs.field_with_name(name));
+            let field = own
+                .field_with_name(name)
+                .or_else(|_| jobs.field_with_name(name));
             let field = field.map_err(|_| {
-                let known: Vec<&str> =
-                    own.fields().iter().map(|field| field.name()).chain(others()).map(String::as_str).collect();
+                let known: Vec<&str> = own
+                    .fields()
+                    .iter()
+                    .map(|field| field.name())
+                    .chain(others())
+                    .map(String::as_str)
+                    .collect();
                 PyValueError::new_err(match stickslip::sweep::nearest(name, &known) {
-                    Some(near) => format!("{table}: there is no column {name}; did you mean {near}?"),
-                    None => format!("{table}: there is no column {name}; there are {}", known.join(", ")),
+                    Some(near) => {
+                        format!("{table}: there is no column {name}; did you mean {near}?")
+                    }
+                    None => format!(
+                        "{table}: there is no column {name}; there are {}",
+                        known.join(", ")
+                    ),
                 })
             })?;
             fields.push(field.clone());
         }
         let (own, of_jobs) = names.into_iter().partition(|name| is_own(name));
-        Ok(Self { table, schema: Arc::new(Schema::new(fields)), own, of_jobs })
+        Ok(Self {
+            table,
+            schema: Arc::new(Schema::new(fields)),
+            own,
+            of_jobs,
+        })
     }
 
     fn read(&self, results: &Results<'_>, stop: &AtomicBool) -> Result<Table, Error> {
@@ -147,28 +204,47 @@ impl Wanted {
         if !self.of_jobs.is_empty() || own.is_empty() {
             own.push(JOB_ID.to_owned());
         }
-        let jobs = if self.of_jobs.is_empty() { None } else { Some(Jobs::read(layout, &self.of_jobs, stop)?) };
+        let jobs = if self.of_jobs.is_empty() {
+            None
+        } else {
+            Some(Jobs::read(layout, &self.of_jobs, stop)?)
+        };
         let mut batches = Vec::new();
         for batch in files.columns(&own) {
             interruptible(stop)?;
             let batch = batch?;
             let damaged = |problem: String| ResultsError::damaged(&batch.path, problem);
-            let rows = jobs.as_ref().map(|jobs| jobs.rows(&batch.rows)).transpose().map_err(damaged)?;
+            let rows = jobs
+                .as_ref()
+                .map(|jobs| jobs.rows(&batch.rows))
+                .transpose()
+                .map_err(damaged)?;
             let column = |field: &Field| -> Result<ArrayRef, Error> {
                 let name = field.name();
                 match (batch.rows.column_by_name(name), &jobs, &rows) {
                     (Some(column), ..) => Ok(Arc::clone(column)),
-                    (None, Some(jobs), Some(rows)) if !self.own.contains(name) => jobs.take(name, rows),
+                    (None, Some(jobs), Some(rows)) if !self.own.contains(name) => {
+                        jobs.take(name, rows)
+                    }
                     // Programs of other versions had other columns.
-                    _ if field.is_nullable() => Ok(new_null_array(field.data_type(), batch.rows.num_rows())),
+                    _ if field.is_nullable() => {
+                        Ok(new_null_array(field.data_type(), batch.rows.num_rows()))
+                    }
                     _ => Err(damaged(format!("there is no column {name}")).into()),
                 }
             };
             let columns = self.schema.fields().iter().map(|field| column(field));
             let columns = columns.collect::<Result<Vec<ArrayRef>, Error>>()?;
-            batches.push(RecordBatch::try_new(SchemaRef::clone(&self.schema), columns)?);
+            batches.push(RecordBatch::try_new(
+                SchemaRef::clone(&self.schema),
+                columns,
+            )?);
         }
-        Ok(Table::new(self.table, SchemaRef::clone(&self.schema), batches))
+        Ok(Table::new(
+            self.table,
+            SchemaRef::clone(&self.schema),
+            batches,
+        ))
     }
 }
 
@@ -187,27 +263,51 @@ impl Jobs {
             interruptible(stop)?;
             batches.push(batch?.rows);
         }
-        let of_first = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
-        let batches = batches.into_iter().map(|batch| batch.with_schema(SchemaRef::clone(&of_first)));
+        let of_first = batches
+            .first()
+            .map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
+        let batches = batches
+            .into_iter()
+            .map(|batch| batch.with_schema(SchemaRef::clone(&of_first)));
         let columns = concat_batches(&of_first, &batches.collect::<Result<Vec<_>, _>>()?)?;
-        let ids = columns.column_by_name(JOB_ID).map(AsArray::as_string::<i32>);
-        let rows = ids.into_iter().flatten().zip(0..).filter_map(|(id, row)| Some((id?.to_owned(), row))).collect();
+        let ids = columns
+            .column_by_name(JOB_ID)
+            .map(AsArray::as_string::<i32>);
+        let rows = ids
+            .into_iter()
+            .flatten()
+            .zip(0..)
+            .filter_map(|(id, row)| Some((id?.to_owned(), row)))
+            .collect();
         Ok(Self { columns, rows })
     }
 
     /// The row of the job of each row of a batch.
     fn rows(&self, batch: &RecordBatch) -> Result<UInt32Array, String> {
-        let ids = batch.column_by_name(JOB_ID).ok_or_else(|| format!("there is no column {JOB_ID}"))?;
+        let ids = batch
+            .column_by_name(JOB_ID)
+            .ok_or_else(|| format!("there is no column {JOB_ID}"))?;
         let row = |id: Option<&str>| {
             let row = id.and_then(|id| self.rows.get(id)).copied();
-            row.ok_or_else(|| format!("job {} is not in the table of jobs", id.unwrap_or("without an id")))
+            row.ok_or_else(|| {
+                format!(
+                    "job {} is not in the table of jobs",
+                    id.unwrap_or("without an id")
+                )
+            })
         };
-        ids.as_string::<i32>().iter().map(row).collect::<Result<Vec<u32>, String>>().map(UInt32Array::from)
+        ids.as_string::<i32>()
+            .iter()
+            .map(row)
+            .collect::<Result<Vec<u32>, String>>()
+            .map(UInt32Array::from)
     }
 
     fn take(&self, column: &str, rows: &UInt32Array) -> Result<ArrayRef, Error> {
         let column = self.columns.column_by_name(column).ok_or_else(|| {
-            Error::Results(format!("tables/jobs: there is no column {column}; `stickslip verify` reports what to do"))
+            Error::Results(format!(
+                "tables/jobs: there is no column {column}; `stickslip verify` reports what to do"
+            ))
         })?;
         Ok(take(column.as_ref() as &dyn Array, rows, None)?)
     }
@@ -215,5 +315,9 @@ impl Jobs {
 
 /// Ends what nobody waits for any more.
 fn interruptible(stop: &AtomicBool) -> Result<(), Error> {
-    if stop.load(Ordering::Relaxed) { Err(Error::Results("interrupted".to_owned())) } else { Ok(()) }
+    if stop.load(Ordering::Relaxed) {
+        Err(Error::Results("interrupted".to_owned()))
+    } else {
+        Ok(())
+    }
 }

@@ -29,16 +29,32 @@ impl Progress {
         self.has_news = true;
         self.tally.note(&event);
         match event {
-            RunEvent::Started { jobs, predicted_cost, jobs_there, threads, .. } => {
+            RunEvent::Started {
+                jobs,
+                predicted_cost,
+                jobs_there,
+                threads,
+                ..
+            } => {
                 self.messages.push(format!(
                     "{jobs} jobs to run, {jobs_there} there already; about {:.1} s on {threads} threads",
                     predicted_cost / threads as f64
                 ));
             }
-            RunEvent::JobFailed { job_id, reason, command, .. } => {
-                self.messages.push(format!("job {job_id} failed: {reason}\n  alone: {command}"));
+            RunEvent::JobFailed {
+                job_id,
+                reason,
+                command,
+                ..
+            } => {
+                self.messages
+                    .push(format!("job {job_id} failed: {reason}\n  alone: {command}"));
             }
-            RunEvent::JobTakesLong { command, predicted_cost, wall } => self.messages.push(format!(
+            RunEvent::JobTakesLong {
+                command,
+                predicted_cost,
+                wall,
+            } => self.messages.push(format!(
                 "1 job has run {wall:.1} s, {:.0} times its prediction: {command}",
                 wall / predicted_cost
             )),
@@ -51,15 +67,28 @@ impl Progress {
         if !std::mem::take(&mut self.has_news) || callback.is_none(py) {
             return Ok(());
         }
-        let (Tally { jobs, jobs_done, .. }, share) = (self.tally, self.tally.share());
-        callback.call1(py, (jobs_done, jobs, share, std::mem::take(&mut self.messages))).map(drop)
+        let (
+            Tally {
+                jobs, jobs_done, ..
+            },
+            share,
+        ) = (self.tally, self.tally.share());
+        callback
+            .call1(
+                py,
+                (jobs_done, jobs, share, std::mem::take(&mut self.messages)),
+            )
+            .map(drop)
     }
 }
 
 /// Runs or resumes a sweep file, or the text of one. Returns the results directory, and warnings.
 #[pyfunction]
 #[pyo3(signature = (file, text, out, threads, retry_failed, walltime, reduce, callback))]
-#[expect(clippy::too_many_arguments, reason = "called by keyword-only Python code")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "called by keyword-only Python code"
+)]
 pub fn run(
     py: Python<'_>,
     file: Option<PathBuf>,
@@ -73,40 +102,63 @@ pub fn run(
 ) -> PyResult<(PathBuf, Vec<String>)> {
     let resumed = file.as_deref().filter(|file| file.is_dir());
     let sweep = match resumed {
-        Some(directory) => Results::read(&Layout::new(&Disk, directory)).map_err(Error::from)?.sweep().clone(),
+        Some(directory) => Results::read(&Layout::new(&Disk, directory))
+            .map_err(Error::from)?
+            .sweep()
+            .clone(),
         None => read_sweep(file.as_deref(), text, "sweep")?,
     };
-    let root = out.or(resumed.map(ToOwned::to_owned)).unwrap_or_else(|| Layout::default_root(&sweep));
-    let threads = Threads::choose(threads, |variable| std::env::var_os(variable)).map_err(Error::from)?.count;
+    let root = out
+        .or(resumed.map(ToOwned::to_owned))
+        .unwrap_or_else(|| Layout::default_root(&sweep));
+    let threads = Threads::choose(threads, |variable| std::env::var_os(variable))
+        .map_err(Error::from)?
+        .count;
     let progress = Mutex::new(Progress::default());
     let report = watched(
         py,
         |stop, events| {
             let layout = Layout::new(&Disk, &root);
-            let options = Options { threads, stop, retry_failed, shard: Shard::default(), walltime };
+            let options = Options {
+                threads,
+                stop,
+                retry_failed,
+                shard: Shard::default(),
+                walltime,
+            };
             let (recording, solver) = (*sweep.recording(), sweep.solver());
-            stickslip::run::join(&layout, &sweep, options, |joined| -> Result<RunReport, Error> {
-                let kernel = |job: &stickslip::sweep::Job, interrupt: &_| {
-                    measure(&job.parameters, &recording, solver, interrupt)
-                };
-                // That nobody listens any more does not end a run.
-                let report = joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
-                if reduce && report.jobs_left == 0 && !report.stopped {
-                    joined.reduce(|| -> Result<(), Error> {
-                        stickslip::reduce::reduce(&Results::read(&layout)?)?;
-                        draw_all(&layout, &Look::of_sweep(sweep.name()), &Format::DEFAULT)?;
-                        Ok(())
-                    })?;
-                }
-                Ok(report)
-            })
+            stickslip::run::join(
+                &layout,
+                &sweep,
+                options,
+                |joined| -> Result<RunReport, Error> {
+                    let kernel = |job: &stickslip::sweep::Job, interrupt: &_| {
+                        measure(&job.parameters, &recording, solver, interrupt)
+                    };
+                    // That nobody listens any more does not end a run.
+                    let report =
+                        joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
+                    if reduce && report.jobs_left == 0 && !report.stopped {
+                        joined.reduce(|| -> Result<(), Error> {
+                            stickslip::reduce::reduce(&Results::read(&layout)?)?;
+                            draw_all(&layout, &Look::of_sweep(sweep.name()), &Format::DEFAULT)?;
+                            Ok(())
+                        })?;
+                    }
+                    Ok(report)
+                },
+            )
         },
         |event| {
             if let Ok(mut progress) = progress.lock() {
                 progress.note(event);
             }
         },
-        |py| progress.lock().map_or(Ok(()), |mut progress| progress.show(py, &callback)),
+        |py| {
+            progress
+                .lock()
+                .map_or(Ok(()), |mut progress| progress.show(py, &callback))
+        },
     )?;
     let mut warnings = sweep.warnings();
     if report.jobs_failed > 0 {
@@ -116,7 +168,11 @@ pub fn run(
         ));
     }
     if report.jobs_left > 0 {
-        let why = if report.stopped { "the time was over; the same call resumes" } else { "others run them" };
+        let why = if report.stopped {
+            "the time was over; the same call resumes"
+        } else {
+            "others run them"
+        };
         warnings.push(format!("jobs left: {}; {why}", report.jobs_left));
     }
     Ok((root, warnings))

@@ -9,7 +9,9 @@ use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stickslip::observe::ContactRow;
-use stickslip::results::tables::{All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label, relabel};
+use stickslip::results::tables::{
+    All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label, relabel,
+};
 use stickslip::simulate::{self as single, Records, Request, only_job};
 use stickslip::sweep::{Change, Sweep};
 use stickslip::table::columns::{Row, Value};
@@ -20,11 +22,22 @@ pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
     let (mut changes, mut unknown) = (Vec::new(), Vec::new());
     for (key, value) in keys {
         match section(&key) {
-            Some(section) => changes.push(Change { section, key, value }),
-            None => unknown.push(format!("in the keys: {key} = {value}: unknown key; {}", hint(&key))),
+            Some(section) => changes.push(Change {
+                section,
+                key,
+                value,
+            }),
+            None => unknown.push(format!(
+                "in the keys: {key} = {value}: unknown key; {}",
+                hint(&key)
+            )),
         }
     }
-    if unknown.is_empty() { Ok(single::sweep_text(&changes)) } else { Err(Error::Sweep(unknown.join("\n")).into()) }
+    if unknown.is_empty() {
+        Ok(single::sweep_text(&changes))
+    } else {
+        Err(Error::Sweep(unknown.join("\n")).into())
+    }
 }
 
 /// Reads a sweep: a file, or a text that was made of something.
@@ -36,12 +49,21 @@ pub fn read_sweep(file: Option<&Path>, text: &str, source: &str) -> Result<Sweep
 }
 
 /// A row of the jobs table, the text of the sweep, warnings, and tables by name.
-type Simulated<'py> = (Bound<'py, PyDict>, String, Vec<String>, BTreeMap<&'static str, Table>);
+type Simulated<'py> = (
+    Bound<'py, PyDict>,
+    String,
+    Vec<String>,
+    BTreeMap<&'static str, Table>,
+);
 
 /// Simulates the only job of a sweep.
 #[pyfunction]
 #[pyo3(signature = (file, text, source, sample, trace, map, profile, contacts))]
-#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "called by keyword-only Python code")]
+#[expect(
+    clippy::too_many_arguments,
+    clippy::fn_params_excessive_bools,
+    reason = "called by keyword-only Python code"
+)]
 pub fn simulate<'py>(
     py: Python<'py>,
     file: Option<PathBuf>,
@@ -55,20 +77,42 @@ pub fn simulate<'py>(
 ) -> PyResult<Simulated<'py>> {
     let sweep = read_sweep(file.as_deref(), text, source)?;
     let parameters = only_job(&sweep).map_err(Error::from)?.parameters;
-    let request = Request { sample, trace, map, profile, contacts };
-    request.check(&parameters, sweep.recording()).map_err(Error::from)?;
+    let request = Request {
+        sample,
+        trace,
+        map,
+        profile,
+        contacts,
+    };
+    request
+        .check(&parameters, sweep.recording())
+        .map_err(Error::from)?;
     let (row, tables) = watched::<_, ()>(
         py,
         |stop, _| {
             let (measured, records) = single::simulate(&sweep, &parameters, request, stop)?;
             let names = label::<DriveAndSeed>(&sweep, &parameters);
             let row: JobRow = (relabel::<_, All>(&names), JobRecord::new(Ok(&measured)));
-            let Records { trace: samples, map: cells, profile: blocks, contacts: events } = records;
+            let Records {
+                trace: samples,
+                map: cells,
+                profile: blocks,
+                contacts: events,
+            } = records;
             let mut tables = BTreeMap::new();
-            let slips = measured.slips.iter().map(|slip| -> SlipRow<'_> { (&names, slip) });
-            tables.insert("slips", Table::without(&sweep.recording().left_out(), slips)?);
+            let slips = measured
+                .slips
+                .iter()
+                .map(|slip| -> SlipRow<'_> { (&names, slip) });
+            tables.insert(
+                "slips",
+                Table::without(&sweep.recording().left_out(), slips)?,
+            );
             if sweep.recording().precursors {
-                let rows = measured.precursors.iter().map(|precursor| -> PrecursorRow<'_> { (&names, precursor) });
+                let rows = measured
+                    .precursors
+                    .iter()
+                    .map(|precursor| -> PrecursorRow<'_> { (&names, precursor) });
                 tables.insert("precursors", Table::of_rows(rows)?);
             }
             if trace {
@@ -81,21 +125,31 @@ pub fn simulate<'py>(
                 tables.insert("profile", Table::of_rows(blocks.into_iter())?);
             }
             if contacts {
-                tables.insert("contacts", Table::of_rows(events.iter().map(ContactRow::from))?);
+                tables.insert(
+                    "contacts",
+                    Table::of_rows(events.iter().map(ContactRow::from))?,
+                );
             }
             Ok((row, tables))
         },
         |()| (),
         |_| Ok(()),
     )?;
-    Ok((as_dict(py, &row)?, sweep.text().to_owned(), sweep.warnings(), tables))
+    Ok((
+        as_dict(py, &row)?,
+        sweep.text().to_owned(),
+        sweep.warnings(),
+        tables,
+    ))
 }
 
 /// A row as a dict, by the names of the columns; `None` where a value is missing.
 fn as_dict<'py, R: Row>(py: Python<'py>, row: &R) -> PyResult<Bound<'py, PyDict>> {
     let (columns, dict, mut written) = (R::columns(), PyDict::new(py), Ok(()));
     row.cells(&mut |cell| {
-        let Some(column) = columns.get(dict.len()) else { return };
+        let Some(column) = columns.get(dict.len()) else {
+            return;
+        };
         let name = column.name.as_ref();
         let set = match cell {
             Value::Null => dict.set_item(name, py.None()),

@@ -27,7 +27,11 @@ pub struct Table {
 
 impl Table {
     pub fn new(name: &str, schema: SchemaRef, batches: Vec<RecordBatch>) -> Self {
-        Self { name: name.to_owned(), schema, batches }
+        Self {
+            name: name.to_owned(),
+            schema,
+            batches,
+        }
     }
 
     /// A table of rows in memory.
@@ -36,7 +40,10 @@ impl Table {
     }
 
     /// The same without the columns of these names.
-    pub fn without<R: TableRow>(left_out: &[Cow<'static, str>], rows: impl Iterator<Item = R>) -> Result<Self, Error> {
+    pub fn without<R: TableRow>(
+        left_out: &[Cow<'static, str>],
+        rows: impl Iterator<Item = R>,
+    ) -> Result<Self, Error> {
         let mut buffer = RowBuffer::new::<R>().without(left_out);
         rows.for_each(|row| buffer.push(&row));
         let batch = buffer.take()?;
@@ -78,7 +85,11 @@ impl Table {
     /// Names of the columns.
     #[getter]
     fn columns(&self) -> Vec<&str> {
-        self.schema.fields().iter().map(|field| field.name().as_str()).collect()
+        self.schema
+            .fields()
+            .iter()
+            .map(|field| field.name().as_str())
+            .collect()
     }
 
     /// Unit of each column; "" for a pure number or a text.
@@ -100,18 +111,33 @@ impl Table {
 
     fn __repr__(&self) -> String {
         let fields = self.schema.fields();
-        let width =
-            |text: fn(&Field) -> &str| fields.iter().map(|field| text(field).chars().count()).max().unwrap_or(0);
-        let (names, units) = (width(|field| field.name()), width(|field| metadata(field, UNIT)));
+        let width = |text: fn(&Field) -> &str| {
+            fields
+                .iter()
+                .map(|field| text(field).chars().count())
+                .max()
+                .unwrap_or(0)
+        };
+        let (names, units) = (
+            width(|field| field.name()),
+            width(|field| metadata(field, UNIT)),
+        );
         let line = |field: &std::sync::Arc<Field>| {
             let (unit, meaning) = (metadata(field, UNIT), metadata(field, DESCRIPTION));
-            format!("  {:names$}  {:5}  {unit:units$}  {meaning}", field.name(), kind(field))
+            format!(
+                "  {:names$}  {:5}  {unit:units$}  {meaning}",
+                field.name(),
+                kind(field)
+            )
         };
         let rows = match self.__len__() {
             1 => "1 row".to_owned(),
             rows => format!("{rows} rows"),
         };
-        let lines: Vec<String> = fields.iter().map(|field| line(field).trim_end().to_owned()).collect();
+        let lines: Vec<String> = fields
+            .iter()
+            .map(|field| line(field).trim_end().to_owned())
+            .collect();
         format!("{}: {rows}\n{}", self.name, lines.join("\n"))
     }
 
@@ -126,7 +152,11 @@ impl Table {
         drop(requested_schema);
         let batches = self.batches.clone().into_iter().map(Ok);
         let reader = RecordBatchIterator::new(batches, SchemaRef::clone(&self.schema));
-        PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(reader)), c"arrow_array_stream")
+        PyCapsule::new_with_value(
+            py,
+            FFI_ArrowArrayStream::new(Box::new(reader)),
+            c"arrow_array_stream",
+        )
     }
 
     /// Hands on the names, types, units and meanings of the columns.
@@ -136,21 +166,33 @@ impl Table {
     }
 
     /// Pickled, it is a stream of Arrow IPC.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let stream = || -> Result<Vec<u8>, Error> {
             let mut writer = StreamWriter::try_new(Vec::new(), &self.schema)?;
-            self.batches.iter().try_for_each(|batch| writer.write(batch))?;
+            self.batches
+                .iter()
+                .try_for_each(|batch| writer.write(batch))?;
             Ok(writer.into_inner()?)
         };
         let arguments = (&self.name, PyBytes::new(py, &stream()?)).into_pyobject(py)?;
-        Ok((py.get_type::<Self>().getattr(intern!(py, "_of_stream"))?, arguments))
+        Ok((
+            py.get_type::<Self>().getattr(intern!(py, "_of_stream"))?,
+            arguments,
+        ))
     }
 
     #[staticmethod]
     fn _of_stream(name: &str, bytes: &[u8]) -> PyResult<Self> {
         let read = || -> Result<Self, Error> {
             let reader = StreamReader::try_new(bytes, None)?;
-            Ok(Self::new(name, reader.schema(), reader.collect::<Result<_, _>>()?))
+            Ok(Self::new(
+                name,
+                reader.schema(),
+                reader.collect::<Result<_, _>>()?,
+            ))
         };
         Ok(read()?)
     }
@@ -158,7 +200,8 @@ impl Table {
     /// The table as a `pyarrow.Table`; units and meanings are in the metadata of its fields.
     fn to_pyarrow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
-        py.import(intern!(py, "pyarrow"))?.call_method1(intern!(py, "table"), (slf,))
+        py.import(intern!(py, "pyarrow"))?
+            .call_method1(intern!(py, "table"), (slf,))
     }
 
     /// The table as a `pandas.DataFrame`; units and meanings are in `.attrs["units"]` and `.attrs["meaning"]`.
@@ -175,6 +218,7 @@ impl Table {
     /// The table as a `polars.DataFrame`, which keeps no units: see `units`.
     fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
-        py.import(intern!(py, "polars"))?.call_method1(intern!(py, "DataFrame"), (slf,))
+        py.import(intern!(py, "polars"))?
+            .call_method1(intern!(py, "DataFrame"), (slf,))
     }
 }

@@ -41,7 +41,9 @@ pub fn watched<T: Send, M: Send>(
                     }
                 }
             }
-            let ended = worker.join().unwrap_or_else(|panic| Err(Error::Simulation(message_of(&*panic))));
+            let ended = worker
+                .join()
+                .unwrap_or_else(|panic| Err(Error::Simulation(message_of(&*panic))));
             raised?;
             Python::attach(&mut show)?;
             ended
@@ -51,6 +53,8 @@ pub fn watched<T: Send, M: Send>(
 
 fn message_of(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied();
-    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a message");
+    let text = text
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("without a message");
     format!("panic: {text}")
 }

@@ -31,7 +31,12 @@ pub struct Reference {
 impl Reference {
     /// Keeps this number of breaks.
     pub fn new(parameters: &Parameters, wanted: usize) -> Self {
-        Self { wanted, apart: APART * parameters.wave_crossing_time(), order: HashMap::new(), times: Vec::new() }
+        Self {
+            wanted,
+            apart: APART * parameters.wave_crossing_time(),
+            order: HashMap::new(),
+            times: Vec::new(),
+        }
     }
 }
 
@@ -82,11 +87,22 @@ impl<'a> Comparison<'a> {
     pub fn new(reference: &'a Reference, counted: usize) -> Self {
         let breaks = reference.times.len();
         let counted = counted.min(breaks);
-        Self { reference, counted, errors: vec![f64::NAN; breaks], due: 0, apart: None, now: 0.0 }
+        Self {
+            reference,
+            counted,
+            errors: vec![f64::NAN; breaks],
+            due: 0,
+            apart: None,
+            now: 0.0,
+        }
     }
 
     pub fn errors(&self) -> BreakErrors {
-        let mut made: Vec<f64> = self.errors[..self.counted].iter().copied().filter(|error| !error.is_nan()).collect();
+        let mut made: Vec<f64> = self.errors[..self.counted]
+            .iter()
+            .copied()
+            .filter(|error| !error.is_nan())
+            .collect();
         made.sort_by(f64::total_cmp);
         let together = self.apart.unwrap_or(self.errors.len());
         let times = &self.reference.times;
@@ -107,7 +123,8 @@ impl<'a> Comparison<'a> {
         while let Some(time) = self.reference.times.get(self.due)
             && time + self.reference.apart < now
         {
-            let is_apart = self.errors[self.due].is_nan() || self.errors[self.due] > self.reference.apart;
+            let is_apart =
+                self.errors[self.due].is_nan() || self.errors[self.due] > self.reference.apart;
             if is_apart && self.apart.is_none() {
                 self.apart = Some(self.due);
             }
@@ -174,17 +191,30 @@ mod tests {
     fn breaks_are_matched_by_contact_and_not_by_order() {
         let errors = compared(&[(0.2 + 2e-6, 1), (0.1 + 1e-6, 0), (0.3 + 3e-6, 2), (0.4, 3)]);
         assert!(
-            (errors.median.unwrap() - 2e-6).abs() < 1e-12 && (errors.largest.unwrap() - 3e-6).abs() < 1e-12,
+            (errors.median.unwrap() - 2e-6).abs() < 1e-12
+                && (errors.largest.unwrap() - 3e-6).abs() < 1e-12,
             "{errors:?}"
         );
-        assert!(errors.together_throughout && errors.missing == Some(0) && errors.together == Some(4));
+        assert!(
+            errors.together_throughout && errors.missing == Some(0) && errors.together == Some(4)
+        );
     }
 
     #[test]
     fn a_late_or_missing_break_ends_the_time_together() {
         let late = compared(&[(0.1, 0), (0.21, 1), (0.3, 2), (0.4, 3)]);
-        assert_eq!((late.together, late.together_seconds, late.missing), (Some(1), Some(0.2), Some(0)));
+        assert_eq!(
+            (late.together, late.together_seconds, late.missing),
+            (Some(1), Some(0.2), Some(0))
+        );
         let missing = compared(&[(0.1, 0), (0.2, 1), (0.4, 3)]);
-        assert_eq!((missing.together, missing.missing, missing.together_throughout), (Some(2), Some(1), false));
+        assert_eq!(
+            (
+                missing.together,
+                missing.missing,
+                missing.together_throughout
+            ),
+            (Some(2), Some(1), false)
+        );
     }
 }

@@ -28,7 +28,8 @@ pub fn processor() -> String {
     let description = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let field = |key: &str| {
         let line = description.lines().find(|line| line.starts_with(key))?;
-        line.split_once(':').map(|(_, value)| value.trim().to_owned())
+        line.split_once(':')
+            .map(|(_, value)| value.trim().to_owned())
     };
     let name = field("model name").unwrap_or_else(|| "unknown processor".to_owned());
     let clock = field("cpu MHz").map_or_else(String::new, |clock| format!(", {clock} MHz"));

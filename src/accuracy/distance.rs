@@ -46,11 +46,22 @@ pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distance
     let (mut resampled, mut by_chance) = (Vec::new(), Vec::new());
     for _ in 0..RESAMPLES {
         let other = resample(reference, reference.len(), &mut generator);
-        resampled.push(differences(&resample(sample, sample.len(), &mut generator), &other));
-        by_chance.push(wasserstein(&resample(reference, sample.len(), &mut generator), &other));
+        resampled.push(differences(
+            &resample(sample, sample.len(), &mut generator),
+            &other,
+        ));
+        by_chance.push(wasserstein(
+            &resample(reference, sample.len(), &mut generator),
+            &other,
+        ));
     }
     let found = differences(&sorted(sample), &sorted(reference));
-    let interval = |which: usize| shifted(found[which], resampled.iter().map(|other| other[which]).collect());
+    let interval = |which: usize| {
+        shifted(
+            found[which],
+            resampled.iter().map(|other| other[which]).collect(),
+        )
+    };
     let [(w1_low, w1_high), mean, deviation] = [0, 1, 2].map(interval);
     let [w1, mean_bias, deviation_bias] = found;
     Some(Distances {
@@ -69,7 +80,11 @@ pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distance
 
 /// Differences of two sorted samples: Wasserstein-1, of the means, of the standard deviations.
 fn differences(sample: &[f64], reference: &[f64]) -> [f64; 3] {
-    [wasserstein(sample, reference), mean(sample) - mean(reference), deviation(sample) - deviation(reference)]
+    [
+        wasserstein(sample, reference),
+        mean(sample) - mean(reference),
+        deviation(sample) - deviation(reference),
+    ]
 }
 
 pub(super) fn mean(sample: &[f64]) -> f64 {
@@ -79,14 +94,18 @@ pub(super) fn mean(sample: &[f64]) -> f64 {
 /// Standard deviation of a sample, by n - 1.
 pub(super) fn deviation(sample: &[f64]) -> f64 {
     let mean = mean(sample);
-    let squares: f64 = sample.iter().map(|value| (value - mean) * (value - mean)).sum();
+    let squares: f64 = sample
+        .iter()
+        .map(|value| (value - mean) * (value - mean))
+        .sum();
     (squares / (sample.len() as f64 - 1.0).max(1.0)).sqrt()
 }
 
 /// The interval of the resampled values, shifted so that their median lies on the value: resampling adds noise, and noise
 /// makes distances longer.
 fn shifted(value: f64, mut resampled: Vec<f64>) -> (f64, f64) {
-    let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|probability| quantile(&mut resampled, probability));
+    let [low, median, high] =
+        [TAIL, 0.5, 1.0 - TAIL].map(|probability| quantile(&mut resampled, probability));
     (value + (low - median), value + (high - median))
 }
 
@@ -120,7 +139,8 @@ fn wasserstein(left: &[f64], right: &[f64]) -> f64 {
     let (mut i, mut j, mut distance) = (0, 0, 0.0);
     let mut before = left[0].min(right[0]);
     while i < left.len() || j < right.len() {
-        let [l, r] = [left.get(i), right.get(j)].map(|value| value.copied().unwrap_or(f64::INFINITY));
+        let [l, r] =
+            [left.get(i), right.get(j)].map(|value| value.copied().unwrap_or(f64::INFINITY));
         let gap = (i as f64 / left.len() as f64 - j as f64 / right.len() as f64).abs();
         distance += gap * (l.min(r) - before);
         before = l.min(r);
@@ -133,7 +153,11 @@ fn wasserstein(left: &[f64], right: &[f64]) -> f64 {
 /// Nearest-rank quantile.
 fn quantile(values: &mut [f64], probability: f64) -> f64 {
     values.sort_by(f64::total_cmp);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an index"
+    )]
     let index = (probability * (values.len() - 1) as f64).round() as usize;
     values[index]
 }
@@ -144,7 +168,9 @@ mod tests {
 
     fn uniform(count: usize, shift: f64, key: u64) -> Vec<f64> {
         let mut generator = ChaCha8Rng::seed_from_u64(key);
-        (0..count).map(|_| shift + generator.next_u64() as f64 / 2.0_f64.powi(64)).collect()
+        (0..count)
+            .map(|_| shift + generator.next_u64() as f64 / 2.0_f64.powi(64))
+            .collect()
     }
 
     #[test]
@@ -163,38 +189,71 @@ mod tests {
         let moved = distances(&uniform(500, 0.1, 2), &reference, 3).unwrap();
         assert!(moved.w1 > 2.0 * moved.w1_floor, "{moved:?}");
         assert!(moved.w1_low < 0.1 && 0.1 < moved.w1_high, "{moved:?}");
-        assert!(moved.mean_bias_low > 0.0 && moved.mean_bias_low < 0.1 && 0.1 < moved.mean_bias_high, "{moved:?}");
-        assert!(moved.deviation_bias_low < 0.0 && 0.0 < moved.deviation_bias_high, "{moved:?}");
+        assert!(
+            moved.mean_bias_low > 0.0 && moved.mean_bias_low < 0.1 && 0.1 < moved.mean_bias_high,
+            "{moved:?}"
+        );
+        assert!(
+            moved.deviation_bias_low < 0.0 && 0.0 < moved.deviation_bias_high,
+            "{moved:?}"
+        );
     }
 
     #[test]
     fn every_interval_holds_its_value_and_a_wider_sample_shows_in_its_deviation() {
         let reference = uniform(1000, 0.0, 1);
-        let wide: Vec<f64> = uniform(500, -0.5, 2).into_iter().map(|value| 1.2 * value + 0.5).collect();
+        let wide: Vec<f64> = uniform(500, -0.5, 2)
+            .into_iter()
+            .map(|value| 1.2 * value + 0.5)
+            .collect();
         for sample in [uniform(500, 0.0, 2), uniform(1000, 0.0, 1), wide.clone()] {
             let found = distances(&sample, &reference, 3).unwrap();
             for (least, low, value, high) in [
                 (0.0, found.w1_low, found.w1, found.w1_high),
-                (f64::NEG_INFINITY, found.mean_bias_low, found.mean_bias, found.mean_bias_high),
-                (f64::NEG_INFINITY, found.deviation_bias_low, found.deviation_bias, found.deviation_bias_high),
+                (
+                    f64::NEG_INFINITY,
+                    found.mean_bias_low,
+                    found.mean_bias,
+                    found.mean_bias_high,
+                ),
+                (
+                    f64::NEG_INFINITY,
+                    found.deviation_bias_low,
+                    found.deviation_bias,
+                    found.deviation_bias_high,
+                ),
             ] {
-                assert!(least <= low && low <= value && value <= high, "{low} {value} {high}");
+                assert!(
+                    least <= low && low <= value && value <= high,
+                    "{low} {value} {high}"
+                );
             }
         }
         let wider = distances(&wide, &reference, 3).unwrap();
         // 0.2 times the deviation of a uniform distribution, 1/sqrt(12).
         assert!(
-            0.0 < wider.deviation_bias_low && wider.deviation_bias_low < 0.0577 && 0.0577 < wider.deviation_bias_high,
+            0.0 < wider.deviation_bias_low
+                && wider.deviation_bias_low < 0.0577
+                && 0.0577 < wider.deviation_bias_high,
             "{wider:?}"
         );
-        assert!(wider.mean_bias_low < 0.0 && 0.0 < wider.mean_bias_high, "{wider:?}");
+        assert!(
+            wider.mean_bias_low < 0.0 && 0.0 < wider.mean_bias_high,
+            "{wider:?}"
+        );
     }
 
     #[test]
     fn the_same_samples_give_the_same_intervals() {
         let (sample, reference) = (uniform(50, 0.0, 1), uniform(60, 0.0, 2));
-        assert_eq!(distances(&sample, &reference, 7), distances(&sample, &reference, 7));
-        assert_ne!(distances(&sample, &reference, 7), distances(&sample, &reference, 8));
+        assert_eq!(
+            distances(&sample, &reference, 7),
+            distances(&sample, &reference, 7)
+        );
+        assert_ne!(
+            distances(&sample, &reference, 7),
+            distances(&sample, &reference, 8)
+        );
         assert_eq!(distances(&[], &reference, 7), None);
     }
 }

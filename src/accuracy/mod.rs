@@ -41,11 +41,17 @@ columns! {
 impl From<Solver> for Method {
     fn from(solver: Solver) -> Self {
         let (method, setting) = match solver {
-            Solver::EventDriven { resolve: Resolve::Auto, tolerance } => ("event-driven", tolerance),
+            Solver::EventDriven {
+                resolve: Resolve::Auto,
+                tolerance,
+            } => ("event-driven", tolerance),
             Solver::EventDriven { resolve, tolerance } => (resolve.word(), tolerance),
             Solver::FixedStep { time_step } => (FIXED_STEP, time_step),
         };
-        Self { method: method.to_owned(), setting }
+        Self {
+            method: method.to_owned(),
+            setting,
+        }
     }
 }
 
@@ -62,7 +68,11 @@ impl Method {
 
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (setting, unit) = if self.method == FIXED_STEP { ("dt", " s") } else { ("tolerance", "") };
+        let (setting, unit) = if self.method == FIXED_STEP {
+            ("dt", " s")
+        } else {
+            ("tolerance", "")
+        };
         write!(f, "{}, {setting} {:e}{unit}", self.name(), self.setting)
     }
 }
@@ -71,17 +81,34 @@ impl fmt::Display for Method {
 pub fn set_in_words(parameters: &Parameters) -> String {
     let modulation = parameters.frequency().map_or_else(
         || "Delta = 0".to_owned(),
-        |frequency| format!("Delta = {:e} m, 1/T = {frequency} Hz", parameters.modulation_amplitude),
+        |frequency| {
+            format!(
+                "Delta = {:e} m, 1/T = {frequency} Hz",
+                parameters.modulation_amplitude
+            )
+        },
     );
     let others = other_settings(parameters).map(|(key, value)| format!(", {key} = {value}"));
-    format!("V0 = {:e} m/s, {modulation}{}", parameters.drive_velocity, others.collect::<String>())
+    format!(
+        "V0 = {:e} m/s, {modulation}{}",
+        parameters.drive_velocity,
+        others.collect::<String>()
+    )
 }
 
 /// Keys and values of what differs from the defaults, but for the drive and the seed.
 fn other_settings(parameters: &Parameters) -> impl Iterator<Item = (&'static str, Value)> {
     let defaults = Parameters::default();
-    let others = |symbol: &Symbol| !matches!(symbol, Symbol::V0 | Symbol::Delta | Symbol::T | Symbol::Seed);
-    let settings = Symbol::ALL.into_iter().filter(others).map(|symbol| (symbol, parameters.get(symbol)));
+    let others = |symbol: &Symbol| {
+        !matches!(
+            symbol,
+            Symbol::V0 | Symbol::Delta | Symbol::T | Symbol::Seed
+        )
+    };
+    let settings = Symbol::ALL
+        .into_iter()
+        .filter(others)
+        .map(|symbol| (symbol, parameters.get(symbol)));
     let settings = settings.filter(move |(symbol, value)| *value != defaults.get(*symbol));
     settings.map(|(symbol, value)| (symbol.key(), value))
 }

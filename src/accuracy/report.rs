@@ -43,10 +43,17 @@ pub fn write(study: &Study, findings: &Findings, folder: &Path) -> Result<Vec<Pa
             sets.push(set);
         }
     }
-    let mut documents = vec![("accuracy.json".to_owned(), to_json(study, findings).to_string().into_bytes())];
+    let mut documents = vec![(
+        "accuracy.json".to_owned(),
+        to_json(study, findings).to_string().into_bytes(),
+    )];
     for set in sets {
         let others = other_settings(&set).map(|(key, value)| format!("-{key}-{value}"));
-        let name = format!("work-precision-V0-{:e}{}", set.drive_velocity, others.collect::<String>());
+        let name = format!(
+            "work-precision-V0-{:e}{}",
+            set.drive_velocity,
+            others.collect::<String>()
+        );
         let picture = work_precision_figure(&set, findings)?;
         documents.push((format!("{name}.svg"), picture.svg().into_bytes()));
         documents.push((format!("{name}.png"), picture.png()?));
@@ -54,8 +61,10 @@ pub fn write(study: &Study, findings: &Findings, folder: &Path) -> Result<Vec<Pa
     Disk.ensure_folder(folder)?;
     let staging = folder.join("staging");
     let mut commit = Commit::begin(&Layout::new(&Disk, folder), &staging)?;
-    let mut files =
-        vec![stage(&mut commit, folder, &findings.methods)?, stage(&mut commit, folder, &findings.distances)?];
+    let mut files = vec![
+        stage(&mut commit, folder, &findings.methods)?,
+        stage(&mut commit, folder, &findings.distances)?,
+    ];
     for (name, bytes) in documents {
         let file = folder.join(name);
         commit.stage_bytes(&file, &bytes)?;
@@ -69,7 +78,10 @@ pub fn write(study: &Study, findings: &Findings, folder: &Path) -> Result<Vec<Pa
 
 fn stage<R: Table>(commit: &mut Commit<'_>, folder: &Path, rows: &[R]) -> Result<PathBuf> {
     let file = folder.join(format!("{}.parquet", R::NAME));
-    let mut writer = TableWriter::new(commit.stage(&file)?, &Footer::default().with("processor", &cost::processor()))?;
+    let mut writer = TableWriter::new(
+        commit.stage(&file)?,
+        &Footer::default().with("processor", &cost::processor()),
+    )?;
     rows.iter().try_for_each(|row| writer.push(row))?;
     writer.finish()?;
     Ok(file)
@@ -88,28 +100,61 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
         Some((error, (error, largest)))
     });
     let label = "Error of break times (s)".to_owned();
-    let mut panels = vec![ErrorPanel { label, by_chance: None, points: breaks }];
+    let mut panels = vec![ErrorPanel {
+        label,
+        by_chance: None,
+        points: breaks,
+    }];
     for (quantity, name) in [("interval", "τ"), ("front_speed", "front speed")] {
         let points = points(&findings.methods, set, |row| {
-            let Distances { w1, w1_low, w1_high, w1_floor, .. } = findings.distances_of(row, quantity)?.distances;
+            let Distances {
+                w1,
+                w1_low,
+                w1_high,
+                w1_floor,
+                ..
+            } = findings.distances_of(row, quantity)?.distances;
             Some((w1 / w1_floor, (w1_low / w1_floor, w1_high / w1_floor)))
         });
-        panels.push(ErrorPanel { label: format!("W₁ of {name} / chance level"), by_chance: Some(1.0), points });
+        panels.push(ErrorPanel {
+            label: format!("W₁ of {name} / chance level"),
+            by_chance: Some(1.0),
+            points,
+        });
     }
     panels.retain(|panel| !panel.points.is_empty());
     let others = other_settings(set).map(|(key, value)| format!(", {key} = {value}"));
-    let mut mine = findings.methods.iter().filter(|row| unmodulated(&row.parameters) == *set);
-    let extrapolated = if mine.any(|row| row.cost.is_extrapolated()) { EXTRAPOLATED } else { "" };
+    let mut mine = findings
+        .methods
+        .iter()
+        .filter(|row| unmodulated(&row.parameters) == *set);
+    let extrapolated = if mine.any(|row| row.cost.is_extrapolated()) {
+        EXTRAPOLATED
+    } else {
+        ""
+    };
     let look = Look {
-        note: format!("V0 = {:e} m/s{}. {NOTE}{extrapolated}", set.drive_velocity, others.collect::<String>()),
+        note: format!(
+            "V0 = {:e} m/s{}. {NOTE}{extrapolated}",
+            set.drive_velocity,
+            others.collect::<String>()
+        ),
         ..Look::default()
     };
     work_precision(WORK, &panels, &look)
 }
 
 fn unmodulated(set: &Parameters) -> Parameters {
-    let Parameters { modulation_amplitude, modulation_period, .. } = Parameters::default();
-    Parameters { modulation_amplitude, modulation_period, ..set.clone() }
+    let Parameters {
+        modulation_amplitude,
+        modulation_period,
+        ..
+    } = Parameters::default();
+    Parameters {
+        modulation_amplitude,
+        modulation_period,
+        ..set.clone()
+    }
 }
 
 /// Each method under each modulation of the sets that are this one without: `error` gives an error and its uncertainty.
@@ -118,19 +163,38 @@ fn points(
     set: &Parameters,
     error: impl Fn(&MethodRow) -> Option<(f64, (f64, f64))>,
 ) -> Vec<WorkPrecision> {
-    let rows: Vec<&MethodRow> = rows.iter().filter(|row| unmodulated(&row.parameters) == *set).collect();
-    let modulations = || rows.iter().filter(|row| row.parameters.modulation_amplitude > 0.0);
-    let is_one = modulations().all(|row| modulations().next().is_some_and(|first| first.parameters == row.parameters));
+    let rows: Vec<&MethodRow> = rows
+        .iter()
+        .filter(|row| unmodulated(&row.parameters) == *set)
+        .collect();
+    let modulations = || {
+        rows.iter()
+            .filter(|row| row.parameters.modulation_amplitude > 0.0)
+    };
+    let is_one = modulations().all(|row| {
+        modulations()
+            .next()
+            .is_some_and(|first| first.parameters == row.parameters)
+    });
     let point = |row: &&MethodRow| {
         let (error, uncertainty) = error(row)?;
         let drive = match row.parameters.frequency() {
             None => "Δ = 0".to_owned(),
             Some(_) if is_one => "Δ > 0".to_owned(),
-            Some(frequency) => format!("Δ = {:e} m, {frequency} Hz", row.parameters.modulation_amplitude),
+            Some(frequency) => format!(
+                "Δ = {:e} m, {frequency} Hz",
+                row.parameters.modulation_amplitude
+            ),
         };
         let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         let method = format!("{}{mark}", row.solver.name());
-        Some(WorkPrecision { method, drive, error, uncertainty, work: row.cost.per_slip })
+        Some(WorkPrecision {
+            method,
+            drive,
+            error,
+            uncertainty,
+            work: row.cost.per_slip,
+        })
     };
     rows.iter().filter_map(point).collect()
 }
@@ -148,7 +212,10 @@ mod tests {
     use crate::table::file::Dataset;
 
     fn findings() -> Findings {
-        let (parameters, solver) = (Parameters::default(), Method::from(Solver::FixedStep { time_step: 1e-6 }));
+        let (parameters, solver) = (
+            Parameters::default(),
+            Method::from(Solver::FixedStep { time_step: 1e-6 }),
+        );
         let break_times = BreakErrors {
             breaks: Some(100),
             missing: Some(0),
@@ -174,7 +241,11 @@ mod tests {
             break_times,
             ledger_residual: Some(-1e-3),
         };
-        let untested = MethodRow { break_times: BreakErrors::default(), ledger_residual: None, ..method.clone() };
+        let untested = MethodRow {
+            break_times: BreakErrors::default(),
+            ledger_residual: None,
+            ..method.clone()
+        };
         let distance = DistanceRow {
             parameters: Selected::new(parameters),
             case: "defaults".to_owned(),
@@ -188,16 +259,25 @@ mod tests {
             reference_deviation: 0.01,
             distances: measured(&[0.1, 0.11, 0.12], &[0.1, 0.11, 0.13], 0).unwrap(),
         };
-        Findings { methods: vec![method, untested], distances: vec![distance] }
+        Findings {
+            methods: vec![method, untested],
+            distances: vec![distance],
+        }
     }
 
     #[test]
     fn a_study_is_written_as_tables_json_and_figures() {
         let folder = tempfile::tempdir().unwrap();
-        let study = Study { sets: vec![Parameters::default()], ..Study::quick() };
+        let study = Study {
+            sets: vec![Parameters::default()],
+            ..Study::quick()
+        };
         let findings = findings();
         let files = write(&study, &findings, folder.path()).unwrap();
-        let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
+        let names: Vec<_> = files
+            .iter()
+            .map(|file| file.file_name().unwrap().to_str().unwrap())
+            .collect();
         assert_eq!(
             names,
             [
@@ -210,20 +290,43 @@ mod tests {
         );
         assert!(files.iter().all(|file| file.is_file()));
         let batches = Dataset::new(&Disk, files[..1].to_vec()).batches();
-        assert_eq!(batches.map(|batch| batch.unwrap().rows.num_rows()).sum::<usize>(), 2);
+        assert_eq!(
+            batches
+                .map(|batch| batch.unwrap().rows.num_rows())
+                .sum::<usize>(),
+            2
+        );
         let json: Value = serde_json::from_slice(&std::fs::read(&files[2]).unwrap()).unwrap();
         assert_eq!(json["methods"][0]["timed_slips"], 0);
-        assert_eq!((&json["methods"][0]["median_break_error"], &json["methods"][0]["T"]), (&json!(1e-7), &Value::Null));
+        assert_eq!(
+            (
+                &json["methods"][0]["median_break_error"],
+                &json["methods"][0]["T"]
+            ),
+            (&json!(1e-7), &Value::Null)
+        );
         assert_eq!(json["methods"][1]["median_break_error"], Value::Null);
         assert_eq!(json["distances"][0]["quantity"], "interval");
-        assert!(!folder.path().join("staging").exists(), "the staging folder must not stay");
+        assert!(
+            !folder.path().join("staging").exists(),
+            "the staging folder must not stay"
+        );
     }
 
     #[test]
     fn every_field_of_the_json_is_documented() {
         let page = include_str!("../../docs/commands.md");
-        let (study, findings) = (Study { sets: vec![Parameters::default()], ..Study::quick() }, findings());
-        let row = page.lines().find(|line| line.starts_with("| `accuracy` |")).unwrap();
+        let (study, findings) = (
+            Study {
+                sets: vec![Parameters::default()],
+                ..Study::quick()
+            },
+            findings(),
+        );
+        let row = page
+            .lines()
+            .find(|line| line.starts_with("| `accuracy` |"))
+            .unwrap();
         for field in to_json(&study, &findings).as_object().unwrap().keys() {
             assert!(row.contains(&format!("`{field}`")), "{field}");
         }
@@ -233,9 +336,17 @@ mod tests {
     fn every_column_is_documented() {
         let page = include_str!("../../docs/commands.md");
         let described = |name: &str, columns: Vec<Column>| {
-            let row = page.lines().find(|line| line.starts_with(&format!("| `{name}` |"))).unwrap();
+            let row = page
+                .lines()
+                .find(|line| line.starts_with(&format!("| `{name}` |")))
+                .unwrap();
             // The ends of all intervals are described together.
-            for column in columns.iter().map(|column| column.name.trim_end_matches("_low").trim_end_matches("_high")) {
+            for column in columns.iter().map(|column| {
+                column
+                    .name
+                    .trim_end_matches("_low")
+                    .trim_end_matches("_high")
+            }) {
                 assert!(row.contains(&format!("`{column}`")), "{name}.{column}");
             }
         };

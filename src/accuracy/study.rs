@@ -15,7 +15,9 @@ use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Recording, Slip, SlipObserver, measure};
 use crate::run::cpu;
-use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate, simulate_audited};
+use crate::solver::{
+    Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate, simulate_audited,
+};
 use crate::table::columns::{columns, tables};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
@@ -64,13 +66,19 @@ impl Study {
     /// The full study, which takes minutes.
     pub fn full() -> Self {
         Self {
-            sets: [1e-4, 1e-5, 1e-6].into_iter().flat_map(plain_and_modulated).collect(),
+            sets: [1e-4, 1e-5, 1e-6]
+                .into_iter()
+                .flat_map(plain_and_modulated)
+                .collect(),
             solvers: solvers(
                 &[4e-6, 2e-6, 1e-6, 5e-7],
                 &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
                 &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10],
             ),
-            own: Solver::EventDriven { tolerance: 1e-3, resolve: Resolve::Grid },
+            own: Solver::EventDriven {
+                tolerance: 1e-3,
+                resolve: Resolve::Grid,
+            },
             slips_of_sets: Vec::new(),
             seeds: 8,
             first_set_multiple: 8,
@@ -98,39 +106,72 @@ impl Study {
 
     /// The same at other sets, with tolerances of the event-driven solver and this one instead.
     pub fn at(self, sets: Vec<Parameters>, solver: Solver) -> Self {
-        let (mut time_steps, mut on_the_grid, mut in_taylor_steps) =
-            (Vec::new(), vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6], vec![1e-3, 1e-4, 1e-6, 1e-8]);
+        let (mut time_steps, mut on_the_grid, mut in_taylor_steps) = (
+            Vec::new(),
+            vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
+            vec![1e-3, 1e-4, 1e-6, 1e-8],
+        );
         let (settings, setting, own) = match solver {
             Solver::FixedStep { time_step } => (&mut time_steps, time_step, solver),
-            Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => {
-                (&mut on_the_grid, tolerance, Solver::EventDriven { tolerance, resolve: Resolve::Grid })
+            Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => (
+                &mut on_the_grid,
+                tolerance,
+                Solver::EventDriven {
+                    tolerance,
+                    resolve: Resolve::Grid,
+                },
+            ),
+            Solver::EventDriven { tolerance, .. } => {
+                (&mut in_taylor_steps, tolerance, taylor(tolerance))
             }
-            Solver::EventDriven { tolerance, .. } => (&mut in_taylor_steps, tolerance, taylor(tolerance)),
         };
         settings.push(setting);
         settings.sort_by(|a, b| b.total_cmp(a));
         settings.dedup();
-        Self { sets, solvers: solvers(&time_steps, &on_the_grid, &in_taylor_steps), own, first_set_multiple: 1, ..self }
+        Self {
+            sets,
+            solvers: solvers(&time_steps, &on_the_grid, &in_taylor_steps),
+            own,
+            first_set_multiple: 1,
+            ..self
+        }
     }
 }
 
 /// The defaults at a drive velocity in m/s, without and with modulation.
 fn plain_and_modulated(drive_velocity: f64) -> [Parameters; 2] {
     let (amplitude, frequency) = MODULATION;
-    let plain = Parameters { drive_velocity, ..Parameters::default() };
-    let modulated =
-        Parameters { modulation_amplitude: amplitude, modulation_period: Some(1.0 / frequency), ..plain.clone() };
+    let plain = Parameters {
+        drive_velocity,
+        ..Parameters::default()
+    };
+    let modulated = Parameters {
+        modulation_amplitude: amplitude,
+        modulation_period: Some(1.0 / frequency),
+        ..plain.clone()
+    };
     [plain, modulated]
 }
 
 fn solvers(time_steps: &[f64], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> Vec<Solver> {
-    let fixed = time_steps.iter().map(|&time_step| Solver::FixedStep { time_step });
-    let grid = on_the_grid.iter().map(|&tolerance| Solver::EventDriven { tolerance, resolve: Resolve::Grid });
-    fixed.chain(grid).chain(in_taylor_steps.iter().map(|&tolerance| taylor(tolerance))).collect()
+    let fixed = time_steps
+        .iter()
+        .map(|&time_step| Solver::FixedStep { time_step });
+    let grid = on_the_grid.iter().map(|&tolerance| Solver::EventDriven {
+        tolerance,
+        resolve: Resolve::Grid,
+    });
+    fixed
+        .chain(grid)
+        .chain(in_taylor_steps.iter().map(|&tolerance| taylor(tolerance)))
+        .collect()
 }
 
 const fn taylor(tolerance: f64) -> Solver {
-    Solver::EventDriven { tolerance, resolve: Resolve::Taylor }
+    Solver::EventDriven {
+        tolerance,
+        resolve: Resolve::Taylor,
+    }
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -212,7 +253,9 @@ impl Findings {
     /// How far a distribution is from the reference, for the solver and set of a row.
     pub fn distances_of(&self, row: &MethodRow, quantity: &str) -> Option<&DistanceRow> {
         self.distances.iter().find(|other| {
-            other.quantity == quantity && other.parameters == row.parameters && other.solver == row.solver
+            other.quantity == quantity
+                && other.parameters == row.parameters
+                && other.solver == row.solver
         })
     }
 }
@@ -233,7 +276,11 @@ impl Ensemble {
         self.per_step.push(cpu_seconds / summary.steps as f64);
         self.end_time += summary.end_time;
         self.steps += summary.steps;
-        self.slips_seen += if slips.is_empty() { 0 } else { DISCARD + slips.len() as u64 };
+        self.slips_seen += if slips.is_empty() {
+            0
+        } else {
+            DISCARD + slips.len() as u64
+        };
         self.slips.extend(slips);
     }
 
@@ -244,7 +291,11 @@ impl Ensemble {
         per_step.sort_by(f64::total_cmp);
         let (steps, slips) = (self.steps as f64, self.slips_seen as f64);
         let is_sample = self.slips_seen > 0;
-        let steps_per_slip = if is_sample { steps / slips } else { mean_interval * steps / self.end_time };
+        let steps_per_slip = if is_sample {
+            steps / slips
+        } else {
+            mean_interval * steps / self.end_time
+        };
         [0, (per_step.len() - 1) / 2].map(|place| Cost {
             per_simulated_second: per_step[place] * steps / self.end_time,
             per_slip: per_step[place] * steps_per_slip,
@@ -260,7 +311,10 @@ impl Study {
     pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<Findings> {
         let mut findings = Findings::default();
         for (set, parameters) in self.sets.iter().enumerate() {
-            report(&format!("{}: first breaks and energy ledgers", set_in_words(parameters)));
+            report(&format!(
+                "{}: first breaks and energy ledgers",
+                set_in_words(parameters)
+            ));
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
             let tightest = taylor(*TOLERANCES.start());
             simulated(parameters, tightest, &mut first_breaks)?;
@@ -278,7 +332,9 @@ impl Study {
             let reference = self.slips_of(parameters, reference, others)?;
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
                 if !self.is_stretch_only(parameters, solver) {
-                    ensemble.slips.extend(self.slips_of(parameters, solver, self.seeds..seeds)?);
+                    ensemble
+                        .slips
+                        .extend(self.slips_of(parameters, solver, self.seeds..seeds)?);
                 }
             }
             if reference.is_empty() {
@@ -287,8 +343,14 @@ impl Study {
                     "{case}: no slips; the study compares slips, so choose parameters at which the slider does not just slide"
                 );
             }
-            let mean_interval = mean(&reference.iter().filter_map(|slip| slip.interval).collect::<Vec<_>>());
-            let pairs: Vec<(Solver, &Ensemble)> = self.solvers.iter().copied().zip(&ensembles).collect();
+            let mean_interval = mean(
+                &reference
+                    .iter()
+                    .filter_map(|slip| slip.interval)
+                    .collect::<Vec<_>>(),
+            );
+            let pairs: Vec<(Solver, &Ensemble)> =
+                self.solvers.iter().copied().zip(&ensembles).collect();
             for (&(solver, ensemble), (break_times, ledger_residual)) in pairs.iter().zip(checks) {
                 let (case, parameters) = (set_in_words(parameters), parameters.clone());
                 let [cost, median] = ensemble.costs(mean_interval);
@@ -302,29 +364,54 @@ impl Study {
                     ledger_residual,
                 });
             }
-            let compared = pairs.into_par_iter().enumerate().flat_map_iter(|(row, (solver, ensemble))| {
-                let key = set * self.solvers.len() + row;
-                distance_rows(parameters, solver, &ensemble.slips, &reference, key as u64)
-            });
+            let compared =
+                pairs
+                    .into_par_iter()
+                    .enumerate()
+                    .flat_map_iter(|(row, (solver, ensemble))| {
+                        let key = set * self.solvers.len() + row;
+                        distance_rows(parameters, solver, &ensemble.slips, &reference, key as u64)
+                    });
             findings.distances.extend(compared.collect::<Vec<_>>());
         }
         Ok(findings)
     }
 
     fn recording(&self) -> Recording {
-        Recording { slips: self.slips, discard: DISCARD, ..Recording::default() }
+        Recording {
+            slips: self.slips,
+            discard: DISCARD,
+            ..Recording::default()
+        }
     }
 
     /// Slips of these seeds; not timed, so on all threads of the pool.
-    fn slips_of(&self, parameters: &Parameters, solver: Solver, seeds: Range<u64>) -> Result<Vec<Slip>> {
+    fn slips_of(
+        &self,
+        parameters: &Parameters,
+        solver: Solver,
+        seeds: Range<u64>,
+    ) -> Result<Vec<Slip>> {
         let slips = |seed: u64| {
-            let parameters = Parameters { seed, ..parameters.clone() };
+            let parameters = Parameters {
+                seed,
+                ..parameters.clone()
+            };
             Ok(measured(&parameters, solver, &self.recording())?.1.slips)
         };
-        Ok(seeds.into_par_iter().map(slips).collect::<Result<Vec<_>>>()?.concat())
+        Ok(seeds
+            .into_par_iter()
+            .map(slips)
+            .collect::<Result<Vec<_>>>()?
+            .concat())
     }
 
-    fn break_times(&self, parameters: &Parameters, solver: Solver, reference: &Reference) -> Result<BreakErrors> {
+    fn break_times(
+        &self,
+        parameters: &Parameters,
+        solver: Solver,
+        reference: &Reference,
+    ) -> Result<BreakErrors> {
         let takes_too_long = parameters.drive_velocity < self.fixed_step_breaks_from;
         if takes_too_long && matches!(solver, Solver::FixedStep { .. }) {
             return Ok(BreakErrors::default());
@@ -335,26 +422,45 @@ impl Study {
     }
 
     fn ledger_residual(&self, parameters: &Parameters, solver: Solver) -> Result<Option<f64>> {
-        let is_on_grid = matches!(solver, Solver::EventDriven { resolve: Resolve::Grid, .. });
+        let is_on_grid = matches!(
+            solver,
+            Solver::EventDriven {
+                resolve: Resolve::Grid,
+                ..
+            }
+        );
         if is_on_grid || self.is_stretch_only(parameters, solver) {
             return Ok(None);
         }
-        let recording = Recording { slips: AUDITED_SLIPS, discard: 0, ..Recording::default() };
-        let audited = simulate_audited(parameters, solver, LIMITS, &mut SlipObserver::new(parameters, &recording));
+        let recording = Recording {
+            slips: AUDITED_SLIPS,
+            discard: 0,
+            ..Recording::default()
+        };
+        let audited = simulate_audited(
+            parameters,
+            solver,
+            LIMITS,
+            &mut SlipObserver::new(parameters, &recording),
+        );
         let (_, ledger) = audited.with_context(|| in_words(parameters, solver))?;
         Ok(Some(ledger.residual()))
     }
 
     /// Whether slips of this solver would take too long.
     fn is_stretch_only(&self, parameters: &Parameters, solver: Solver) -> bool {
-        matches!(solver, Solver::FixedStep { .. }) && parameters.drive_velocity < self.fixed_step_slips_from
+        matches!(solver, Solver::FixedStep { .. })
+            && parameters.drive_velocity < self.fixed_step_slips_from
     }
 
     /// Seed by seed, every solver in turn, so that whatever slows the machine down slows down all.
     fn ensembles(&self, parameters: &Parameters) -> Result<Vec<Ensemble>> {
         let mut ensembles = vec![Ensemble::default(); self.solvers.len()];
         for seed in 0..self.seeds {
-            let parameters = Parameters { seed, ..parameters.clone() };
+            let parameters = Parameters {
+                seed,
+                ..parameters.clone()
+            };
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
                 let is_stretch = self.is_stretch_only(&parameters, solver);
                 let mut recording = self.recording();
@@ -363,7 +469,11 @@ impl Study {
                 }
                 let (cpu_seconds, measured) = measured(&parameters, solver, &recording)?;
                 // The few slips of a stretch are no sample.
-                let slips = if is_stretch { Vec::new() } else { measured.slips };
+                let slips = if is_stretch {
+                    Vec::new()
+                } else {
+                    measured.slips
+                };
                 ensemble.add(cpu_seconds, &measured.summary, slips);
             }
         }
@@ -372,20 +482,41 @@ impl Study {
 }
 
 /// Observers end these simulations; none comes near this number of events.
-const LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
+const LIMITS: Limits<'static> = Limits {
+    end_time: f64::INFINITY,
+    events: 1_000_000_000,
+    interrupt: None,
+};
 
-fn simulated(parameters: &Parameters, solver: Solver, observer: &mut dyn Observer) -> Result<Summary> {
+fn simulated(
+    parameters: &Parameters,
+    solver: Solver,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
     simulate(parameters, solver, LIMITS, observer).with_context(|| in_words(parameters, solver))
 }
 
 /// CPU time in s, and what a sweep would measure.
-fn measured(parameters: &Parameters, solver: Solver, recording: &Recording) -> Result<(f64, Measurements)> {
-    let (cpu_seconds, measured) = cpu::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
-    Ok((cpu_seconds, measured.with_context(|| in_words(parameters, solver))?))
+fn measured(
+    parameters: &Parameters,
+    solver: Solver,
+    recording: &Recording,
+) -> Result<(f64, Measurements)> {
+    let (cpu_seconds, measured) =
+        cpu::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
+    Ok((
+        cpu_seconds,
+        measured.with_context(|| in_words(parameters, solver))?,
+    ))
 }
 
 fn in_words(parameters: &Parameters, solver: Solver) -> String {
-    format!("{}, seed {}, {}", set_in_words(parameters), parameters.seed, Method::from(solver))
+    format!(
+        "{}, seed {}, {}",
+        set_in_words(parameters),
+        parameters.seed,
+        Method::from(solver)
+    )
 }
 
 /// The distributions of one ensemble against those of the reference, of all quantities that there are.
@@ -397,7 +528,8 @@ fn distance_rows(
     key: u64,
 ) -> Vec<DistanceRow> {
     let row = |(place, (quantity, value)): (u64, Quantity)| {
-        let [sample, reference] = [slips, reference].map(|slips| slips.iter().filter_map(value).collect::<Vec<_>>());
+        let [sample, reference] =
+            [slips, reference].map(|slips| slips.iter().filter_map(value).collect::<Vec<_>>());
         let key = key * QUANTITIES.len() as u64 + place;
         Some(DistanceRow {
             parameters: Selected::new(parameters.clone()),
@@ -438,19 +570,39 @@ mod tests {
             let [coarse, grid, tight] = [0, 1, 2].map(|row| rows[row].break_times);
             assert!(coarse.median > Some(1e-7), "{coarse:?}");
             // Seen: 1e-8 s and 2e-14 s.
-            assert!(grid.median > Some(1e-10) && grid.median < Some(1e-7) && grid.missing == Some(0), "{grid:?}");
-            assert!(tight.median < Some(1e-12) && tight.missing == Some(0), "{tight:?}");
-            assert!(rows[0].ledger_residual.unwrap().abs() > 1e-4 && rows[2].ledger_residual.unwrap().abs() < 1e-8);
+            assert!(
+                grid.median > Some(1e-10) && grid.median < Some(1e-7) && grid.missing == Some(0),
+                "{grid:?}"
+            );
+            assert!(
+                tight.median < Some(1e-12) && tight.missing == Some(0),
+                "{tight:?}"
+            );
+            assert!(
+                rows[0].ledger_residual.unwrap().abs() > 1e-4
+                    && rows[2].ledger_residual.unwrap().abs() < 1e-8
+            );
             assert_eq!(rows[1].ledger_residual, None);
             for row in rows {
-                assert!(row.cost.per_slip > 0.0 && row.cost.timed_slips == 9, "{row:?}");
+                assert!(
+                    row.cost.per_slip > 0.0 && row.cost.timed_slips == 9,
+                    "{row:?}"
+                );
             }
         }
         // All quantities of all solvers, but no phase where there is no modulation.
         assert_eq!(findings.distances.len(), 3 * 5 + 3 * 6);
         for row in &findings.distances {
-            let seeds = if row.parameters.modulation_period.is_none() { 3 } else { 1 };
-            assert_eq!((row.slips, row.reference_slips), (4 * seeds, 8 * seeds), "{row:?}");
+            let seeds = if row.parameters.modulation_period.is_none() {
+                3
+            } else {
+                1
+            };
+            assert_eq!(
+                (row.slips, row.reference_slips),
+                (4 * seeds, 8 * seeds),
+                "{row:?}"
+            );
         }
     }
 
@@ -472,22 +624,36 @@ mod tests {
         assert!(findings.distances.is_empty(), "{:?}", findings.distances);
         for row in &findings.methods {
             assert_eq!(row.cost.timed_slips, 0);
-            assert!(row.cost.steps_per_slip > 2e4 && row.cost.steps_per_slip < 4e4, "{row:?}");
+            assert!(
+                row.cost.steps_per_slip > 2e4 && row.cost.steps_per_slip < 4e4,
+                "{row:?}"
+            );
         }
     }
 
     #[test]
     fn the_cost_of_a_stretch_is_extrapolated_by_the_steps_of_an_interval() {
         let mut ensemble = Ensemble::default();
-        let summary = Summary { end_time: 0.5, steps: 500_000, ..Summary::default() };
+        let summary = Summary {
+            end_time: 0.5,
+            steps: 500_000,
+            ..Summary::default()
+        };
         ensemble.add(0.1, &summary, Vec::new());
         let [cost, ..] = ensemble.costs(10.0);
         assert_eq!((cost.steps_per_slip, cost.timed_slips), (1e7, 0));
-        assert!((cost.per_slip - 2.0).abs() < 1e-12 && (cost.per_simulated_second - 0.2).abs() < 1e-12);
+        assert!(
+            (cost.per_slip - 2.0).abs() < 1e-12 && (cost.per_simulated_second - 0.2).abs() < 1e-12
+        );
         // Others that other work has slowed down change nothing but the spread.
         ensemble.add(0.3, &summary, Vec::new());
         ensemble.add(0.2, &summary, Vec::new());
         let per_slip = ensemble.costs(10.0).map(|cost| cost.per_slip);
-        assert!(per_slip.iter().zip([2.0, 4.0, 6.0]).all(|(cost, expected)| (cost - expected).abs() < 1e-12));
+        assert!(
+            per_slip
+                .iter()
+                .zip([2.0, 4.0, 6.0])
+                .all(|(cost, expected)| (cost - expected).abs() < 1e-12)
+        );
     }
 }

@@ -18,22 +18,52 @@ const TIGHTER: f64 = 0.5;
 /// The lines, the answer first.
 pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
     let own = Method::from(study.own);
-    let compared: Vec<&DistanceRow> = findings.distances.iter().filter(|row| row.solver == own).collect();
-    let rows: Vec<&MethodRow> = findings.methods.iter().filter(|row| row.solver == own).collect();
-    let subject = if study.slips_of_sets.is_empty() { "The solver" } else { "Your sweep" };
-    let Some(slips) = compared.iter().map(|row| row.slips.min(row.reference_slips)).min() else {
-        return vec![format!("{subject} ({own}): not compared, as its slips would take too long")];
+    let compared: Vec<&DistanceRow> = findings
+        .distances
+        .iter()
+        .filter(|row| row.solver == own)
+        .collect();
+    let rows: Vec<&MethodRow> = findings
+        .methods
+        .iter()
+        .filter(|row| row.solver == own)
+        .collect();
+    let subject = if study.slips_of_sets.is_empty() {
+        "The solver"
+    } else {
+        "Your sweep"
+    };
+    let Some(slips) = compared
+        .iter()
+        .map(|row| row.slips.min(row.reference_slips))
+        .min()
+    else {
+        return vec![format!(
+            "{subject} ({own}): not compared, as its slips would take too long"
+        )];
     };
     // In half-widths of the interval of one comparison.
     let deviate = |error: f64| standard_normal_quantile(1.0 - 0.5 * error);
     let counts_from = deviate(ERROR / compared.len() as f64) / deviate(ERROR);
-    let excess = |row: &DistanceRow| row.distances.mean_bias.abs() / (counts_from * row.half_width());
-    let most = compared.iter().max_by(|a, b| excess(a).total_cmp(&excess(b))).filter(|row| excess(row) > 1.0);
+    let excess =
+        |row: &DistanceRow| row.distances.mean_bias.abs() / (counts_from * row.half_width());
+    let most = compared
+        .iter()
+        .max_by(|a, b| excess(a).total_cmp(&excess(b)))
+        .filter(|row| excess(row) > 1.0);
     let percent = |row: &DistanceRow, value: f64| 100.0 * value / row.reference_mean.abs();
-    let intervals: Vec<&&DistanceRow> = compared.iter().filter(|row| row.quantity == "interval").collect();
-    let shown = intervals.iter().map(|row| percent(row, counts_from * row.half_width())).fold(0.0, f64::max);
+    let intervals: Vec<&&DistanceRow> = compared
+        .iter()
+        .filter(|row| row.quantity == "interval")
+        .collect();
+    let shown = intervals
+        .iter()
+        .map(|row| percent(row, counts_from * row.half_width()))
+        .fold(0.0, f64::max);
     let finding = match most {
-        Some(_) if slips < MIN_SLIPS => format!("too few slips to tell: {slips} a side; take more --seeds or --slips"),
+        Some(_) if slips < MIN_SLIPS => {
+            format!("too few slips to tell: {slips} a side; take more --seeds or --slips")
+        }
         Some(row) => format!(
             "biased: {} by {:+.2} ± {:.2} % at {}, more than chance among {} comparisons",
             row.quantity,
@@ -43,28 +73,47 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
             compared.len()
         ),
         None => {
-            format!("no bias found; {slips} slips a side could have shown one of {shown:.1} % of the mean interval")
+            format!(
+                "no bias found; {slips} slips a side could have shown one of {shown:.1} % of the mean interval"
+            )
         }
     };
     let mut lines = vec![format!("{subject} ({own}): {finding}.")];
-    let largest = |value: fn(&MethodRow) -> Option<f64>| rows.iter().filter_map(|row| value(row)).reduce(f64::max);
-    let (median, most_off) = (largest(|row| row.break_times.median), largest(|row| row.break_times.largest));
+    let largest = |value: fn(&MethodRow) -> Option<f64>| {
+        rows.iter().filter_map(|row| value(row)).reduce(f64::max)
+    };
+    let (median, most_off) = (
+        largest(|row| row.break_times.median),
+        largest(|row| row.break_times.largest),
+    );
     if let Some((median, most_off)) = median.zip(most_off) {
         lines.push(format!(
             "Before trajectories part, breaks are off by {median:.0e} s in the median, and by {most_off:.0e} s at most."
         ));
     }
     // The error of a difference of two means, scaled to the slips of the sweep: neighbours are correlated in both.
-    let errors =
-        study.slips_of_sets.iter().zip(&study.sets).filter(|(slips, _)| **slips > 0).filter_map(|(&own, set)| {
+    let errors = study
+        .slips_of_sets
+        .iter()
+        .zip(&study.sets)
+        .filter(|(slips, _)| **slips > 0)
+        .filter_map(|(&own, set)| {
             let row = intervals.iter().find(|row| *row.parameters == *set)?;
             let of_difference = 1.0 / row.slips as f64 + 1.0 / row.reference_slips as f64;
-            Some(percent(row, row.half_width() * (1.0 / (own as f64 * of_difference)).sqrt()))
+            Some(percent(
+                row,
+                row.half_width() * (1.0 / (own as f64 * of_difference)).sqrt(),
+            ))
         });
     let errors: Vec<f64> = errors.collect();
-    if let Some((least, largest)) = errors.iter().copied().reduce(f64::min).zip(errors.iter().copied().reduce(f64::max))
+    if let Some((least, largest)) = errors
+        .iter()
+        .copied()
+        .reduce(f64::min)
+        .zip(errors.iter().copied().reduce(f64::max))
     {
-        let excluded_from = |row: &&&DistanceRow| percent(row, row.distances.mean_bias.abs() + row.half_width());
+        let excluded_from =
+            |row: &&&DistanceRow| percent(row, row.distances.mean_bias.abs() + row.half_width());
         let conclusion = match most {
             Some(_) => "",
             None if intervals.iter().all(|row| excluded_from(row) <= largest) => {
@@ -72,21 +121,37 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
             }
             None => "; more --seeds here would show whether the solver adds to it",
         };
-        let range = if largest < 1.05 * least { String::new() } else { format!("{least:.1} to ") };
+        let range = if largest < 1.05 * least {
+            String::new()
+        } else {
+            format!("{least:.1} to ")
+        };
         lines.push(format!(
             "Statistical error of the mean interval in your sets (95 %), as far as these slips tell: {range}{largest:.1} \
              %{conclusion}."
         ));
     }
-    let first = rows.first().and_then(|row| Some((row.break_times.median? * TIGHTER, row)));
+    let first = rows
+        .first()
+        .and_then(|row| Some((row.break_times.median? * TIGHTER, row)));
     let tighter = first.and_then(|(error, row)| {
-        let others = findings.methods.iter().filter(|other| other.parameters == row.parameters);
-        let others = others.filter(|other| other.break_times.median.is_some_and(|median| median < error));
+        let others = findings
+            .methods
+            .iter()
+            .filter(|other| other.parameters == row.parameters);
+        let others = others.filter(|other| {
+            other
+                .break_times
+                .median
+                .is_some_and(|median| median < error)
+        });
         let cheapest = others.min_by(|a, b| a.cost.per_slip.total_cmp(&b.cost.per_slip))?;
         Some((&cheapest.solver, cheapest.cost.per_slip / row.cost.per_slip))
     });
     if let Some((solver, times)) = tighter {
-        lines.push(format!("For more: {solver} costs {times:.1} times as much."));
+        lines.push(format!(
+            "For more: {solver} costs {times:.1} times as much."
+        ));
     }
     lines
 }
@@ -101,7 +166,10 @@ mod tests {
     use crate::model::selected::Selected;
     use crate::solver::{Resolve, Solver};
 
-    const GRID: Solver = Solver::EventDriven { tolerance: 1e-3, resolve: Resolve::Grid };
+    const GRID: Solver = Solver::EventDriven {
+        tolerance: 1e-3,
+        resolve: Resolve::Grid,
+    };
 
     fn row(quantity: &str, slips: u64, bias: f64) -> DistanceRow {
         DistanceRow {
@@ -129,17 +197,32 @@ mod tests {
             parameters: Selected::new(Parameters::default()),
             case: String::new(),
             solver: solver.into(),
-            cost: Cost { per_slip, timed_slips: 9, ..Cost::default() },
+            cost: Cost {
+                per_slip,
+                timed_slips: 9,
+                ..Cost::default()
+            },
             median_per_slip: per_slip,
-            break_times: BreakErrors { median: Some(error), largest: Some(10.0 * error), ..BreakErrors::default() },
+            break_times: BreakErrors {
+                median: Some(error),
+                largest: Some(10.0 * error),
+                ..BreakErrors::default()
+            },
             ledger_residual: None,
         }
     }
 
     fn lines(slips_of_set: u64, distances: Vec<DistanceRow>) -> Vec<String> {
-        let tighter = Solver::EventDriven { tolerance: 1e-5, resolve: Resolve::Grid };
-        let study =
-            Study { sets: vec![Parameters::default()], own: GRID, slips_of_sets: vec![slips_of_set], ..Study::quick() };
+        let tighter = Solver::EventDriven {
+            tolerance: 1e-5,
+            resolve: Resolve::Grid,
+        };
+        let study = Study {
+            sets: vec![Parameters::default()],
+            own: GRID,
+            slips_of_sets: vec![slips_of_set],
+            ..Study::quick()
+        };
         let methods = vec![method(GRID, 2e-7, 1e-3), method(tighter, 1e-9, 1.6e-3)];
         verdict(&study, &Findings { methods, distances })
     }
@@ -147,20 +230,33 @@ mod tests {
     #[test]
     fn a_bias_counts_if_it_survives_the_number_of_comparisons_and_there_are_slips_enough() {
         let with = |slips, bias| {
-            let others = ["drop", "duration", "peak_force", "front_speed"].map(|quantity| row(quantity, slips, 0.0));
-            lines(1000, others.into_iter().chain([row("interval", slips, bias)]).collect()).remove(0)
+            let others = ["drop", "duration", "peak_force", "front_speed"]
+                .map(|quantity| row(quantity, slips, 0.0));
+            lines(
+                1000,
+                others
+                    .into_iter()
+                    .chain([row("interval", slips, bias)])
+                    .collect(),
+            )
+            .remove(0)
         };
         // 1.2 half-widths, or 2.35 standard errors, count for one comparison and not for five, of which 2.58 are needed.
-        assert!(with(1000, 1.2e-3).contains("no bias found; 1000 slips a side could have shown one of 1.3 %"));
         assert!(
-            lines(1000, vec![row("interval", 1000, 1.2e-3)])[0].contains("biased: interval by +1.20 ± 1.00 % at V0")
+            with(1000, 1.2e-3)
+                .contains("no bias found; 1000 slips a side could have shown one of 1.3 %")
+        );
+        assert!(
+            lines(1000, vec![row("interval", 1000, 1.2e-3)])[0]
+                .contains("biased: interval by +1.20 ± 1.00 % at V0")
         );
         assert!(with(1000, -1.4e-3).contains("biased: interval by -1.40"));
         assert!(with(24, 5e-3).contains("too few slips to tell: 24 a side"));
     }
 
     #[test]
-    fn the_solver_is_held_against_the_statistical_error_of_the_sweep_and_what_is_tighter_has_its_price() {
+    fn the_solver_is_held_against_the_statistical_error_of_the_sweep_and_what_is_tighter_has_its_price()
+     {
         // 1 % is the error of 1000 slips against 2000, which is that of 667 alone.
         let said = |slips| lines(slips, vec![row("interval", 1000, 0.0)]);
         let few = said(167);
@@ -169,14 +265,25 @@ mod tests {
             "Your sweep (grid, tolerance 1e-3): no bias found; 1000 slips a side could have shown one of 1.0 % \
                             of the mean interval."
         );
-        assert_eq!(few[1], "Before trajectories part, breaks are off by 2e-7 s in the median, and by 2e-6 s at most.");
-        assert!(few[2].ends_with("tell: 2.0 %, so the solver is not what limits you."), "{}", few[2]);
-        assert_eq!(few[3], "For more: grid, tolerance 1e-5 costs 1.6 times as much.");
+        assert_eq!(
+            few[1],
+            "Before trajectories part, breaks are off by 2e-7 s in the median, and by 2e-6 s at most."
+        );
+        assert!(
+            few[2].ends_with("tell: 2.0 %, so the solver is not what limits you."),
+            "{}",
+            few[2]
+        );
+        assert_eq!(
+            few[3],
+            "For more: grid, tolerance 1e-5 costs 1.6 times as much."
+        );
         assert!(said(66_700)[2].contains("0.1 %; more --seeds here"));
         // 0.9 % was found, and up to 1.9 % are not excluded.
         let off = |slips| lines(slips, vec![row("interval", 1000, 9e-4)]).remove(2);
         assert!(
-            off(167).ends_with("not what limits you.") && off(220).contains("1.7 %; more --seeds here"),
+            off(167).ends_with("not what limits you.")
+                && off(220).contains("1.7 %; more --seeds here"),
             "{}",
             off(220)
         );

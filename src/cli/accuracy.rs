@@ -76,41 +76,61 @@ pub struct Arguments {
 }
 
 pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
-    let mut study = if arguments.quick { Study::quick() } else { Study::full() };
+    let mut study = if arguments.quick {
+        Study::quick()
+    } else {
+        Study::full()
+    };
     let changes = changes(&arguments.variation)?;
     let has_file = arguments.sweep.is_some() || arguments.preset.preset.is_some();
     let mut out = PathBuf::from("results/accuracy");
     if has_file || !changes.is_empty() {
-        let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
+        let sweep = sweep::read(
+            arguments.sweep.as_deref(),
+            arguments.preset.preset,
+            &changes,
+        )?;
         output::warn(&sweep.warnings());
         let (sets, jobs): (Vec<_>, Vec<u64>) = sets_of(&sweep)?.into_iter().unzip();
         study = study.at(sets, sweep.solver());
         if has_file {
-            study.slips_of_sets = jobs.iter().map(|jobs| jobs * sweep.recording().slips).collect();
+            study.slips_of_sets = jobs
+                .iter()
+                .map(|jobs| jobs * sweep.recording().slips)
+                .collect();
             out = Layout::default_root(&sweep);
             out.as_mut_os_string().push("-accuracy");
         }
         if sweep.jobs_of_grid().any(|job| job.parameters.seed != 0) {
-            output::report("the seeds of the sweep are not used: a study has its own, and --seeds says how many");
+            output::report(
+                "the seeds of the sweep are not used: a study has its own, and --seeds says how many",
+            );
         }
     }
     let out = arguments.out.clone().unwrap_or(out);
     if !out.is_dir() && out.symlink_metadata().is_ok() {
-        return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(&out))).into());
+        return Err(UsageError(format!(
+            "--out {}: must be a folder, or not be there yet",
+            shown(&out)
+        ))
+        .into());
     }
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
     study.slips = arguments.slips.unwrap_or(study.slips);
     let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?.count;
     let threads = threads.map_or(0, NonZeroUsize::get);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
+    let pool =
+        pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
     let files = accuracy::write(&study, &findings, &out)?;
     if arguments.json {
         output::plain_json(&accuracy::to_json(&study, &findings))?;
     } else {
         output::print(&study_text(&study, &findings, arguments.all))?;
-        files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
+        files
+            .iter()
+            .try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
     }
     Ok(Exit::Done)
 }
@@ -119,7 +139,10 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
 fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, u64)>> {
     let mut sets: Vec<(Parameters, u64)> = Vec::new();
     for job in sweep.jobs_of_grid() {
-        let set = Parameters { seed: 0, ..job.parameters };
+        let set = Parameters {
+            seed: 0,
+            ..job.parameters
+        };
         match sets.iter_mut().find(|(known, _)| *known == set) {
             Some((_, jobs)) => *jobs += 1,
             None => sets.push((set, 1)),
@@ -133,7 +156,11 @@ fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, u64)>> {
         }
     }
     if sets.is_empty() {
-        return Err(UsageError(format!("sweep {} has no jobs: its conditions drop all points", sweep.name())).into());
+        return Err(UsageError(format!(
+            "sweep {} has no jobs: its conditions drop all points",
+            sweep.name()
+        ))
+        .into());
     }
     Ok(sets)
 }
@@ -158,49 +185,103 @@ fn study_text(study: &Study, findings: &Findings, all: bool) -> String {
                 .to_owned(),
         );
     }
-    let tables = study.sets.iter().map(|set| table(study, findings, set, all));
+    let tables = study
+        .sets
+        .iter()
+        .map(|set| table(study, findings, set, all));
     lines.join("\n") + "\n" + &tables.collect::<String>()
 }
 
 /// A line for each solver at a set; -> before that of the sweep.
 fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> String {
-    let rows: Vec<&MethodRow> = findings.methods.iter().filter(|row| *row.parameters == *set).collect();
-    let is_there = |quantity: &str| rows.iter().any(|row| findings.distances_of(row, quantity).is_some());
+    let rows: Vec<&MethodRow> = findings
+        .methods
+        .iter()
+        .filter(|row| *row.parameters == *set)
+        .collect();
+    let is_there = |quantity: &str| {
+        rows.iter()
+            .any(|row| findings.distances_of(row, quantity).is_some())
+    };
     let quantities = QUANTITIES.map(|(quantity, _)| quantity).into_iter();
     let quantities = quantities.filter(|&name| (all || name == "interval") && is_there(name));
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     let mut columns = Columns::default();
     let mut add = |is_worded: bool, head: &str, cell: &dyn Fn(&MethodRow) -> String| {
-        columns.add(is_worded, std::iter::once(head.to_owned()).chain(rows.iter().map(|row| cell(row))).collect());
+        columns.add(
+            is_worded,
+            std::iter::once(head.to_owned())
+                .chain(rows.iter().map(|row| cell(row)))
+                .collect(),
+        );
     };
     add(true, "   solver", &|row| {
-        format!("{} {}", if row.solver == study.own.into() { "->" } else { "  " }, row.solver)
+        format!(
+            "{} {}",
+            if row.solver == study.own.into() {
+                "->"
+            } else {
+                "  "
+            },
+            row.solver
+        )
     });
     add(false, "ms/slip", &|row| {
-        format!("{:.3}{}", 1e3 * row.cost.per_slip, if row.cost.is_extrapolated() { "*" } else { "" })
+        format!(
+            "{:.3}{}",
+            1e3 * row.cost.per_slip,
+            if row.cost.is_extrapolated() { "*" } else { "" }
+        )
     });
-    add(false, "break times (s)", &|MethodRow { break_times, .. }| {
-        let times = break_times.median.zip(break_times.largest);
-        or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
-    });
+    add(
+        false,
+        "break times (s)",
+        &|MethodRow { break_times, .. }| {
+            let times = break_times.median.zip(break_times.largest);
+            or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
+        },
+    );
     for name in quantities {
         let unit = if name == "phase" { "rad" } else { "%" };
         add(false, &format!("{name} ({unit})"), &|row| {
             or_none(findings.distances_of(row, name).map(|row| {
-                let scale = if unit == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
-                format!("{:+.3} ± {:.3}", scale * row.distances.mean_bias, scale * row.half_width())
+                let scale = if unit == "%" {
+                    100.0 / row.reference_mean.abs()
+                } else {
+                    1.0
+                };
+                format!(
+                    "{:+.3} ± {:.3}",
+                    scale * row.distances.mean_bias,
+                    scale * row.half_width()
+                )
             }))
         });
     }
     if all {
-        add(false, "median", &|row| format!("{:.2}", row.median_per_slip / row.cost.per_slip));
-        add(false, "ns/step", &|row| format!("{:.0}", 1e9 * row.cost.per_step));
-        add(false, "together", &|MethodRow { break_times, .. }| {
-            let mark = if break_times.together_throughout { ">" } else { "" };
-            let together = break_times.together.zip(break_times.together_seconds);
-            or_none(together.map(|(breaks, seconds)| format!("{mark}{breaks} breaks, {seconds:.3} s")))
+        add(false, "median", &|row| {
+            format!("{:.2}", row.median_per_slip / row.cost.per_slip)
         });
-        add(false, "ledger", &|row| or_none(row.ledger_residual.map(|residual| format!("{:.1e}", residual.abs()))));
+        add(false, "ns/step", &|row| {
+            format!("{:.0}", 1e9 * row.cost.per_step)
+        });
+        add(false, "together", &|MethodRow { break_times, .. }| {
+            let mark = if break_times.together_throughout {
+                ">"
+            } else {
+                ""
+            };
+            let together = break_times.together.zip(break_times.together_seconds);
+            or_none(
+                together.map(|(breaks, seconds)| format!("{mark}{breaks} breaks, {seconds:.3} s")),
+            )
+        });
+        add(false, "ledger", &|row| {
+            or_none(
+                row.ledger_residual
+                    .map(|residual| format!("{:.1e}", residual.abs())),
+            )
+        });
     }
     format!("\n{}\n{columns}", set_in_words(set))
 }

@@ -76,7 +76,11 @@ const WARNING: u32 = 15;
 
 fn time_in_queue(text: &str) -> Result<Duration, String> {
     let time = time::parse(text)?;
-    if time < MIN_TIME { Err("must be at least 1m".to_owned()) } else { Ok(time) }
+    if time < MIN_TIME {
+        Err("must be at least 1m".to_owned())
+    } else {
+        Ok(time)
+    }
 }
 
 /// The scripts, with {{names}} where values go. A job script lies within Slurm's, as the folder of the logs must be there
@@ -85,10 +89,19 @@ const SLURM: &str = include_str!("batch/slurm.sh");
 const HYPERQUEUE: &str = include_str!("batch/hyperqueue.sh");
 
 pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
-    let Arguments { time, threads, workers, options, .. } = arguments;
+    let Arguments {
+        time,
+        threads,
+        workers,
+        options,
+        ..
+    } = arguments;
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &[])?;
     output::warn(&sweep.warnings());
-    let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
+    let root = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| Layout::default_root(&sweep));
     let program = match program {
         Some(program) => program.to_owned(),
         None => std::env::current_exe().context("cannot find out where this program lies")?,
@@ -100,9 +113,15 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
     };
     let starts = arguments.starts.unwrap_or(*workers);
     if starts < *workers {
-        return Err(UsageError(format!("--starts {starts}: must be >= --workers, here {workers}")).into());
+        return Err(UsageError(format!(
+            "--starts {starts}: must be >= --workers, here {workers}"
+        ))
+        .into());
     }
-    if let Some(option) = options.iter().find(|option| option.contains(char::is_control)) {
+    if let Some(option) = options
+        .iter()
+        .find(|option| option.contains(char::is_control))
+    {
         return Err(UsageError(format!("{option:?}: must hold no control characters")).into());
     }
     let (program, out, logs) = (quoted(&program), quoted(&root), format!("{root}/run/batch"));
@@ -110,16 +129,31 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
     let command = format!("{program} run {source} --out {out} --worker --walltime {walltime}");
     let (script, array, time, options) = match arguments.engine {
         Engine::Slurm => {
-            let limit = if starts > *workers { format!("%{workers}") } else { String::new() };
+            let limit = if starts > *workers {
+                format!("%{workers}")
+            } else {
+                String::new()
+            };
             let minutes = format!("{}:{:02}", time.as_secs() / 60, time.as_secs() % 60);
             let output = format!("--output={}/%A_%a.log", logs.replace('%', "%%"));
-            let warning = (margin(*time) == MAX_MARGIN).then(|| format!("--signal=B:USR1@{WARNING}"));
-            let options = [output].iter().chain(&warning).chain(options).map(|text| directive(text)).collect();
+            let warning =
+                (margin(*time) == MAX_MARGIN).then(|| format!("--signal=B:USR1@{WARNING}"));
+            let options = [output]
+                .iter()
+                .chain(&warning)
+                .chain(options)
+                .map(|text| directive(text))
+                .collect();
             (SLURM, format!("1-{starts}{limit}"), minutes, options)
         }
         Engine::Hyperqueue => {
             let options: String = options.iter().map(|option| quoted(option) + " ").collect();
-            (HYPERQUEUE, format!("1-{starts}"), time::with_units(*time), options)
+            (
+                HYPERQUEUE,
+                format!("1-{starts}"),
+                time::with_units(*time),
+                options,
+            )
         }
     };
     // Last what may hold braces itself.
@@ -132,7 +166,13 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
         ("{{command}}", &command),
         ("{{options}}", &options),
     ];
-    output::print(&values.iter().fold(script.to_owned(), |script, (name, value)| script.replace(name, value)))?;
+    output::print(
+        &values
+            .iter()
+            .fold(script.to_owned(), |script, (name, value)| {
+                script.replace(name, value)
+            }),
+    )?;
     Ok(Exit::Done)
 }
 
@@ -149,10 +189,20 @@ fn whole_path(mut path: &Path) -> Result<String> {
         folder.pop();
         path = rest;
     }
-    let path = absolute(folder.join(path)).with_context(|| format!("{}: cannot be made absolute", shown(path)))?;
-    let text = path.to_str().filter(|text| !text.contains(char::is_control));
-    let problem = || format!("{}: must be UTF-8 without control characters; choose another path", shown(&path));
-    Ok(text.map(ToOwned::to_owned).ok_or_else(|| UsageError(problem()))?)
+    let path = absolute(folder.join(path))
+        .with_context(|| format!("{}: cannot be made absolute", shown(path)))?;
+    let text = path
+        .to_str()
+        .filter(|text| !text.contains(char::is_control));
+    let problem = || {
+        format!(
+            "{}: must be UTF-8 without control characters; choose another path",
+            shown(&path)
+        )
+    };
+    Ok(text
+        .map(ToOwned::to_owned)
+        .ok_or_else(|| UsageError(problem()))?)
 }
 
 /// The line of an option as sbatch reads it from a script: with quotes, and a backslash before what else would mean
@@ -162,6 +212,9 @@ fn directive(option: &str) -> String {
     if option.chars().all(plain) {
         format!("#SBATCH {option}\n")
     } else {
-        format!("#SBATCH \"{}\"\n", option.replace('\\', r"\\").replace('"', "\\\""))
+        format!(
+            "#SBATCH \"{}\"\n",
+            option.replace('\\', r"\\").replace('"', "\\\"")
+        )
     }
 }

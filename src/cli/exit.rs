@@ -26,17 +26,23 @@ pub struct UsageError(pub String);
 impl Exit {
     /// The code for an error: by the first cause that says whose fault it is; a disk that fails can be resumed from.
     pub fn of(error: &anyhow::Error) -> Self {
-        error.chain().find_map(Self::of_cause).unwrap_or(Self::Stopped)
+        error
+            .chain()
+            .find_map(Self::of_cause)
+            .unwrap_or(Self::Stopped)
     }
 
     fn of_cause(cause: &(dyn std::error::Error + 'static)) -> Option<Self> {
-        let is_usage = cause.is::<UsageError>() || cause.is::<BadOption>() || cause.is::<ThreadsError>();
+        let is_usage =
+            cause.is::<UsageError>() || cause.is::<BadOption>() || cause.is::<ThreadsError>();
         if is_usage || cause.is::<SweepError>() || cause.is::<NoJobs>() {
             return Some(Self::Usage);
         }
         if let Some(error) = cause.downcast_ref::<SimulationError>() {
             return Some(match error {
-                SimulationError::UnstableStep { .. } | SimulationError::BadTolerance { .. } => Self::Usage,
+                SimulationError::UnstableStep { .. } | SimulationError::BadTolerance { .. } => {
+                    Self::Usage
+                }
                 SimulationError::Interrupted { .. } => Self::Stopped,
                 _ => Self::Failed,
             });

@@ -41,8 +41,14 @@ const FORMAT: u32 = 1;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
-    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
-    bar.set_style(ProgressStyle::with_template("{wide_bar} {percent} % of the parts, {eta} left")?);
+    let bar = if std::io::stderr().is_terminal() {
+        ProgressBar::new(0)
+    } else {
+        ProgressBar::hidden()
+    };
+    bar.set_style(ProgressStyle::with_template(
+        "{wide_bar} {percent} % of the parts, {eta} left",
+    )?);
     let exported = results.export(&arguments.out, arguments.format, &mut |done, total| {
         bar.set_length(total);
         bar.set_position(done);
@@ -54,11 +60,16 @@ pub fn export(arguments: &Arguments) -> Result<Exit> {
     }
     for file in &exported.files {
         let (rows, megabytes) = (output::count(file.rows, "row"), file.bytes as f64 / 1e6);
-        output::print(&format!("{}  {rows}, {megabytes:.1} MB\n", shown(&arguments.out.join(&file.name))))?;
+        output::print(&format!(
+            "{}  {rows}, {megabytes:.1} MB\n",
+            shown(&arguments.out.join(&file.name))
+        ))?;
     }
     if exported.jobs_missing > 0 {
         let jobs = output::count(exported.jobs_missing, "job");
-        output::report(&format!("exported what is there: {jobs} are missing; stickslip run continues with them"));
+        output::report(&format!(
+            "exported what is there: {jobs} are missing; stickslip run continues with them"
+        ));
     }
     Ok(Exit::Done)
 }

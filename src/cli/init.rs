@@ -50,44 +50,83 @@ impl Question {
         match self {
             Self::Friction => ("friction", &[]),
             Self::Interval => ("velocity", &[]),
-            Self::Locking => ("locking-map", &["frequency=linear:10:70:31", "Delta=log:2e-7:4e-6:9"]),
-            Self::Sliding => ("regimes", &["V0=log:1e-5:1e-2:10", "tau_r=log:1e-4:1e-1:10"]),
+            Self::Locking => (
+                "locking-map",
+                &["frequency=linear:10:70:31", "Delta=log:2e-7:4e-6:9"],
+            ),
+            Self::Sliding => (
+                "regimes",
+                &["V0=log:1e-5:1e-2:10", "tau_r=log:1e-4:1e-1:10"],
+            ),
         }
     }
 }
 
 /// A sweep that runs as it is, with all other keys as comments.
-const TEMPLATE: Preset = Preset { name: "sweep", text: include_str!("init/template.toml") };
+const TEMPLATE: Preset = Preset {
+    name: "sweep",
+    text: include_str!("init/template.toml"),
+};
 
 pub fn init(arguments: &Arguments) -> Result<Exit> {
     let file = &arguments.file;
-    let name = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    let name = file
+        .file_stem()
+        .and_then(|stem| stem.to_str())
+        .unwrap_or_default();
     let (preset, axes) = match arguments.question.map(Question::sweep) {
-        Some((name, axes)) => (Preset::from_str(name, false).map_err(anyhow::Error::msg)?, axes),
+        Some((name, axes)) => (
+            Preset::from_str(name, false).map_err(anyhow::Error::msg)?,
+            axes,
+        ),
         None => (arguments.preset.unwrap_or(TEMPLATE), [].as_slice()),
     };
-    let text = preset.text.replace(&format!("name = \"{}\"", preset.name), &format!("name = \"{name}\""));
+    let text = preset.text.replace(
+        &format!("name = \"{}\"", preset.name),
+        &format!("name = \"{name}\""),
+    );
     let sweep = Sweep::parse(&text, file);
-    let sweep = sweep.with_context(|| format!("{}: the name of the file must suit a sweep", shown(file)))?;
+    let sweep = sweep
+        .with_context(|| format!("{}: the name of the file must suit a sweep", shown(file)))?;
     let axes: Vec<String> = axes.iter().map(|&axis| axis.to_owned()).collect();
     let own = changes(&arguments.variation)?;
-    let of_question = changes(&Variation { settings: Vec::new(), axes })?;
+    let of_question = changes(&Variation {
+        settings: Vec::new(),
+        axes,
+    })?;
     let text = vary(vary(sweep, &of_question)?, &own)?.text().to_owned();
     // What is set stands no longer as a comment with its default.
-    let is_set = |line: &str| own.iter().any(|change| line.starts_with(&format!("# {} = ", change.key)));
-    let text: String = text.split_inclusive('\n').filter(|line| !is_set(line)).collect();
-    let question = arguments.question.and_then(|question| question.to_possible_value());
+    let is_set = |line: &str| {
+        own.iter()
+            .any(|change| line.starts_with(&format!("# {} = ", change.key)))
+    };
+    let text: String = text
+        .split_inclusive('\n')
+        .filter(|line| !is_set(line))
+        .collect();
+    let question = arguments
+        .question
+        .and_then(|question| question.to_possible_value());
     let text = match question.as_ref().and_then(|question| question.get_help()) {
-        Some(question) => format!("# {question}\n{}", &text[text.find("name = ").unwrap_or(0)..]),
+        Some(question) => format!(
+            "# {question}\n{}",
+            &text[text.find("name = ").unwrap_or(0)..]
+        ),
         None => text,
     };
     if file.symlink_metadata().is_ok() {
-        let problem = format!("{}: is there already and was not changed; choose another name", shown(file));
+        let problem = format!(
+            "{}: is there already and was not changed; choose another name",
+            shown(file)
+        );
         return Err(UsageError(problem).into());
     }
     output::replace(file, |draft| Ok(std::fs::write(draft, &text)?))?;
     let quoted = output::quoted_path(file);
-    output::report(&format!("wrote {}. See what it would run: stickslip plan {quoted}", shown(file)));
+    output::report(&format!(
+        "wrote {}. See what it would run: stickslip plan {quoted}",
+        shown(file)
+    ));
     Ok(Exit::Done)
 }
 
@@ -107,16 +146,39 @@ mod tests {
         // The tables of rounds stand as a whole or not at all.
         let text = TEMPLATE.text.split("\n# Seeds until").next().unwrap();
         // What has no default stays a comment.
-        let is_setting = |line: &str| line.contains(" = ") && !line.contains("= none") && !line.contains("where");
-        let uncommented = |line: &str| line.strip_prefix("# ").filter(|line| is_setting(line)).map(ToOwned::to_owned);
-        let all: Vec<String> = text.lines().map(|line| uncommented(line).unwrap_or_else(|| line.to_owned())).collect();
+        let is_setting = |line: &str| {
+            line.contains(" = ") && !line.contains("= none") && !line.contains("where")
+        };
+        let uncommented = |line: &str| {
+            line.strip_prefix("# ")
+                .filter(|line| is_setting(line))
+                .map(ToOwned::to_owned)
+        };
+        let all: Vec<String> = text
+            .lines()
+            .map(|line| uncommented(line).unwrap_or_else(|| line.to_owned()))
+            .collect();
         let (sparse, full) = (sweep(TEMPLATE.text), sweep(&all.join("\n")));
         assert_eq!(sparse.jobs().count(), 3 * 3 * 2);
-        assert!(sparse.jobs().map(|job| job.parameters).eq(full.jobs().map(|job| job.parameters)));
-        assert_eq!((sparse.recording(), sparse.solver()), (full.recording(), full.solver()));
-        let keys = Symbol::ALL.map(Symbol::key).into_iter().chain(RecordingKey::ALL.map(RecordingKey::key));
+        assert!(
+            sparse
+                .jobs()
+                .map(|job| job.parameters)
+                .eq(full.jobs().map(|job| job.parameters))
+        );
+        assert_eq!(
+            (sparse.recording(), sparse.solver()),
+            (full.recording(), full.solver())
+        );
+        let keys = Symbol::ALL
+            .map(Symbol::key)
+            .into_iter()
+            .chain(RecordingKey::ALL.map(RecordingKey::key));
         for key in keys.filter(|key| *key != "T") {
-            let is_of = |line: &str| line.trim_start_matches("# ").starts_with(&format!("{key} "));
+            let is_of = |line: &str| {
+                line.trim_start_matches("# ")
+                    .starts_with(&format!("{key} "))
+            };
             assert!(text.lines().any(is_of), "{key}");
         }
     }
@@ -126,12 +188,20 @@ mod tests {
         let text = TEMPLATE.text;
         for table in ["[precision]", "[refine]"] {
             let start = text.find(&format!("# {table}")).unwrap();
-            let end = text[start..].find("\n\n").map_or(text.len(), |length| start + length);
-            let table: Vec<&str> = text[start..end].lines().map(|line| line.trim_start_matches("# ")).collect();
+            let end = text[start..]
+                .find("\n\n")
+                .map_or(text.len(), |length| start + length);
+            let table: Vec<&str> = text[start..end]
+                .lines()
+                .map(|line| line.trim_start_matches("# "))
+                .collect();
             let table = table.join("\n");
             let changed = format!("{}{table}{}", &text[..start], &text[end..]);
-            let changed =
-                if table.contains("seeds") { changed.replace("seed      =", "# seed      =") } else { changed };
+            let changed = if table.contains("seeds") {
+                changed.replace("seed      =", "# seed      =")
+            } else {
+                changed
+            };
             assert!(sweep(&changed).bounds().is_some(), "{table}");
         }
     }
@@ -140,14 +210,38 @@ mod tests {
     fn what_is_set_is_no_comment_any_more() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("mine.toml");
-        let variation = Variation { settings: vec!["N=140".to_owned()], axes: vec!["tolerance=1e-5,1e-4".to_owned()] };
-        let arguments = Arguments { file: file.clone(), preset: None, question: None, variation };
-        assert!(init(&arguments).unwrap_err().to_string().contains("tolerance"), "no axis");
+        let variation = Variation {
+            settings: vec!["N=140".to_owned()],
+            axes: vec!["tolerance=1e-5,1e-4".to_owned()],
+        };
+        let arguments = Arguments {
+            file: file.clone(),
+            preset: None,
+            question: None,
+            variation,
+        };
+        assert!(
+            init(&arguments)
+                .unwrap_err()
+                .to_string()
+                .contains("tolerance"),
+            "no axis"
+        );
         assert!(!file.exists());
-        let variation = Variation { axes: vec!["V0=1e-5,1e-4".to_owned()], ..arguments.variation };
-        init(&Arguments { variation, ..arguments }).unwrap();
+        let variation = Variation {
+            axes: vec!["V0=1e-5,1e-4".to_owned()],
+            ..arguments.variation
+        };
+        init(&Arguments {
+            variation,
+            ..arguments
+        })
+        .unwrap();
         let text = std::fs::read_to_string(&file).unwrap();
-        assert!(text.contains("\nN = 140  # --set\n") && !text.contains("# N = 70"), "{text}");
+        assert!(
+            text.contains("\nN = 140  # --set\n") && !text.contains("# N = 70"),
+            "{text}"
+        );
         assert_eq!(sweep(&text).jobs().count(), 2 * (1 + 2) * 2);
     }
 
@@ -156,9 +250,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("mine.toml");
         std::fs::write(&file, "mine").unwrap();
-        let error =
-            init(&Arguments { file: file.clone(), preset: None, question: None, variation: Variation::default() })
-                .unwrap_err();
+        let error = init(&Arguments {
+            file: file.clone(),
+            preset: None,
+            question: None,
+            variation: Variation::default(),
+        })
+        .unwrap_err();
         assert!(error.to_string().contains("is there already"), "{error}");
         assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
     }

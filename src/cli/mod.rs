@@ -93,9 +93,12 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
 
 /// An error and its causes, without those that it already quotes.
 fn message(error: &anyhow::Error) -> String {
-    error.chain().map(ToString::to_string).fold(String::new(), |message, cause| match message.as_str() {
-        "" => cause,
-        _ if message.contains(&cause) => message,
-        _ => format!("{message}: {cause}"),
-    })
+    error
+        .chain()
+        .map(ToString::to_string)
+        .fold(String::new(), |message, cause| match message.as_str() {
+            "" => cause,
+            _ if message.contains(&cause) => message,
+            _ => format!("{message}: {cause}"),
+        })
 }

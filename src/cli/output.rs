@@ -50,8 +50,14 @@ pub fn plain_json(value: &impl Serialize) -> Result<()> {
 
 /// Prints labels and values in two columns.
 pub fn pairs(pairs: &[(&str, String)]) -> Result<()> {
-    let width = pairs.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
-    pairs.iter().try_for_each(|(label, value)| print(&format!("{label:width$}  {value}\n")))
+    let width = pairs
+        .iter()
+        .map(|(label, _)| label.chars().count())
+        .max()
+        .unwrap_or(0);
+    pairs
+        .iter()
+        .try_for_each(|(label, value)| print(&format!("{label:width$}  {value}\n")))
 }
 
 /// Columns of cells side by side, each with whether it is of words, which stand to the left.
@@ -66,14 +72,28 @@ impl Columns {
 
 impl fmt::Display for Columns {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = |cells: &[String]| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
+        let width = |cells: &[String]| {
+            cells
+                .iter()
+                .map(|cell| cell.chars().count())
+                .max()
+                .unwrap_or(0)
+        };
         let widths: Vec<usize> = self.0.iter().map(|(_, cells)| width(cells)).collect();
         let lines = self.0.first().map_or(0, |(_, cells)| cells.len());
         (0..lines).try_for_each(|line| {
-            let padded = self.0.iter().zip(&widths).map(|((is_worded, cells), &width)| {
-                let cell = &cells[line];
-                if *is_worded { format!("{cell:width$}") } else { format!("{cell:>width$}") }
-            });
+            let padded = self
+                .0
+                .iter()
+                .zip(&widths)
+                .map(|((is_worded, cells), &width)| {
+                    let cell = &cells[line];
+                    if *is_worded {
+                        format!("{cell:width$}")
+                    } else {
+                        format!("{cell:>width$}")
+                    }
+                });
             writeln!(f, "{}", padded.collect::<Vec<_>>().join("  ").trim_end())
         })
     }
@@ -94,25 +114,58 @@ pub fn duration(seconds: f64) -> String {
 
 /// Bytes of memory, rounded up.
 pub fn memory(bytes: f64) -> String {
-    if bytes < 1e9 { format!("{:.0} MB", (1e-6 * bytes).ceil()) } else { format!("{:.1} GB", 1e-9 * bytes) }
+    if bytes < 1e9 {
+        format!("{:.0} MB", (1e-6 * bytes).ceil())
+    } else {
+        format!("{:.1} GB", 1e-9 * bytes)
+    }
 }
 
 /// A count with its noun, in the plural where that fits.
 pub fn count(number: u64, noun: &str) -> String {
-    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
+    if number == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{number} {noun}s")
+    }
 }
 
 /// How far the rounds of a sweep are.
 pub fn rounds(rounds: &RoundsSoFar) -> String {
-    let Standing { sets_done, sets_open, sets_capped, edges_capped } = rounds.standing;
-    let over = if rounds.is_over { "the last" } else { "not the last" };
-    let sets = format!("{} ({over}): {} done, {sets_open} open", rounds.round, count(sets_done, "set"));
+    let Standing {
+        sets_done,
+        sets_open,
+        sets_capped,
+        edges_capped,
+    } = rounds.standing;
+    let over = if rounds.is_over {
+        "the last"
+    } else {
+        "not the last"
+    };
+    let sets = format!(
+        "{} ({over}): {} done, {sets_open} open",
+        rounds.round,
+        count(sets_done, "set")
+    );
     let capped = [
-        (sets_capped > 0).then(|| format!("; {} with all seeds allowed, above the target", count(sets_capped, "set"))),
-        (edges_capped > 0)
-            .then(|| format!("; {} wider than wanted, at the limit of seeds or jobs", count(edges_capped, "edge"))),
+        (sets_capped > 0).then(|| {
+            format!(
+                "; {} with all seeds allowed, above the target",
+                count(sets_capped, "set")
+            )
+        }),
+        (edges_capped > 0).then(|| {
+            format!(
+                "; {} wider than wanted, at the limit of seeds or jobs",
+                count(edges_capped, "edge")
+            )
+        }),
     ];
-    capped.into_iter().flatten().fold(sets, |text, more| text + &more)
+    capped
+        .into_iter()
+        .flatten()
+        .fold(sets, |text, more| text + &more)
 }
 
 /// Writes a file whole: beside its place, and then moved there, so that no half of it looks whole. Where a link leads to a
@@ -124,7 +177,9 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
         Ok(there) if there.is_dir() => return refused("is a folder; name a file in it"),
         Ok(there) if !there.is_file() => return write(path).with_context(cannot),
         Ok(_) => fs::canonicalize(path).with_context(cannot)?,
-        Err(_) if path.is_symlink() => return refused("is a link that leads nowhere; remove it, or name another file"),
+        Err(_) if path.is_symlink() => {
+            return refused("is a link that leads nowhere; remove it, or name another file");
+        }
         Err(_) => path.to_owned(),
     };
     let draft = place.with_file_name(format!(".stickslip-{}.draft", std::process::id()));
@@ -138,16 +193,23 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
 
 /// A line on a terminal, with the time so far, until it is dropped.
 pub fn waiting(what: String) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template("{elapsed_precise} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
-    let line = ProgressBar::new_spinner().with_style(style).with_message(what).with_finish(ProgressFinish::AndClear);
+    let style = ProgressStyle::with_template("{elapsed_precise} {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_spinner());
+    let line = ProgressBar::new_spinner()
+        .with_style(style)
+        .with_message(what)
+        .with_finish(ProgressFinish::AndClear);
     line.enable_steady_tick(Duration::from_secs(1));
     line
 }
 
 /// A text as a shell reads it.
 pub fn quoted(text: &str) -> String {
-    if !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || "/._-+=:,@".contains(c)) {
+    if !text.is_empty()
+        && text
+            .chars()
+            .all(|c| c.is_alphanumeric() || "/._-+=:,@".contains(c))
+    {
         text.to_owned()
     } else {
         format!("'{}'", text.replace('\'', r"'\''"))
@@ -185,14 +247,28 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [file, link] = ["page", "link"].map(|name| folder.path().join(name));
         symlink("page", &link).unwrap();
-        assert!(put(&link, "a").unwrap_err().to_string().contains("is a link that leads nowhere"));
+        assert!(
+            put(&link, "a")
+                .unwrap_err()
+                .to_string()
+                .contains("is a link that leads nowhere")
+        );
         put(&file, "b").unwrap();
         put(&link, "c").unwrap();
         assert!(link.is_symlink());
         assert_eq!(fs::read_to_string(&file).unwrap(), "c");
-        assert!(put(folder.path(), "d").unwrap_err().to_string().contains("is a folder"));
-        replace(&file, |draft| fs::write(draft, "half").and(Err(io::Error::other("full"))).map_err(Into::into))
-            .unwrap_err();
+        assert!(
+            put(folder.path(), "d")
+                .unwrap_err()
+                .to_string()
+                .contains("is a folder")
+        );
+        replace(&file, |draft| {
+            fs::write(draft, "half")
+                .and(Err(io::Error::other("full")))
+                .map_err(Into::into)
+        })
+        .unwrap_err();
         assert_eq!(fs::read_to_string(&file).unwrap(), "c");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
@@ -201,7 +277,13 @@ mod tests {
     fn a_pipe_is_written_to_and_stays() {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe");
-        assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(
+            Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
         std::thread::scope(|scope| {
             let read = scope.spawn(|| fs::read_to_string(&pipe).unwrap());
             put(&pipe, "page").unwrap();

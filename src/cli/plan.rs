@@ -74,38 +74,59 @@ impl Directory {
             Err(error) if error.kind == ErrorKind::Refused => (Some(error.to_string()), None, None),
             Err(error) => return Err(error.into()),
         };
-        Ok(Some(Self { path: root, refused, overview, rounds }))
+        Ok(Some(Self {
+            path: root,
+            refused,
+            overview,
+            rounds,
+        }))
     }
 
     fn in_words(&self) -> String {
-        let Some(Overview { jobs_done, jobs_failed, jobs_kept, jobs_missing, .. }) = &self.overview else {
+        let Some(Overview {
+            jobs_done,
+            jobs_failed,
+            jobs_kept,
+            jobs_missing,
+            ..
+        }) = &self.overview
+        else {
             return format!("refused: {}", self.refused.as_deref().unwrap_or_default());
         };
         let (path, own) = (shown(&self.path), jobs_done - jobs_kept);
         let kept = format!("; {jobs_kept} more done that the sweep no longer has");
         let kept = if *jobs_kept == 0 { "" } else { &kept };
-        let round =
-            self.rounds.as_ref().map_or_else(String::new, |rounds| format!("; round {}", output::rounds(rounds)));
+        let round = self.rounds.as_ref().map_or_else(String::new, |rounds| {
+            format!("; round {}", output::rounds(rounds))
+        });
         format!("{path}: {own} done, {jobs_failed} failed, {jobs_missing} to run{kept}{round}")
     }
 }
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let changes = sweep::changes(&arguments.variation)?;
-    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
+    let sweep = sweep::read(
+        arguments.sweep.as_deref(),
+        arguments.preset.preset,
+        &changes,
+    )?;
     output::warn(&sweep.warnings());
     let default = changes.is_empty().then(|| Layout::default_root(&sweep));
     let root = arguments.out.clone().or(default);
     let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let wall_time = totals.cost / threads as f64;
-    let thread_memory = MEMORY_OF_A_CONTACT * totals.contacts as f64 + MEMORY_OF_A_SLIP * totals.slips_of_part;
+    let thread_memory =
+        MEMORY_OF_A_CONTACT * totals.contacts as f64 + MEMORY_OF_A_SLIP * totals.slips_of_part;
     let slips = totals.jobs.saturating_mul(sweep.recording().slips);
     // What all rounds of a sweep that decides for itself may add up to; the other numbers are those of the first.
     let at_most = sweep.bounds();
     let directory = root.map_or(Ok(None), |root| Directory::of(&sweep, root))?;
     if arguments.json {
-        let axes: Vec<Json> = sweep.axes().map(|(keys, points)| json!({ "keys": keys, "points": points })).collect();
+        let axes: Vec<Json> = sweep
+            .axes()
+            .map(|(keys, points)| json!({ "keys": keys, "points": points }))
+            .collect();
         let mut report = json!({
             "name": sweep.name(),
             "axes": axes,
@@ -125,33 +146,69 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         }
         output::json(FORMAT, &report)?;
     } else {
-        let axes: Vec<String> = sweep.axes().map(|(keys, points)| format!("{keys} ({points})")).collect();
-        let directory = directory.map_or("none yet: all jobs are to run".to_owned(), |directory| directory.in_words());
+        let axes: Vec<String> = sweep
+            .axes()
+            .map(|(keys, points)| format!("{keys} ({points})"))
+            .collect();
+        let directory = directory.map_or("none yet: all jobs are to run".to_owned(), |directory| {
+            directory.in_words()
+        });
         let (choice, which) = match at_most {
-            Some(_) => (", from which the rounds choose", "in the first round, to which the numbers below refer"),
-            None if sweep.recording().control => ("", "after conditions and duplicates, and their controls"),
+            Some(_) => (
+                ", from which the rounds choose",
+                "in the first round, to which the numbers below refer",
+            ),
+            None if sweep.recording().control => {
+                ("", "after conditions and duplicates, and their controls")
+            }
             None => ("", "after conditions and duplicates"),
         };
         let mut pairs = vec![
             ("sweep", sweep.name().to_owned()),
-            ("axes", if axes.is_empty() { "none: a single point".to_owned() } else { axes.join(" x ") }),
+            (
+                "axes",
+                if axes.is_empty() {
+                    "none: a single point".to_owned()
+                } else {
+                    axes.join(" x ")
+                },
+            ),
             ("grid points", format!("{}{choice}", sweep.point_count())),
             ("jobs", format!("{} {which}", totals.jobs)),
             ("parts", totals.parts.to_string()),
             ("slips to record", slips.to_string()),
             (
                 "predicted CPU time",
-                format!("{}, {:.1} core-hours", output::duration(totals.cost), totals.cost / 3600.0),
+                format!(
+                    "{}, {:.1} core-hours",
+                    output::duration(totals.cost),
+                    totals.cost / 3600.0
+                ),
             ),
-            ("predicted wall time", format!("{} on {threads} cores", output::duration(wall_time))),
+            (
+                "predicted wall time",
+                format!("{} on {threads} cores", output::duration(wall_time)),
+            ),
             (
                 "worker memory",
-                format!("{} and {} for each thread", output::memory(MEMORY), output::memory(thread_memory)),
+                format!(
+                    "{} and {} for each thread",
+                    output::memory(MEMORY),
+                    output::memory(thread_memory)
+                ),
             ),
         ];
-        if let Some(Bounds { sets, jobs, predicted_cost }) = at_most {
+        if let Some(Bounds {
+            sets,
+            jobs,
+            predicted_cost,
+        }) = at_most
+        {
             let cost = output::duration(predicted_cost);
-            pairs.push(("all rounds", format!("at most {sets} sets, {jobs} jobs; estimated CPU time {cost}")));
+            pairs.push((
+                "all rounds",
+                format!("at most {sets} sets, {jobs} jobs; estimated CPU time {cost}"),
+            ));
         }
         pairs.push(("directory", directory));
         output::pairs(&pairs)?;

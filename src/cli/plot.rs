@@ -57,11 +57,19 @@ Examples:
 
 impl Arguments {
     fn look(&self, results: &Results<'_>) -> Look {
-        Look { style: self.style, size: self.size, ..Look::of_sweep(results.sweep().name()) }
+        Look {
+            style: self.style,
+            size: self.size,
+            ..Look::of_sweep(results.sweep().name())
+        }
     }
 
     fn formats(&self) -> &[Format] {
-        if self.format.is_empty() { &Format::DEFAULT } else { &self.format }
+        if self.format.is_empty() {
+            &Format::DEFAULT
+        } else {
+            &self.format
+        }
     }
 }
 
@@ -69,7 +77,9 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     if arguments.list {
         list()?;
     }
-    let Some(directory) = &arguments.directory else { return Ok(Exit::Done) };
+    let Some(directory) = &arguments.directory else {
+        return Ok(Exit::Done);
+    };
     let results = renew(&Results::read(&Layout::new(&Disk, directory))?)?;
     let (layout, look) = (results.layout(), arguments.look(&results));
     let files = if arguments.own.x.is_none() {
@@ -83,7 +93,9 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
             None => write_own(layout, picture, &look, arguments.formats())?,
             Some(file) => {
                 let format = format_of(file)?;
-                output::replace(file, |draft| Ok(std::fs::write(draft, picture.encoded(format)?)?))?;
+                output::replace(file, |draft| {
+                    Ok(std::fs::write(draft, picture.encoded(format)?)?)
+                })?;
                 vec![file.clone()]
             }
         }
@@ -100,16 +112,31 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
 /// The format that a file's name ends in.
 pub fn format_of(file: &Path) -> Result<Format> {
     let extension = file.extension().and_then(|extension| extension.to_str());
-    let format = Format::ALL.into_iter().find(|format| extension == Some(format.extension()));
-    format.ok_or_else(|| UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into())
+    let format = Format::ALL
+        .into_iter()
+        .find(|format| extension == Some(format.extension()));
+    format.ok_or_else(|| {
+        UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into()
+    })
 }
 
 /// Prints the columns of the table of sets.
 fn list() -> Result<()> {
     let columns = set_columns();
-    let name = columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
-    let unit = columns.iter().map(|column| column.unit.len()).max().unwrap_or(0);
+    let name = columns
+        .iter()
+        .map(|column| column.name.len())
+        .max()
+        .unwrap_or(0);
+    let unit = columns
+        .iter()
+        .map(|column| column.unit.len())
+        .max()
+        .unwrap_or(0);
     columns.iter().try_for_each(|column| {
-        output::print(&format!("{:name$}  {:unit$}  {}\n", column.name, column.unit, column.meaning))
+        output::print(&format!(
+            "{:name$}  {:unit$}  {}\n",
+            column.name, column.unit, column.meaning
+        ))
     })
 }

@@ -48,12 +48,30 @@ impl Progress {
 
     pub fn show(&mut self, event: &RunEvent) {
         self.tally.note(event);
-        self.has_results |= matches!(event, RunEvent::PartCommitted { .. } | RunEvent::Started { jobs_there: 1.., .. });
+        self.has_results |= matches!(
+            event,
+            RunEvent::PartCommitted { .. }
+                | RunEvent::Started {
+                    jobs_there: 1..,
+                    ..
+                }
+        );
         match event {
-            &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, others, .. } => {
+            &RunEvent::Started {
+                jobs,
+                predicted_cost,
+                jobs_there,
+                threads,
+                others,
+                ..
+            } => {
                 self.begin = Instant::now();
-                let variable = self.threads.variable.map_or_else(String::new, |variable| format!(" ({variable})"));
-                let workers = || format!(", shared with {}", output::count(others as u64, "worker"));
+                let variable = self
+                    .threads
+                    .variable
+                    .map_or_else(String::new, |variable| format!(" ({variable})"));
+                let workers =
+                    || format!(", shared with {}", output::count(others as u64, "worker"));
                 let beside = (others > 0).then(workers).unwrap_or_default();
                 self.say(&format!(
                     "running {}{}, {jobs_there} there already; predicted: {} on {}{variable}{beside}",
@@ -63,23 +81,43 @@ impl Progress {
                     output::count(threads as u64, "thread"),
                 ));
                 if self.is_terminal {
-                    self.bar = ProgressBar::with_draw_target(Some(u64::from(RESOLUTION)), ProgressDrawTarget::stderr());
+                    self.bar = ProgressBar::with_draw_target(
+                        Some(u64::from(RESOLUTION)),
+                        ProgressDrawTarget::stderr(),
+                    );
                 }
-                if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
+                if let Ok(style) =
+                    ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}")
+                {
                     self.bar.set_style(style.progress_chars("=> "));
                 }
             }
             RunEvent::RoundBegun { jobs, rounds, .. } => {
-                self.say(&format!("{} more; round {}", output::count(*jobs, "job"), output::rounds(rounds)));
+                self.say(&format!(
+                    "{} more; round {}",
+                    output::count(*jobs, "job"),
+                    output::rounds(rounds)
+                ));
             }
             RunEvent::JobDone { .. } | RunEvent::Tick => self.draw(),
-            RunEvent::JobTakesLong { command, predicted_cost, wall } => self.say(&format!(
+            RunEvent::JobTakesLong {
+                command,
+                predicted_cost,
+                wall,
+            } => self.say(&format!(
                 "1 job has run {}, {:.0} times its prediction: {command}",
                 output::duration(*wall),
                 wall / predicted_cost
             )),
-            RunEvent::JobFailed { job_id, reason, command, .. } => {
-                self.say(&format!("job {job_id} failed: {reason}\n  alone: {command}"));
+            RunEvent::JobFailed {
+                job_id,
+                reason,
+                command,
+                ..
+            } => {
+                self.say(&format!(
+                    "job {job_id} failed: {reason}\n  alone: {command}"
+                ));
                 self.draw();
             }
             RunEvent::Stopping => self.say("stopping: jobs in flight end, finished jobs are kept"),
@@ -99,22 +137,51 @@ impl Progress {
 
     /// Draws the bar, which counts the jobs of all workers since this one began, or says a line if the last is long ago.
     fn draw(&mut self) {
-        let (Tally { jobs, jobs_done, jobs_of_others, .. }, share) = (self.tally, self.tally.share());
+        let (
+            Tally {
+                jobs,
+                jobs_done,
+                jobs_of_others,
+                ..
+            },
+            share,
+        ) = (self.tally, self.tally.share());
         let elapsed = self.begin.elapsed().as_secs_f64();
         let left = if share > 0.0 {
-            let guess = if share < GUESS { ", a guess so far" } else { "" };
-            format!("{} left{}{guess}", output::duration(elapsed * (1.0 - share) / share), self.of_round)
+            let guess = if share < GUESS {
+                ", a guess so far"
+            } else {
+                ""
+            };
+            format!(
+                "{} left{}{guess}",
+                output::duration(elapsed * (1.0 - share) / share),
+                self.of_round
+            )
         } else {
             "time left unknown".to_owned()
         };
-        let others = if jobs_of_others == 0 { String::new() } else { format!(" ({jobs_of_others} by others)") };
+        let others = if jobs_of_others == 0 {
+            String::new()
+        } else {
+            format!(" ({jobs_of_others} by others)")
+        };
         let text = format!("{jobs_done} of {jobs} jobs{others}, {left}");
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 1000")]
-        self.bar.set_position((f64::from(RESOLUTION) * share) as u64);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of 1000"
+        )]
+        self.bar
+            .set_position((f64::from(RESOLUTION) * share) as u64);
         self.bar.set_message(text.clone());
         if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();
-            output::report(&format!("{}, {:.0} %: {text}", output::duration(elapsed), 100.0 * share));
+            output::report(&format!(
+                "{}, {:.0} %: {text}",
+                output::duration(elapsed),
+                100.0 * share
+            ));
         }
     }
 }
@@ -126,12 +193,24 @@ mod tests {
     #[test]
     fn the_time_left_is_that_of_a_round_where_more_may_come() {
         let message = |has_rounds: bool| {
-            let mut progress = Progress::new(Threads { count: None, variable: None }, has_rounds);
-            progress.tally.note(&RunEvent::OthersDone { jobs: 3, predicted_cost: 1.0 });
+            let mut progress = Progress::new(
+                Threads {
+                    count: None,
+                    variable: None,
+                },
+                has_rounds,
+            );
+            progress.tally.note(&RunEvent::OthersDone {
+                jobs: 3,
+                predicted_cost: 1.0,
+            });
             progress.show(&RunEvent::Tick);
             progress.bar.message()
         };
         assert_eq!(message(false), "3 of 0 jobs (3 by others), 0.0 s left");
-        assert_eq!(message(true), "3 of 0 jobs (3 by others), 0.0 s left of this round");
+        assert_eq!(
+            message(true),
+            "3 of 0 jobs (3 by others), 0.0 s left of this round"
+        );
     }
 }

@@ -35,15 +35,21 @@ pub fn reduce(arguments: &Arguments) -> Result<Exit> {
         output::pairs(&summary_lines(&summary, results.layout()))?;
     }
     report_missing(&results)?;
-    Ok(if summary.failed_jobs > 0 { Exit::Failed } else { Exit::Done })
+    Ok(if summary.failed_jobs > 0 {
+        Exit::Failed
+    } else {
+        Exit::Done
+    })
 }
 
 /// Says which jobs were not there to be reduced.
 pub fn report_missing(results: &Results<'_>) -> Result<()> {
     let overview = crate::run::status(results)?.overview;
     if overview.jobs_missing > 0 {
-        let (jobs, parts) =
-            (output::count(overview.jobs_missing, "job"), output::count(overview.parts_missing, "part"));
+        let (jobs, parts) = (
+            output::count(overview.jobs_missing, "job"),
+            output::count(overview.parts_missing, "part"),
+        );
         output::report(&format!(
             "reduced what is there: {jobs} in {parts} are missing; stickslip run continues with them"
         ));
@@ -51,11 +57,20 @@ pub fn report_missing(results: &Results<'_>) -> Result<()> {
     Ok(())
 }
 
-pub fn summary_lines(summary: &ReductionSummary, layout: &Layout<'_>) -> Vec<(&'static str, String)> {
+pub fn summary_lines(
+    summary: &ReductionSummary,
+    layout: &Layout<'_>,
+) -> Vec<(&'static str, String)> {
     let text = |path: &Path| shown(path).to_string();
     vec![
-        ("jobs reduced", format!("{}, {} failed", summary.jobs, summary.failed_jobs)),
-        ("parameter sets", format!("{}, {} with a phase", summary.sets, summary.phased_sets)),
+        (
+            "jobs reduced",
+            format!("{}, {} failed", summary.jobs, summary.failed_jobs),
+        ),
+        (
+            "parameter sets",
+            format!("{}, {} with a phase", summary.sets, summary.phased_sets),
+        ),
         ("slips", summary.slips.to_string()),
         ("reduced data", text(&layout.reduced())),
     ]

@@ -69,13 +69,22 @@ pub struct Reporter<'a> {
 
 impl<'a> Reporter<'a> {
     pub fn new(layout: &'a Layout<'a>) -> Self {
-        Self { layout, is_due: false, last: None, spacing: MIN_SPACING, has_failed: false }
+        Self {
+            layout,
+            is_due: false,
+            last: None,
+            spacing: MIN_SPACING,
+            has_failed: false,
+        }
     }
 
     /// Writes a report if there is something new and the last is long enough ago. One that cannot be written does not
     /// end the run.
     pub fn follow(&mut self, event: &RunEvent) {
-        self.is_due |= matches!(event, RunEvent::PartCommitted { .. } | RunEvent::OthersDone { jobs: 1.., .. });
+        self.is_due |= matches!(
+            event,
+            RunEvent::PartCommitted { .. } | RunEvent::OthersDone { jobs: 1.., .. }
+        );
         if !self.is_due || self.last.is_some_and(|last| last.elapsed() < self.spacing) {
             return;
         }
@@ -83,7 +92,10 @@ impl<'a> Reporter<'a> {
         if let Err(error) = self.write(Some(self.spacing))
             && !std::mem::replace(&mut self.has_failed, true)
         {
-            output::report(&format!("warning: no report is written: {}", message(&error)));
+            output::report(&format!(
+                "warning: no report is written: {}",
+                message(&error)
+            ));
         }
         self.is_due = false;
         self.last = Some(Instant::now());

@@ -96,11 +96,17 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         shard: arguments.shard.unwrap_or_default(),
         walltime: arguments.walltime,
     };
-    let (layout, mut progress) = (Layout::new(&Disk, &root), Progress::new(threads, sweep.rounds().is_some()));
-    let report =
-        crate::run::join(&layout, &sweep, options, |joined| work(joined, &sweep, &layout, arguments, &mut progress));
+    let (layout, mut progress) = (
+        Layout::new(&Disk, &root),
+        Progress::new(threads, sweep.rounds().is_some()),
+    );
+    let report = crate::run::join(&layout, &sweep, options, |joined| {
+        work(joined, &sweep, &layout, arguments, &mut progress)
+    });
     let report = report.map_err(|error| match Exit::of(&error) {
-        Exit::Stopped if progress.has_results() => error.context("the run stopped; what was committed is kept"),
+        Exit::Stopped if progress.has_results() => {
+            error.context("the run stopped; what was committed is kept")
+        }
         _ => error,
     })?;
     Ok(ending(&report, &root, arguments))
@@ -116,7 +122,10 @@ impl Arguments {
             return Ok((sweep, out.clone()));
         }
         let is_own = |results: Results<'_>| results.sweep().text() == sweep.text();
-        if !changes.is_empty() && Disk.exists(&root)? && !Results::read(&Layout::new(&Disk, &root)).is_ok_and(is_own) {
+        if !changes.is_empty()
+            && Disk.exists(&root)?
+            && !Results::read(&Layout::new(&Disk, &root)).is_ok_and(is_own)
+        {
             let (there, root) = (shown(&root), output::quoted_path(&root));
             let problem = format!(
                 "--set, --axis: {there} holds another sweep; give a new directory with -o DIR, or -o {root} to extend that one"
@@ -137,7 +146,8 @@ fn work(
 ) -> Result<RunReport> {
     let mut reporter = arguments.report.then(|| Reporter::new(layout));
     let (recording, solver) = (*sweep.recording(), sweep.solver());
-    let kernel = |job: &Job, interrupt: &AtomicBool| measure(&job.parameters, &recording, solver, interrupt);
+    let kernel =
+        |job: &Job, interrupt: &AtomicBool| measure(&job.parameters, &recording, solver, interrupt);
     let report = joined.run(&kernel, &mut |event| {
         progress.show(event);
         if let Some(reporter) = &mut reporter {
@@ -160,17 +170,30 @@ fn work(
     if arguments.json {
         output::json(FORMAT, &report)?;
     } else {
-        let lines = reduced.as_ref().ok().and_then(Option::as_ref).map(|reduced| reduced.lines.clone());
+        let lines = reduced
+            .as_ref()
+            .ok()
+            .and_then(Option::as_ref)
+            .map(|reduced| reduced.lines.clone());
         output::pairs(&[summary_lines(&report), lines.unwrap_or_default()].concat())?;
     }
-    if let Some(Reduced { result, figures, .. }) = reduced?.filter(|_| !arguments.json) {
+    if let Some(Reduced {
+        result, figures, ..
+    }) = reduced?.filter(|_| !arguments.json)
+    {
         output::print(&format!("\n{result}\n"))?;
-        figures.iter().try_for_each(|path| output::print(&format!("figure  {}\n", shown(path))))?;
+        figures
+            .iter()
+            .try_for_each(|path| output::print(&format!("figure  {}\n", shown(path))))?;
     }
     if is_complete && arguments.shard.is_some() {
         reduce::report_missing(&Results::read(layout)?)?;
     }
-    let written = reporter.as_ref().map(|reporter| reporter.finish(&report)).transpose()?.flatten();
+    let written = reporter
+        .as_ref()
+        .map(|reporter| reporter.finish(&report))
+        .transpose()?
+        .flatten();
     if let Some(path) = written.filter(|_| !arguments.json) {
         output::print(&format!("report  {}\n", shown(&path)))?;
     }
@@ -182,17 +205,32 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     if report.stopped {
         let left = output::count(report.jobs_left, "job");
         let hint = match arguments.walltime {
-            Some(_) if report.jobs_run == 0 => "No part ended in this time: give a longer --walltime.",
+            Some(_) if report.jobs_run == 0 => {
+                "No part ended in this time: give a longer --walltime."
+            }
             _ => "The same command resumes.",
         };
-        let of_round = if report.rounds.is_some() { " of this round" } else { "" };
-        output::report(&format!("stopped with {left} left{of_round}; finished jobs are kept. {hint}"));
+        let of_round = if report.rounds.is_some() {
+            " of this round"
+        } else {
+            ""
+        };
+        output::report(&format!(
+            "stopped with {left} left{of_round}; finished jobs are kept. {hint}"
+        ));
         // One that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
-        return if arguments.worker && has_worked && !signals::is_cancelled() { Exit::Done } else { Exit::Stopped };
+        return if arguments.worker && has_worked && !signals::is_cancelled() {
+            Exit::Done
+        } else {
+            Exit::Stopped
+        };
     }
     if report.jobs_left > 0 {
-        let (left, hosts) = (output::count(report.jobs_left, "job"), report.hosts.join(", "));
+        let (left, hosts) = (
+            output::count(report.jobs_left, "job"),
+            report.hosts.join(", "),
+        );
         let out = output::quoted_path(root);
         output::report(&format!(
             "nothing is left to take: others run the last {left} ({hosts}); see stickslip status {out}"
@@ -200,7 +238,9 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     }
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
-        output::report(&format!("{failed} failed; tables/jobs has the reasons. --retry-failed runs them again."));
+        output::report(&format!(
+            "{failed} failed; tables/jobs has the reasons. --retry-failed runs them again."
+        ));
         return Exit::Failed;
     }
     Exit::Done
@@ -224,14 +264,29 @@ fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
         }
         summary => summary?,
     };
-    let figures = draw_all(layout, &Look::of_sweep(results.sweep().name()), &Format::DEFAULT)?;
+    let figures = draw_all(
+        layout,
+        &Look::of_sweep(results.sweep().name()),
+        &Format::DEFAULT,
+    )?;
     let lines = reduce::summary_lines(&summary, layout);
-    Ok(Some(Reduced { lines, result: show::summary(&results, summary.sets)?, figures }))
+    Ok(Some(Reduced {
+        lines,
+        result: show::summary(&results, summary.sets)?,
+        figures,
+    }))
 }
 
 fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
     let mut pairs = vec![
-        ("jobs run", format!("{}, {} failed", report.jobs_run + report.jobs_spilled, report.jobs_failed)),
+        (
+            "jobs run",
+            format!(
+                "{}, {} failed",
+                report.jobs_run + report.jobs_spilled,
+                report.jobs_failed
+            ),
+        ),
         ("parts committed", report.parts_committed.to_string()),
     ];
     if let Some(rounds) = &report.rounds {
@@ -239,7 +294,13 @@ fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
     }
     if report.jobs_run > 0 {
         let measured = output::duration(report.measured_cost);
-        pairs.push(("CPU time", format!("{measured}, predicted {}", output::duration(report.predicted_cost))));
+        pairs.push((
+            "CPU time",
+            format!(
+                "{measured}, predicted {}",
+                output::duration(report.predicted_cost)
+            ),
+        ));
         pairs.push(("wall time", output::duration(report.wall)));
     }
     pairs

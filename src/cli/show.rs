@@ -4,7 +4,8 @@ use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
 use crate::model::Symbol;
 use crate::reduce::{
-    EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, differing, read_reduced, renew, sets_where,
+    EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, differing, read_reduced, renew,
+    sets_where,
 };
 use crate::results::Results;
 use crate::results::layout::Layout;
@@ -84,14 +85,24 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     if let Some(other) = &arguments.other {
         let others = Results::read(&Layout::new(&Disk, other))?;
         let columns = compare(&results, &others)?;
-        if columns.first().is_none_or(|values| values.numbers.is_empty()) {
-            let problem = "no set agrees with one of the first in all parameters that either varies";
+        if columns
+            .first()
+            .is_none_or(|values| values.numbers.is_empty())
+        {
+            let problem =
+                "no set agrees with one of the first in all parameters that either varies";
             return Err(UsageError(format!("{}: {problem}", shown(other))).into());
         }
         if is_text {
-            output::print(&format!("A is {}, B is {}\n", shown(&arguments.directory), shown(other)))?;
+            output::print(&format!(
+                "A is {}, B is {}\n",
+                shown(&arguments.directory),
+                shown(other)
+            ))?;
             let differences = results.sweep().differences(others.sweep());
-            let mut differences = differences.iter().filter(|difference| !difference.starts_with("name"));
+            let mut differences = differences
+                .iter()
+                .filter(|difference| !difference.starts_with("name"));
             differences.try_for_each(|difference| output::print(&format!("{difference}\n")))?;
         }
         return print(arguments, &columns, &[], &[]);
@@ -100,7 +111,8 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     let mut rows = sets(&results, usize::MAX)?;
     let (usual, count) = (usual_names(&rows), rows.len());
     if let Some(condition) = &arguments.condition {
-        rows = sets_where(rows, condition).map_err(|problem| UsageError(format!("--where {condition}: {problem}")))?;
+        rows = sets_where(rows, condition)
+            .map_err(|problem| UsageError(format!("--where {condition}: {problem}")))?;
         if rows.is_empty() && is_text {
             output::print(&format!("no set of {count}\n"))?;
             return Ok(Exit::Done);
@@ -109,15 +121,30 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     if let Some(column) = &arguments.sort {
         sort(&mut rows, column)?;
     }
-    let asked =
-        |name: &String| Values::of(&rows, name).map_err(|problem| UsageError(format!("--columns {name}: {problem}")));
-    let asked: Vec<Values> = arguments.columns.iter().map(asked).collect::<Result<_, _>>()?;
-    let columns = if asked.is_empty() { usual_columns(usual, &rows) } else { asked };
+    let asked = |name: &String| {
+        Values::of(&rows, name)
+            .map_err(|problem| UsageError(format!("--columns {name}: {problem}")))
+    };
+    let asked: Vec<Values> = arguments
+        .columns
+        .iter()
+        .map(asked)
+        .collect::<Result<_, _>>()?;
+    let columns = if asked.is_empty() {
+        usual_columns(usual, &rows)
+    } else {
+        asked
+    };
     let edges = edges(&results)?;
     if is_text {
         if let Some((_, missing @ 1..)) = results.missing()? {
-            let (jobs, root) = (output::count(missing, "job"), output::quoted_path(&arguments.directory));
-            output::print(&format!("so far: {jobs} missing; stickslip run {root} goes on with them\n\n"))?;
+            let (jobs, root) = (
+                output::count(missing, "job"),
+                output::quoted_path(&arguments.directory),
+            );
+            output::print(&format!(
+                "so far: {jobs} missing; stickslip run {root} goes on with them\n\n"
+            ))?;
         }
         output::print(&table_of_edges(&edges))?;
     }
@@ -131,10 +158,17 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
 }
 
 /// Prints columns as is asked, as JSON with the edges; `rows` are the sets, if they are of one directory.
-fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow], edges: &[EdgeRow]) -> Result<Exit> {
+fn print(
+    arguments: &Arguments,
+    columns: &[Values],
+    rows: &[SetRow],
+    edges: &[EdgeRow],
+) -> Result<Exit> {
     let count = columns.first().map_or(0, |values| values.numbers.len());
     if arguments.json {
-        let sets: Vec<Map<String, Json>> = (0..count).map(|set| record(columns, set).into_iter().collect()).collect();
+        let sets: Vec<Map<String, Json>> = (0..count)
+            .map(|set| record(columns, set).into_iter().collect())
+            .collect();
         let edges: Vec<Json> = edges.iter().map(json).collect();
         output::json(FORMAT, &serde_json::json!({ "sets": sets, "edges": edges }))?;
     } else if arguments.csv {
@@ -152,13 +186,19 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let columns = usual_columns(usual_names(&rows), &rows);
     let mut notes = notes(results, &rows);
     // A line that says how many more there are is as long as one of these.
-    let first = if count <= FIRST as u64 + 1 { FIRST + 1 } else { FIRST };
+    let first = if count <= FIRST as u64 + 1 {
+        FIRST + 1
+    } else {
+        FIRST
+    };
     if let Some(more) = count.checked_sub(first as u64).filter(|more| *more > 0) {
         let root = output::quoted_path(results.layout().root());
         notes.insert(0, format!("… {more} more: stickslip show {root}"));
     }
     let text = table_of_edges(&edges(results)?) + &aligned(&columns, &rows, first);
-    Ok(notes.into_iter().fold(text, |text, note| text + &note + "\n"))
+    Ok(notes
+        .into_iter()
+        .fold(text, |text, note| text + &note + "\n"))
 }
 
 /// The first of the reduced sets, controls left out.
@@ -166,7 +206,12 @@ fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
     let file = results.layout().reduced_file(SetRow::NAME);
     let mut sets = Vec::new();
     for batch in Dataset::new(results.layout().storage, vec![file]).rows::<SetRow>() {
-        sets.extend(batch?.into_iter().filter(|row| !row.is_control).take(most - sets.len()));
+        sets.extend(
+            batch?
+                .into_iter()
+                .filter(|row| !row.is_control)
+                .take(most - sets.len()),
+        );
         if sets.len() == most {
             break;
         }
@@ -176,7 +221,11 @@ fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
 
 /// The column that shows a parameter: of the period, the frequency.
 const fn key_of(symbol: Symbol) -> &'static str {
-    if matches!(symbol, Symbol::T) { FREQUENCY } else { symbol.key() }
+    if matches!(symbol, Symbol::T) {
+        FREQUENCY
+    } else {
+        symbol.key()
+    }
 }
 
 /// The parameters in which sets differ.
@@ -188,13 +237,21 @@ fn usual_names(rows: &[SetRow]) -> Vec<&'static str> {
 
 /// Parameters of these names, and what was found of sets.
 fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
-    let columns = names.into_iter().chain(FOUND).filter_map(|name| Values::of(rows, name).ok());
-    columns.filter(|values| values.numbers.iter().any(Option::is_some)).collect()
+    let columns = names
+        .into_iter()
+        .chain(FOUND)
+        .filter_map(|name| Values::of(rows, name).ok());
+    columns
+        .filter(|values| values.numbers.iter().any(Option::is_some))
+        .collect()
 }
 
 fn sort(rows: &mut Vec<SetRow>, column: &str) -> Result<()> {
-    let (name, is_falling) = column.strip_prefix('-').map_or((column, false), |name| (name, true));
-    let values = Values::of(rows, name).map_err(|problem| UsageError(format!("--sort {column}: {problem}")))?;
+    let (name, is_falling) = column
+        .strip_prefix('-')
+        .map_or((column, false), |name| (name, true));
+    let values = Values::of(rows, name)
+        .map_err(|problem| UsageError(format!("--sort {column}: {problem}")))?;
     let mut order: Vec<usize> = (0..rows.len()).collect();
     order.sort_by(|&left, &right| {
         let sign = if is_falling { -1.0 } else { 1.0 };
@@ -211,7 +268,9 @@ fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
     let mut record = Vec::new();
     for values in columns {
         let name = &values.column.name;
-        let word = values.numbers[set].filter(|_| values.is_worded()).and_then(|value| values.word(value));
+        let word = values.numbers[set]
+            .filter(|_| values.is_worded())
+            .and_then(|value| values.word(value));
         let number = || match values.numbers[set] {
             #[expect(clippy::cast_possible_truncation, reason = "a count")]
             Some(number) if values.column.kind == Kind::Count => Json::from(number as i64),
@@ -257,13 +316,22 @@ fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
 
 /// The edges that a sweep has found; none for one that looks for none.
 fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
-    let refines = results.sweep().rounds().is_some_and(|rounds| rounds.refinement.is_some());
-    Ok(if refines { read_reduced(results.layout())? } else { Vec::new() })
+    let refines = results
+        .sweep()
+        .rounds()
+        .is_some_and(|rounds| rounds.refinement.is_some());
+    Ok(if refines {
+        read_reduced(results.layout())?
+    } else {
+        Vec::new()
+    })
 }
 
 /// Edges for people, and a blank line; empty if there are none.
 fn table_of_edges(edges: &[EdgeRow]) -> String {
-    let Some(first) = edges.first() else { return String::new() };
+    let Some(first) = edges.first() else {
+        return String::new();
+    };
     let row = |EdgeRow { parameters, .. }: &EdgeRow| SetRow {
         frequency: parameters.frequency(),
         parameters: parameters.clone(),
@@ -271,26 +339,48 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
     };
     let rows: Vec<SetRow> = edges.iter().map(row).collect();
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
-    let others = differing(&rows.iter()).into_iter().filter(|symbol| *symbol != axis);
+    let others = differing(&rows.iter())
+        .into_iter()
+        .filter(|symbol| *symbol != axis);
     let others = others.filter_map(|symbol| Values::of(&rows, key_of(symbol)).ok());
     let mut columns = Columns::default();
     others.for_each(|values| columns.add(false, column(&values, &rows, rows.len())));
     let of_axis = label(&first.axis);
-    let (factor, unit) = of_axis.scale(edges.iter().map(|edge| edge.bracket_high).fold(0.0, f64::max));
+    let (factor, unit) = of_axis.scale(
+        edges
+            .iter()
+            .map(|edge| edge.bracket_high)
+            .fold(0.0, f64::max),
+    );
     let number = |value: f64| {
         let digits: f64 = format!("{:.3e}", factor * value).parse().unwrap_or(value);
         digits.to_string()
     };
     let mut add = |head: String, cell: &dyn Fn(&EdgeRow) -> String| {
-        columns.add(true, std::iter::once(head).chain(edges.iter().map(cell)).collect());
+        columns.add(
+            true,
+            std::iter::once(head)
+                .chain(edges.iter().map(cell))
+                .collect(),
+        );
     };
     add("edge of".to_owned(), &EdgeRow::crossed);
-    add(of_axis.short(unit), &|edge| edge.edge.map_or_else(|| "none".to_owned(), number));
+    add(of_axis.short(unit), &|edge| {
+        edge.edge.map_or_else(|| "none".to_owned(), number)
+    });
     add("95 %".to_owned(), &|edge| match edge.edge_interval {
         Some(Interval { low, high }) => format!("{} to {}", number(low), number(high)),
-        None => format!("from {} to {}", number(edge.bracket_low), number(edge.bracket_high)),
+        None => format!(
+            "from {} to {}",
+            number(edge.bracket_low),
+            number(edge.bracket_high)
+        ),
     });
-    add(String::new(), &|edge| edge.rises.map_or("", |rises| if rises { "rises" } else { "falls" }).to_owned());
+    add(String::new(), &|edge| {
+        edge.rises
+            .map_or("", |rises| if rises { "rises" } else { "falls" })
+            .to_owned()
+    });
     add("jobs".to_owned(), &|edge| edge.jobs.to_string());
     add("ended by".to_owned(), &|edge| edge.ended.word().to_owned());
     format!("{columns}\n")
@@ -299,16 +389,32 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
 /// The head of a column and its first cells.
 fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
     let label = values.label();
-    let bound = |set: usize| rows.get(set).filter(|_| values.column.name == "tau_mean")?.tau_bound;
-    let shown = |set: usize| values.numbers[set].or_else(|| bound(set)).unwrap_or_default().abs();
+    let bound = |set: usize| {
+        rows.get(set)
+            .filter(|_| values.column.name == "tau_mean")?
+            .tau_bound
+    };
+    let shown = |set: usize| {
+        values.numbers[set]
+            .or_else(|| bound(set))
+            .unwrap_or_default()
+            .abs()
+    };
     let (factor, unit) = label.scale((0..values.numbers.len()).map(shown).fold(0.0, f64::max));
     let mut cells = vec![label.short(unit)];
     for (set, &number) in values.numbers.iter().enumerate().take(most) {
         cells.push(match (number, values.intervals[set]) {
-            (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
-            (Some(value), Some((low, high))) => with_interval(factor * value, factor * low, factor * high),
+            (Some(value), _) if values.is_worded() => {
+                values.word(value).unwrap_or_default().to_owned()
+            }
+            (Some(value), Some((low, high))) => {
+                with_interval(factor * value, factor * low, factor * high)
+            }
             (Some(value), None) => three_digits(factor * value),
-            (None, _) => bound(set).map_or_else(|| "–".to_owned(), |tau| format!("> {}", three_digits(factor * tau))),
+            (None, _) => bound(set).map_or_else(
+                || "–".to_owned(),
+                |tau| format!("> {}", three_digits(factor * tau)),
+            ),
         });
     }
     cells
@@ -328,38 +434,72 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
     let is_lopsided = crosses || (value - low - half).abs() > LOPSIDED * half;
     // Two digits of an error that begins with 1, and of ends.
     let exponent = libm::floor(libm::log10(half));
-    let digits = if is_lopsided || half / libm::exp10(exponent) < 1.95 { 1.0 } else { 0.0 } - exponent;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 18")]
+    let digits = if is_lopsided || half / libm::exp10(exponent) < 1.95 {
+        1.0
+    } else {
+        0.0
+    } - exponent;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to 18"
+    )]
     let digits = digits.clamp(0.0, 18.0) as usize;
     let rounded = |value: f64| format!("{value:.digits$}");
     // Not -0.00, which is 0 with 0 added.
-    let [value, low, high] = [value, low, high].map(|end| rounded(rounded(end).parse().unwrap_or(end) + 0.0));
-    if is_lopsided { format!("{value} ({low} to {high})") } else { format!("{value} ± {}", rounded(half)) }
+    let [value, low, high] =
+        [value, low, high].map(|end| rounded(rounded(end).parse().unwrap_or(end) + 0.0));
+    if is_lopsided {
+        format!("{value} ({low} to {high})")
+    } else {
+        format!("{value} ± {}", rounded(half))
+    }
 }
 
 /// What the lines do not say: jobs that ended otherwise, each kind with a command that shows one, and sets that the sweep
 /// no longer has.
 fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     let (sweep, mut notes) = (results.sweep(), Vec::new());
-    let without: Vec<&SetRow> = rows.iter().filter(|row| row.jobs_without_slips > 0).collect();
+    let without: Vec<&SetRow> = rows
+        .iter()
+        .filter(|row| row.jobs_without_slips > 0)
+        .collect();
     if !without.is_empty() {
-        let jobs = output::count(without.iter().map(|row| row.jobs_without_slips).sum(), "job");
+        let jobs = output::count(
+            without.iter().map(|row| row.jobs_without_slips).sum(),
+            "job",
+        );
         let sets = output::count(without.len() as u64, "set");
-        let set = without.iter().find_map(|row| sweep.set_with(&row.parameters.parameters));
+        let set = without
+            .iter()
+            .find_map(|row| sweep.set_with(&row.parameters.parameters));
         let job = set.and_then(|set| sweep.jobs_at(set..set + 1).next());
-        let command = job.map_or_else(String::new, |job| format!("; a job of one such set: {}", sweep.command(&job)));
+        let command = job.map_or_else(String::new, |job| {
+            format!("; a job of one such set: {}", sweep.command(&job))
+        });
         notes.push(format!(
             "{jobs} of {sets} ended as no further slip came: they slide, or give_up_after is too short{command}"
         ));
     }
     let recording = sweep.recording();
     let is_cut = |row: &&SetRow| {
-        row.slips < row.finished_jobs.saturating_sub(row.jobs_without_slips).saturating_mul(recording.slips)
+        row.slips
+            < row
+                .finished_jobs
+                .saturating_sub(row.jobs_without_slips)
+                .saturating_mul(recording.slips)
     };
     let cut: Vec<&SetRow> = rows.iter().filter(is_cut).collect();
     if let Some(time) = recording.max_time.filter(|_| !cut.is_empty()) {
-        let (sets, slips) = (output::count(cut.len() as u64, "set"), cut.iter().map(|row| row.slips).sum::<u64>());
-        let wanted = cut.iter().map(|row| row.finished_jobs).sum::<u64>().saturating_mul(recording.slips);
+        let (sets, slips) = (
+            output::count(cut.len() as u64, "set"),
+            cut.iter().map(|row| row.slips).sum::<u64>(),
+        );
+        let wanted = cut
+            .iter()
+            .map(|row| row.finished_jobs)
+            .sum::<u64>()
+            .saturating_mul(recording.slips);
         notes.push(format!(
             "{sets} with jobs that ended at max_time = {time} s: {slips} of {wanted} slips; a longer one, here, runs them again"
         ));
@@ -367,11 +507,20 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
     if failed > 0 {
         let root = output::quoted_path(results.layout().root());
-        notes.push(format!("{} failed: stickslip status {root} says why", output::count(failed, "job")));
+        notes.push(format!(
+            "{} failed: stickslip status {root} says why",
+            output::count(failed, "job")
+        ));
     }
-    let gone = rows.iter().filter(|row| sweep.set_with(&row.parameters.parameters).is_none()).count();
+    let gone = rows
+        .iter()
+        .filter(|row| sweep.set_with(&row.parameters.parameters).is_none())
+        .count();
     if gone > 0 {
-        notes.push(format!("no longer in the sweep: {} of these", output::count(gone as u64, "set")));
+        notes.push(format!(
+            "no longer in the sweep: {} of these",
+            output::count(gone as u64, "set")
+        ));
     }
     notes
 }
@@ -382,18 +531,38 @@ mod tests {
 
     #[test]
     fn values_have_the_digits_that_their_errors_leave() {
-        let shown =
-            [(136.42, 0.83), (136.42, 1.24), (0.9412, 0.0171), (297.3, 21.0), (3.0, 0.0), (-0.02, 0.06), (-3e-4, 2e-3)];
+        let shown = [
+            (136.42, 0.83),
+            (136.42, 1.24),
+            (0.9412, 0.0171),
+            (297.3, 21.0),
+            (3.0, 0.0),
+            (-0.02, 0.06),
+            (-3e-4, 2e-3),
+        ];
         assert_eq!(
             shown.map(|(value, half)| with_interval(value, value - half, value + half)),
-            ["136.4 ± 0.8", "136.4 ± 1.2", "0.941 ± 0.017", "297 ± 21", "3", "-0.02 ± 0.06", "0.000 ± 0.002"]
+            [
+                "136.4 ± 0.8",
+                "136.4 ± 1.2",
+                "0.941 ± 0.017",
+                "297 ± 21",
+                "3",
+                "-0.02 ± 0.06",
+                "0.000 ± 0.002"
+            ]
         );
     }
 
     #[test]
     fn an_interval_that_is_not_symmetric_is_shown_by_its_ends() {
-        let shown =
-            [(4.03, 1.42, 13.78), (0.9, 0.05, 1.9), (136.4, 120.0, 150.0), (0.046, 0.031, 0.112), (-0.5, -1.1, -0.01)];
+        let shown = [
+            (4.03, 1.42, 13.78),
+            (0.9, 0.05, 1.9),
+            (136.4, 120.0, 150.0),
+            (0.046, 0.031, 0.112),
+            (-0.5, -1.1, -0.01),
+        ];
         assert_eq!(
             shown.map(|(value, low, high)| with_interval(value, low, high)),
             [

@@ -47,6 +47,11 @@ fn register_all() -> io::Result<()> {
     #[cfg(unix)]
     register(SIGXFSZ, &FILE_TOO_LARGE)?;
     // Before the flag that stops, so that whoever stops finds it set.
-    CANCELLING.iter().try_for_each(|&signal| register(signal, &CANCELLED).map(drop))?;
-    CANCELLING.iter().chain(WARNING).try_for_each(|&signal| register(signal, &STOP).map(drop))
+    CANCELLING
+        .iter()
+        .try_for_each(|&signal| register(signal, &CANCELLED).map(drop))?;
+    CANCELLING
+        .iter()
+        .chain(WARNING)
+        .try_for_each(|&signal| register(signal, &STOP).map(drop))
 }

@@ -87,7 +87,12 @@ struct TableFlags {
     #[arg(long, value_name = "FILE")]
     slip_table: Option<PathBuf>,
     /// Time between samples of trace, map and plot, in s
-    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 1e-4)]
+    #[arg(
+        long,
+        allow_negative_numbers = true,
+        value_name = "SECONDS",
+        default_value_t = 1e-4
+    )]
     sample: f64,
 }
 
@@ -101,16 +106,34 @@ struct PlotFlags {
     #[arg(long, value_enum, default_value_t = Panel::Both, requires = "files")]
     panel: Panel,
     /// First instant of the plot, in s
-    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0, requires = "files")]
+    #[arg(
+        long,
+        allow_negative_numbers = true,
+        value_name = "SECONDS",
+        default_value_t = 0.0,
+        requires = "files"
+    )]
     from: f64,
     /// Last instant of the plot, in s [default: the end]
-    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", requires = "files")]
+    #[arg(
+        long,
+        allow_negative_numbers = true,
+        value_name = "SECONDS",
+        requires = "files"
+    )]
     until: Option<f64>,
 }
 
 impl Arguments {
     fn request(&self) -> Request {
-        let TableFlags { sample, trace, map, profile, contacts, .. } = &self.tables;
+        let TableFlags {
+            sample,
+            trace,
+            map,
+            profile,
+            contacts,
+            ..
+        } = &self.tables;
         Request {
             sample: *sample,
             trace: trace.is_some() || self.plot.draws(Panel::Force),
@@ -129,7 +152,12 @@ impl PlotFlags {
 }
 
 fn after_help() -> String {
-    let lines = |keys: &[&str]| keys.chunks(17).map(|keys| keys.join(" ")).collect::<Vec<_>>().join("\n");
+    let lines = |keys: &[&str]| {
+        keys.chunks(17)
+            .map(|keys| keys.join(" "))
+            .collect::<Vec<_>>()
+            .join("\n")
+    };
     format!(
         "\
 Examples:
@@ -159,27 +187,66 @@ const FORMAT: u32 = 1;
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let changes = arguments.job.changes()?;
-    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
+    let sweep = sweep::read(
+        arguments.sweep.as_deref(),
+        arguments.preset.preset,
+        &changes,
+    )?;
     let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
     check_outputs(arguments, &sweep, parameters).map_err(UsageError)?;
     output::warn(&sweep.warnings());
     let begin = Instant::now();
     let never = AtomicBool::new(false);
-    let waiting = output::waiting(format!("simulating; about {} predicted", output::duration(job.cost)));
+    let waiting = output::waiting(format!(
+        "simulating; about {} predicted",
+        output::duration(job.cost)
+    ));
     let (result, recorded) = single::simulate(&sweep, parameters, arguments.request(), &never)?;
     drop(waiting);
     let wall = begin.elapsed().as_secs_f64();
 
-    let footer = Footer::default().with_sweep(sweep.name(), sweep.text()).with("parameters", &as_json(parameters));
+    let footer = Footer::default()
+        .with_sweep(sweep.name(), sweep.text())
+        .with("parameters", &as_json(parameters));
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
-    let TableFlags { trace, map, profile, contacts, slip_table, .. } = &arguments.tables;
-    write_table(trace.as_deref(), &footer, &[], recorded.trace.iter().copied())?;
+    let TableFlags {
+        trace,
+        map,
+        profile,
+        contacts,
+        slip_table,
+        ..
+    } = &arguments.tables;
+    write_table(
+        trace.as_deref(),
+        &footer,
+        &[],
+        recorded.trace.iter().copied(),
+    )?;
     write_table(map.as_deref(), &footer, &[], recorded.map.iter().copied())?;
-    write_table(profile.as_deref(), &footer, &[], recorded.profile.iter().copied())?;
-    write_table(contacts.as_deref(), &footer, &[], recorded.contacts.iter().map(ContactRow::from))?;
-    let slips = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
-    write_table(slip_table.as_deref(), &footer, &sweep.recording().left_out(), slips)?;
+    write_table(
+        profile.as_deref(),
+        &footer,
+        &[],
+        recorded.profile.iter().copied(),
+    )?;
+    write_table(
+        contacts.as_deref(),
+        &footer,
+        &[],
+        recorded.contacts.iter().map(ContactRow::from),
+    )?;
+    let slips = result
+        .slips
+        .iter()
+        .map(|slip| -> SlipRow<'_> { (&label, slip) });
+    write_table(
+        slip_table.as_deref(),
+        &footer,
+        &sweep.recording().left_out(),
+        slips,
+    )?;
     write_pictures(arguments, parameters, &recorded, &result.slips)?;
     report(arguments.json, &label.0.job_id, &result, wall)?;
     Ok(Exit::Done)
@@ -195,24 +262,41 @@ impl JobFlags {
             ("method", &self.solver),
             ("tolerance", &self.tolerance),
             ("resolve", &self.resolve),
-            ("dt", &self.dt.clone().or_else(|| is_fixed.then(|| "1e-6".to_owned()))),
+            (
+                "dt",
+                &self
+                    .dt
+                    .clone()
+                    .or_else(|| is_fixed.then(|| "1e-6".to_owned())),
+            ),
         ];
-        let flags = flags.into_iter().filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
-        changes(&Variation { settings: self.settings.iter().cloned().chain(flags).collect(), axes: Vec::new() })
+        let flags = flags
+            .into_iter()
+            .filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
+        changes(&Variation {
+            settings: self.settings.iter().cloned().chain(flags).collect(),
+            axes: Vec::new(),
+        })
     }
 }
 
 /// The parameters as JSON, under their keys.
 fn as_json(parameters: &Parameters) -> String {
-    let entries = Symbol::ALL.into_iter().map(|symbol| (symbol.key().to_owned(), json!(parameters.get(symbol))));
+    let entries = Symbol::ALL
+        .into_iter()
+        .map(|symbol| (symbol.key().to_owned(), json!(parameters.get(symbol))));
     serde_json::Value::Object(entries.collect()).to_string()
 }
 
 fn report(in_json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Result<()> {
     let (slips, summary, averages) = (&measured.slips, &measured.summary, measured.averages);
     let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
-    let mean = (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
-    let (outcome, regime) = (JobOutcome::of(measured).word(), measured.regime().map(Regime::word));
+    let mean =
+        (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
+    let (outcome, regime) = (
+        JobOutcome::of(measured).word(),
+        measured.regime().map(Regime::word),
+    );
     let friction = averages.map(|averages| averages.friction);
     let slip_share = averages.map(|averages| averages.slip_share);
     if in_json {
@@ -237,24 +321,38 @@ fn report(in_json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Re
     }
     let mut columns = Columns::default();
     let mut add = |head: &str, cell: &dyn Fn(&Slip) -> String| {
-        columns.add(false, std::iter::once(head.to_owned()).chain(slips.iter().map(cell)).collect());
+        columns.add(
+            false,
+            std::iter::once(head.to_owned())
+                .chain(slips.iter().map(cell))
+                .collect(),
+        );
     };
     add("slip", &|slip| slip.number.to_string());
     add("onset (s)", &|slip| format!("{:.6}", slip.onset));
-    add("interval (s)", &|slip| slip.interval.map_or_else(|| "-".to_owned(), |interval| format!("{interval:.6}")));
-    add("phase (rad)", &|slip| slip.phase.map_or_else(|| "-".to_owned(), |phase| format!("{phase:.4}")));
+    add("interval (s)", &|slip| {
+        slip.interval
+            .map_or_else(|| "-".to_owned(), |interval| format!("{interval:.6}"))
+    });
+    add("phase (rad)", &|slip| {
+        slip.phase
+            .map_or_else(|| "-".to_owned(), |phase| format!("{phase:.4}"))
+    });
     add("peak (N)", &|slip| format!("{:.2}", slip.peak_force));
     add("drop (N)", &|slip| format!("{:.2}", slip.drop));
     add("precursors", &|slip| slip.precursors.to_string());
     if !slips.is_empty() {
         output::print(&columns.to_string())?;
     }
-    let or_none =
-        |value: Option<f64>, unit: &str| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"));
+    let or_none = |value: Option<f64>, unit: &str| {
+        value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"))
+    };
     let regime = match regime.zip(slip_share) {
         None => "none".to_owned(),
         Some((regime, _)) if slips.is_empty() => regime.to_owned(),
-        Some((regime, share)) => format!("{regime}, {:.3} % of the time within slips", 100.0 * share),
+        Some((regime, share)) => {
+            format!("{regime}, {:.3} % of the time within slips", 100.0 * share)
+        }
     };
     output::pairs(&[
         ("job", job_id.to_owned()),
@@ -264,8 +362,17 @@ fn report(in_json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Re
         ("regime", regime),
         ("mean interval", or_none(mean, "s")),
         ("mean friction", or_none(friction, "N")),
-        ("contacts", format!("{} breaks, {} reattachments", summary.breaks, summary.reattachments)),
-        ("steps", format!("{}, of which {} leaps", summary.steps, summary.leaps)),
+        (
+            "contacts",
+            format!(
+                "{} breaks, {} reattachments",
+                summary.breaks, summary.reattachments
+            ),
+        ),
+        (
+            "steps",
+            format!("{}, of which {} leaps", summary.steps, summary.leaps),
+        ),
         ("wall time", output::duration(wall)),
     ])
 }

@@ -43,10 +43,18 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
         let left = match (overview.jobs_missing, status.time_left) {
             (0, _) => "nothing left to run".to_owned(),
             (_, Some(seconds)) => format!("{} at the pace so far", output::duration(seconds)),
-            (_, None) => format!("{} of CPU time predicted", output::duration(overview.predicted_cost_missing)),
+            (_, None) => format!(
+                "{} of CPU time predicted",
+                output::duration(overview.predicted_cost_missing)
+            ),
         };
-        let goes_on = status.rounds.as_ref().is_some_and(|rounds| !rounds.is_over) && overview.jobs_missing > 0;
-        let left = if goes_on { format!("{left}, of this round") } else { left };
+        let goes_on = status.rounds.as_ref().is_some_and(|rounds| !rounds.is_over)
+            && overview.jobs_missing > 0;
+        let left = if goes_on {
+            format!("{left}, of this round")
+        } else {
+            left
+        };
         let kept = match overview.jobs_kept {
             0 => String::new(),
             kept => format!(", {kept} of them kept of values that the sweep no longer has"),
@@ -56,29 +64,58 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             ("jobs done", format!("{}{kept}", overview.jobs_done)),
             ("jobs failed", overview.jobs_failed.to_string()),
             ("jobs missing", overview.jobs_missing.to_string()),
-            ("parts", format!("{} done, {} missing", overview.parts_done, overview.parts_missing)),
+            (
+                "parts",
+                format!(
+                    "{} done, {} missing",
+                    overview.parts_done, overview.parts_missing
+                ),
+            ),
             ("time left", left),
         ];
-        pairs.extend(status.rounds.as_ref().map(|rounds| ("round", output::rounds(rounds))));
+        pairs.extend(
+            status
+                .rounds
+                .as_ref()
+                .map(|rounds| ("round", output::rounds(rounds))),
+        );
         output::pairs(&pairs)?;
         for Present { worker, last_beat } in &status.workers {
-            let Worker { host, process, threads, jobs_per_second, .. } = worker;
+            let Worker {
+                host,
+                process,
+                threads,
+                jobs_per_second,
+                ..
+            } = worker;
             output::print(&format!(
                 "worker  process {process} on {}: {}, {jobs_per_second:.2} jobs/s, last beat {last_beat:.0} s ago\n",
                 shown_text(host),
                 output::count(*threads as u64, "thread")
             ))?;
         }
-        for Failure { job_id, reason, command } in &status.failures {
-            output::print(&format!("failed  {job_id}: {}\n  alone: {command}\n", shown_text(reason)))?;
+        for Failure {
+            job_id,
+            reason,
+            command,
+        } in &status.failures
+        {
+            output::print(&format!(
+                "failed  {job_id}: {}\n  alone: {command}\n",
+                shown_text(reason)
+            ))?;
         }
         if overview.jobs_failed > status.failures.len() as u64 {
             output::print("failed  and more: see outcome and reason in tables/jobs\n")?;
         }
     }
     Ok(match overview {
-        Overview { jobs_missing: 1.., .. } if arguments.check => Exit::Stopped,
-        Overview { jobs_failed: 1.., .. } => Exit::Failed,
+        Overview {
+            jobs_missing: 1.., ..
+        } if arguments.check => Exit::Stopped,
+        Overview {
+            jobs_failed: 1.., ..
+        } => Exit::Failed,
         _ => Exit::Done,
     })
 }

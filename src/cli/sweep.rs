@@ -34,9 +34,18 @@ const PRESETS: [Preset; 30] = presets! {
 impl Preset {
     /// What the first line of the file says, without a sentence that goes on in the next line.
     fn about(self) -> &'static str {
-        let line = self.text.lines().next().unwrap_or_default().trim_start_matches(['#', ' ']);
-        let whole =
-            if line.ends_with('.') { line } else { line.rsplit_once([':', '.', ',']).map_or(line, |(whole, _)| whole) };
+        let line = self
+            .text
+            .lines()
+            .next()
+            .unwrap_or_default()
+            .trim_start_matches(['#', ' ']);
+        let whole = if line.ends_with('.') {
+            line
+        } else {
+            line.rsplit_once([':', '.', ','])
+                .map_or(line, |(whole, _)| whole)
+        };
         whole.trim_end_matches(['.', ',', ':'])
     }
 
@@ -59,7 +68,12 @@ impl ValueEnum for Preset {
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PresetFlag {
     /// Take a sweep of the paper, or beyond it, in place of a file; `stickslip init --help` lists them
-    #[arg(long, value_name = "NAME", conflicts_with = "sweep", hide_possible_values = true)]
+    #[arg(
+        long,
+        value_name = "NAME",
+        conflicts_with = "sweep",
+        hide_possible_values = true
+    )]
     pub preset: Option<Preset>,
 }
 
@@ -74,25 +88,36 @@ pub struct Variation {
     pub axes: Vec<String>,
 }
 
-const IN_THE_FILE: &str = "; flags change no zip or sample: edit the file (`stickslip init` writes that of a preset)";
+const IN_THE_FILE: &str =
+    "; flags change no zip or sample: edit the file (`stickslip init` writes that of a preset)";
 
 /// What `--set` and `--axis` change.
 pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, UsageError> {
     let mut changes: Vec<Change> = Vec::new();
     let settings = settings.iter().map(|text| ("--set", "VALUE", "1e-5", text));
-    for (flag, form, example, text) in settings.chain(axes.iter().map(|text| ("--axis", "VALUES", "1e-5,1e-4", text))) {
-        let no_change = || UsageError(format!("{flag} {text}: must be KEY={form}, such as {flag} V0={example}"));
+    for (flag, form, example, text) in settings.chain(
+        axes.iter()
+            .map(|text| ("--axis", "VALUES", "1e-5,1e-4", text)),
+    ) {
+        let no_change = || {
+            UsageError(format!(
+                "{flag} {text}: must be KEY={form}, such as {flag} V0={example}"
+            ))
+        };
         let (key, value) = text.split_once('=').ok_or_else(no_change)?;
         let (key, value) = (key.trim(), value.trim());
         if changes.iter().any(|earlier| earlier.key == key) {
-            return Err(UsageError(format!("{flag} {text}: {key} is set before; keep one")));
+            return Err(UsageError(format!(
+                "{flag} {text}: {key} is set before; keep one"
+            )));
         }
         if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             return Err(no_change());
         }
         changes.push(match flag {
             "--set" => Change::setting(key, value),
-            _ => Change::axis(key, value).map_err(|form| UsageError(format!("{flag} {text}: must be {key}={form}")))?,
+            _ => Change::axis(key, value)
+                .map_err(|form| UsageError(format!("{flag} {text}: must be {key}={form}")))?,
         });
     }
     Ok(changes)
@@ -102,7 +127,9 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
 pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> Result<Sweep> {
     let sweep = match (file, preset) {
         // A results directory, of which it is that asked for last.
-        (Some(folder), _) if folder.is_dir() => Ok(Results::read(&Layout::new(&Disk, folder))?.sweep().clone()),
+        (Some(folder), _) if folder.is_dir() => {
+            Ok(Results::read(&Layout::new(&Disk, folder))?.sweep().clone())
+        }
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
         (None, None) => return of_flags(&single::sweep_text(changes)),
@@ -112,7 +139,11 @@ pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> 
 
 /// A sweep as varied.
 pub fn vary(sweep: Sweep, changes: &[Change]) -> Result<Sweep> {
-    if changes.is_empty() { Ok(sweep) } else { of_flags(&varied(sweep.text(), changes)) }
+    if changes.is_empty() {
+        Ok(sweep)
+    } else {
+        of_flags(&varied(sweep.text(), changes))
+    }
 }
 
 /// Reads a text that flags were made into; mistakes are those of the flags.
@@ -120,7 +151,11 @@ fn of_flags(text: &str) -> Result<Sweep> {
     Sweep::parse(text, Path::new("flags")).map_err(|error| match error {
         SweepError::Invalid { mistakes, .. } => {
             let problem = single::mistakes_in("flags", &mistakes);
-            let hint = if problem.contains("[axes.") { IN_THE_FILE } else { "" };
+            let hint = if problem.contains("[axes.") {
+                IN_THE_FILE
+            } else {
+                ""
+            };
             UsageError(problem + hint).into()
         }
         unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
@@ -135,15 +170,34 @@ mod tests {
     #[test]
     fn the_presets_are_the_files_of_the_folder_sweeps() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sweeps");
-        let files = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap());
-        let presets: BTreeSet<_> = PRESETS.iter().map(|preset| format!("{}.toml", preset.name)).collect();
+        let files = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|file| file.unwrap().file_name().into_string().unwrap());
+        let presets: BTreeSet<_> = PRESETS
+            .iter()
+            .map(|preset| format!("{}.toml", preset.name))
+            .collect();
         assert_eq!(presets, files.collect());
         for preset in PRESETS {
             assert_eq!(preset.sweep().unwrap().name(), preset.name);
-            assert!((10..130).contains(&preset.about().len()), "{}: {}", preset.name, preset.about());
+            assert!(
+                (10..130).contains(&preset.about().len()),
+                "{}: {}",
+                preset.name,
+                preset.about()
+            );
         }
-        let about = |name: &str| PRESETS.iter().find(|preset| preset.name == name).unwrap().about();
+        let about = |name: &str| {
+            PRESETS
+                .iter()
+                .find(|preset| preset.name == name)
+                .unwrap()
+                .about()
+        };
         assert_eq!(about("size"), "Locking against the number of blocks N");
-        assert!(about("friction-drives").ends_with("eight frequencies"), "the next line says how far");
+        assert!(
+            about("friction-drives").ends_with("eight frequencies"),
+            "the next line says how far"
+        );
     }
 }

@@ -10,10 +10,18 @@ const DAY: u64 = 24 * HOUR;
 /// `D-HH:MM:SS`. A number alone is refused, since Slurm means minutes and people mean seconds.
 pub fn parse(text: &str) -> Result<Duration, String> {
     if by_units(&format!("{text}s")).is_some() {
-        return Err(format!("{text} has no unit at its end; write {text}m for minutes or {text}s for seconds"));
+        return Err(format!(
+            "{text} has no unit at its end; write {text}m for minutes or {text}s for seconds"
+        ));
     }
-    let seconds = if text.contains([':', '-']) { by_clock(text) } else { by_units(text) };
-    let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()).filter(|time| !time.is_zero());
+    let seconds = if text.contains([':', '-']) {
+        by_clock(text)
+    } else {
+        by_units(text)
+    };
+    let time = seconds
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
+        .filter(|time| !time.is_zero());
     time.ok_or_else(|| {
         "must be a time with units d, h, m, s, such as 55m or 1h30m, or as for Slurm, such as 1:30:00 or 2-12"
             .to_owned()
@@ -24,7 +32,10 @@ fn by_units(text: &str) -> Option<f64> {
     let (mut seconds, mut rest) = (0.0, text);
     while !rest.is_empty() {
         let (number, tail) = rest.split_at(rest.find(|c: char| !(c.is_ascii_digit() || c == '.'))?);
-        let (unit, after) = tail.split_at(tail.find(|c: char| c.is_ascii_digit()).unwrap_or(tail.len()));
+        let (unit, after) = tail.split_at(
+            tail.find(|c: char| c.is_ascii_digit())
+                .unwrap_or(tail.len()),
+        );
         let unit = match unit {
             "d" => DAY,
             "h" => HOUR,
@@ -39,7 +50,9 @@ fn by_units(text: &str) -> Option<f64> {
 }
 
 fn by_clock(text: &str) -> Option<f64> {
-    let (days, clock) = text.split_once('-').map_or((None, text), |(days, clock)| (Some(days), clock));
+    let (days, clock) = text
+        .split_once('-')
+        .map_or((None, text), |(days, clock)| (Some(days), clock));
     // With days the first number after them is hours; without, the last is seconds.
     let fields: Vec<&str> = clock.split(':').collect();
     let units: &[u64] = match (days, fields.len()) {
@@ -47,16 +60,33 @@ fn by_clock(text: &str) -> Option<f64> {
         (None, 2) => &[MINUTE, 1],
         _ => return None,
     };
-    let fields = fields.into_iter().zip(units).chain(days.map(|days| (days, &DAY)));
-    fields.map(|(number, unit)| number.parse::<u32>().ok().map(|number| f64::from(number) * *unit as f64)).sum()
+    let fields = fields
+        .into_iter()
+        .zip(units)
+        .chain(days.map(|days| (days, &DAY)));
+    fields
+        .map(|(number, unit)| {
+            number
+                .parse::<u32>()
+                .ok()
+                .map(|number| f64::from(number) * *unit as f64)
+        })
+        .sum()
 }
 
 /// A time with units, in whole seconds.
 pub fn with_units(time: Duration) -> String {
     let seconds = time.as_secs();
-    let parts = [(seconds / HOUR, "h"), (seconds % HOUR / MINUTE, "m"), (seconds % MINUTE, "s")];
+    let parts = [
+        (seconds / HOUR, "h"),
+        (seconds % HOUR / MINUTE, "m"),
+        (seconds % MINUTE, "s"),
+    ];
     let parts = parts.into_iter().filter(|(number, _)| *number > 0);
-    parts.map(|(number, unit)| format!("{number}{unit}")).collect::<Vec<_>>().concat()
+    parts
+        .map(|(number, unit)| format!("{number}{unit}"))
+        .collect::<Vec<_>>()
+        .concat()
 }
 
 #[cfg(test)]
@@ -90,15 +120,22 @@ mod tests {
     fn a_number_alone_is_refused_with_both_meanings() {
         for text in ["55", "1.5", "1h30"] {
             let error = parse(text).unwrap_err();
-            assert!(error.contains(&format!("{text}m for minutes or {text}s for seconds")), "{error}");
+            assert!(
+                error.contains(&format!("{text}m for minutes or {text}s for seconds")),
+                "{error}"
+            );
         }
     }
 
     #[test]
     fn what_is_no_time_is_refused() {
-        let units = ["", "m", "0s", "-1", "nan", "nans", "inf", "infd", "1e300d", "5 m", "3w", "1m\u{e9}"];
-        let clocks =
-            ["-1h", "2h-1h", ":", "1:", ":30", "0:00", "1:2:3:4", "1-2-3", "1-", "-12", "1:-2", "1.5:00", "1 :2"];
+        let units = [
+            "", "m", "0s", "-1", "nan", "nans", "inf", "infd", "1e300d", "5 m", "3w", "1m\u{e9}",
+        ];
+        let clocks = [
+            "-1h", "2h-1h", ":", "1:", ":30", "0:00", "1:2:3:4", "1-2-3", "1-", "-12", "1:-2",
+            "1.5:00", "1 :2",
+        ];
         for text in units.into_iter().chain(clocks) {
             assert!(parse(text).unwrap_err().contains("such as 55m"), "{text}");
         }

@@ -54,19 +54,35 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
         // Says what it is instead.
         Results::read_plan(layout)?;
     }
-    let verification = if arguments.repair { Results::repair(layout)? } else { Results::verify(layout)? };
+    let verification = if arguments.repair {
+        Results::repair(layout)?
+    } else {
+        Results::verify(layout)?
+    };
     let repaired = arguments.repair && verification.wants_repair();
     let commands = commands(layout, &verification, !arguments.repair);
     if arguments.json {
-        output::json(FORMAT, &Report { verification: &verification, repaired, commands })?;
+        output::json(
+            FORMAT,
+            &Report {
+                verification: &verification,
+                repaired,
+                commands,
+            },
+        )?;
     } else {
         print_summary(&verification, &commands, repaired)?;
     }
-    Ok(match (verification.whole || arguments.repair, verification.missing.is_empty()) {
-        (false, _) => Exit::Damaged,
-        (true, false) => Exit::Stopped,
-        (true, true) => Exit::Done,
-    })
+    Ok(
+        match (
+            verification.whole || arguments.repair,
+            verification.missing.is_empty(),
+        ) {
+            (false, _) => Exit::Damaged,
+            (true, false) => Exit::Stopped,
+            (true, true) => Exit::Done,
+        },
+    )
 }
 
 fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool) -> Vec<String> {
@@ -84,32 +100,51 @@ fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool)
 
 fn print_summary(verification: &Verification, commands: &[String], repaired: bool) -> Result<()> {
     for problem in &verification.problems {
-        output::print(&format!("{}: {}{}\n", shown(&problem.path), shown_text(&problem.problem), jobs_of(problem)))?;
+        output::print(&format!(
+            "{}: {}{}\n",
+            shown(&problem.path),
+            shown_text(&problem.problem),
+            jobs_of(problem)
+        ))?;
     }
     let megabytes = verification.bytes as f64 / 1e6;
     let missing = match verification.missing.len() as u64 {
         0 => "nothing".to_owned(),
         parts => {
-            let (jobs, names) = (output::count(verification.jobs_missing, "job"), first_of(&verification.missing));
+            let (jobs, names) = (
+                output::count(verification.jobs_missing, "job"),
+                first_of(&verification.missing),
+            );
             format!("{}, {jobs}: {names}", output::count(parts, "part"))
         }
     };
     let damaged = match verification.problems.len() as u64 {
         0 => "nothing".to_owned(),
-        problems => output::count(problems, "problem") + if repaired { ", taken care of" } else { "" },
+        problems => {
+            output::count(problems, "problem") + if repaired { ", taken care of" } else { "" }
+        }
     };
     output::pairs(&[
         (
             "whole",
-            format!("{} with {}", output::count(verification.parts, "part"), output::count(verification.jobs, "job")),
+            format!(
+                "{} with {}",
+                output::count(verification.parts, "part"),
+                output::count(verification.jobs, "job")
+            ),
         ),
-        ("files", format!("{}, {megabytes:.1} MB", verification.files)),
+        (
+            "files",
+            format!("{}, {megabytes:.1} MB", verification.files),
+        ),
         ("not there", missing),
         ("damaged", damaged),
     ])?;
     if !commands.is_empty() {
         output::print("to go on:\n")?;
-        commands.iter().try_for_each(|command| output::print(&format!("  {command}\n")))?;
+        commands
+            .iter()
+            .try_for_each(|command| output::print(&format!("  {command}\n")))?;
     }
     Ok(())
 }
@@ -117,7 +152,11 @@ fn print_summary(verification: &Verification, commands: &[String], repaired: boo
 fn jobs_of(Problem { jobs, .. }: &Problem) -> String {
     match jobs.len() as u64 {
         0 => String::new(),
-        count => format!("; concerns {}: {}", output::count(count, "job"), first_of(jobs)),
+        count => format!(
+            "; concerns {}: {}",
+            output::count(count, "job"),
+            first_of(jobs)
+        ),
     }
 }
 

@@ -30,7 +30,11 @@ const MAX_TICKS: f64 = 6.0;
 const FEWEST: usize = 3;
 /// Mantissas with a number on logarithmic axes: over several decades, over few, and over so short a range that those give
 /// one or two numbers.
-const MANTISSAS: [&[f64]; 3] = [&[1.0], &[1.0, 2.0, 5.0], &[1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0]];
+const MANTISSAS: [&[f64]; 3] = [
+    &[1.0],
+    &[1.0, 2.0, 5.0],
+    &[1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0],
+];
 /// Numbers of values within these limits are written out, if they need no more decimals than this; others are multiples of a
 /// power of ten that stands in the label.
 const WRITTEN_OUT: std::ops::Range<f64> = 1e-2..1e6;
@@ -55,40 +59,78 @@ impl Axis {
     fn linear_with(label: &str, low: f64, high: f64, max_ticks: f64) -> Self {
         let high = above(low, high);
         let largest = low.abs().max(high.abs());
-        let is_small = largest < WRITTEN_OUT.start && decimals(nice_step((high - low) / max_ticks)) > MAX_DECIMALS;
+        let is_small = largest < WRITTEN_OUT.start
+            && decimals(nice_step((high - low) / max_ticks)) > MAX_DECIMALS;
         // Thousandths, millionths, thousands, ...: those that units have prefixes for.
         let is_scaled = is_small || (WRITTEN_OUT.end..LARGEST).contains(&largest);
-        let power = if is_scaled { 3 * exponent(largest).div_euclid(3) } else { 0 };
-        let axis =
-            Self { power: Some(power), ..Self::fixed(&with_power(label, power), (low, high), Vec::new(), Vec::new()) };
+        let power = if is_scaled {
+            3 * exponent(largest).div_euclid(3)
+        } else {
+            0
+        };
+        let axis = Self {
+            power: Some(power),
+            ..Self::fixed(
+                &with_power(label, power),
+                (low, high),
+                Vec::new(),
+                Vec::new(),
+            )
+        };
         axis.with_steps(nice_step((high - low) / max_ticks), power)
     }
 
     fn with_steps(self, step: f64, power: i32) -> Self {
         let unit = libm::exp10(f64::from(power));
         let decimals = decimals(step / unit);
-        let ticks = multiples(step, self.low, self.high).map(|tick| (tick, number(tick / unit, decimals))).collect();
+        let ticks = multiples(step, self.low, self.high)
+            .map(|tick| (tick, number(tick / unit, decimals)))
+            .collect();
         // A step of 2 is halved, others are cut in five.
-        let parts = if (step / libm::exp10(f64::from(exponent(step)))).round() == 2.0 { 2.0 } else { 5.0 };
+        let parts = if (step / libm::exp10(f64::from(exponent(step)))).round() == 2.0 {
+            2.0
+        } else {
+            5.0
+        };
         let minor = multiples(step / parts, self.low, self.high).collect();
-        Self { ticks, minor, ..self }
+        Self {
+            ticks,
+            minor,
+            ..self
+        }
     }
 
     /// The same axis without ticks between its numbers if they would stand close on this length.
     pub(super) fn without_dense_ticks(self, length: f64) -> Self {
         const CLOSE: f64 = 5.0;
         let is_dense = self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length;
-        if is_dense { Self { minor: Vec::new(), ..self } } else { self }
+        if is_dense {
+            Self {
+                minor: Vec::new(),
+                ..self
+            }
+        } else {
+            self
+        }
     }
 
     /// The same axis with a number at each of these values and no other tick.
     pub(super) fn with_ticks_at(self, label: &str, values: impl Iterator<Item = f64>) -> Self {
         let ticks = values.map(|value| (value, typeset(value))).collect();
-        Self { label: label.to_owned(), power: None, ticks, minor: Vec::new(), ..self }
+        Self {
+            label: label.to_owned(),
+            power: None,
+            ticks,
+            minor: Vec::new(),
+            ..self
+        }
     }
 
     pub(super) fn with_short_label(self, short_label: Option<String>) -> Self {
-        Self { short_label, ..self }
+        Self {
+            short_label,
+            ..self
+        }
     }
 
     /// The same axis with three numbers or more, where one or two would not show its scale.
@@ -98,50 +140,82 @@ impl Axis {
         }
         let has_enough = |axis: &Self| axis.ticks.len() >= FEWEST;
         let finer = match (self.scale, self.power) {
-            (Scale::Logarithmic, _) => {
-                MANTISSAS.into_iter().map(|mantissas| self.clone().with_mantissas(mantissas)).find(has_enough)
-            }
+            (Scale::Logarithmic, _) => MANTISSAS
+                .into_iter()
+                .map(|mantissas| self.clone().with_mantissas(mantissas))
+                .find(has_enough),
             (Scale::Linear, Some(power)) => {
                 let step = nice_step((self.high - self.low) / FEWEST as f64);
                 let steps = [1.0, 0.5, 0.4, 0.2, 0.1].map(|share| nice_step(share * step));
-                steps.into_iter().map(|step| self.clone().with_steps(step, power)).find(has_enough)
+                steps
+                    .into_iter()
+                    .map(|step| self.clone().with_steps(step, power))
+                    .find(has_enough)
             }
             (Scale::Linear, None) => None,
         };
         let is_bare = self.minor.is_empty();
         let axis = finer.unwrap_or(self);
-        if is_bare { Self { minor: Vec::new(), ..axis } } else { axis }
+        if is_bare {
+            Self {
+                minor: Vec::new(),
+                ..axis
+            }
+        } else {
+            axis
+        }
     }
 
     /// For data: logarithmic where these lie decades apart, and a little wider than they are; `None` without any.
     pub(super) fn of_data(label: &str, values: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let ends = bounds(values.clone())?;
-        let ends = if is_wide(ends) { logarithmic_bounds(values)? } else { widened(ends) };
+        let ends = if is_wide(ends) {
+            logarithmic_bounds(values)?
+        } else {
+            widened(ends)
+        };
         Some(Self::spanning(label, ends))
     }
 
     /// From `low` to `high`: logarithmic if these lie decades apart.
     pub(super) fn spanning(label: &str, (low, high): (f64, f64)) -> Self {
-        if is_wide((low, high)) { Self::logarithmic(label, low, high) } else { Self::linear(label, low, high) }
+        if is_wide((low, high)) {
+            Self::logarithmic(label, low, high)
+        } else {
+            Self::linear(label, low, high)
+        }
     }
 
     /// Logarithmic from `low` to `high`, both > 0.
     pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
         let [low, high] = [low, high].map(|end| end.clamp(1.0 / LARGEST, LARGEST));
-        let axis = Self { scale: Scale::Logarithmic, ..Self::fixed(label, (low, high), Vec::new(), Vec::new()) };
+        let axis = Self {
+            scale: Scale::Logarithmic,
+            ..Self::fixed(label, (low, high), Vec::new(), Vec::new())
+        };
         axis.with_mantissas(MANTISSAS[usize::from(libm::log10(high / low) < 2.0)])
     }
 
     fn with_mantissas(self, mantissas: &[f64]) -> Self {
         let Self { low, high, .. } = self;
         // Every decade up to 7 of them, then every second, third, ...
-        #[expect(clippy::cast_possible_truncation, reason = "at most some hundred decades")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "at most some hundred decades"
+        )]
         let every = ((libm::log10(high / low) / 7.0).ceil() as i32).max(1);
-        let number = if low >= 9e-4 && high <= 1.1e4 { plain_power } else { power_of_ten };
+        let number = if low >= 9e-4 && high <= 1.1e4 {
+            plain_power
+        } else {
+            power_of_ten
+        };
         let (mut ticks, mut minor) = (Vec::new(), Vec::new());
         for power in exponent(low)..=exponent(high) {
             let decade = libm::exp10(f64::from(power));
-            let between = mantissas.iter().copied().filter(|mantissa| mantissa.fract() != 0.0);
+            let between = mantissas
+                .iter()
+                .copied()
+                .filter(|mantissa| mantissa.fract() != 0.0);
             let mut all: Vec<f64> = (1..10).map(f64::from).chain(between).collect();
             all.sort_by(f64::total_cmp);
             for mantissa in all {
@@ -156,26 +230,49 @@ impl Axis {
                 }
             }
         }
-        Self { ticks, minor, ..self }
+        Self {
+            ticks,
+            minor,
+            ..self
+        }
     }
 
     /// Angles in rad between multiples of π/2.
     pub(super) fn angle(label: &str, low: f64, high: f64) -> Self {
-        let ticks = multiples(FRAC_PI_2, low, high).map(|tick| (tick, halves_of_pi(tick))).collect();
+        let ticks = multiples(FRAC_PI_2, low, high)
+            .map(|tick| (tick, halves_of_pi(tick)))
+            .collect();
         let minor = multiples(FRAC_PI_2 / 3.0, low, high).collect();
         Self::fixed(label, (low, high), ticks, minor)
     }
 
     /// Words at 0, 1, 2, ...
     pub(super) fn categories(label: &str, words: &[&str]) -> Self {
-        let ticks = (0..).map(f64::from).zip(words.iter().map(|word| (*word).to_owned())).collect();
+        let ticks = (0..)
+            .map(f64::from)
+            .zip(words.iter().map(|word| (*word).to_owned()))
+            .collect();
         let high = words.len() as f64 - 0.5;
         Self::fixed(label, (-0.5, high), ticks, Vec::new())
     }
 
-    fn fixed(label: &str, (low, high): (f64, f64), ticks: Vec<(f64, String)>, minor: Vec<f64>) -> Self {
+    fn fixed(
+        label: &str,
+        (low, high): (f64, f64),
+        ticks: Vec<(f64, String)>,
+        minor: Vec<f64>,
+    ) -> Self {
         let label = label.to_owned();
-        Self { label, short_label: None, low, high, scale: Scale::Linear, power: None, ticks, minor }
+        Self {
+            label,
+            short_label: None,
+            low,
+            high,
+            scale: Scale::Linear,
+            power: None,
+            ticks,
+            minor,
+        }
     }
 
     /// Its label where there is little room.
@@ -246,7 +343,11 @@ pub(super) fn logarithmic_bounds(values: impl Iterator<Item = f64>) -> Option<(f
 /// A range with a margin on both sides, also where it is a single value.
 pub(super) fn widened((low, high): (f64, f64)) -> (f64, f64) {
     const MARGIN: f64 = 0.05;
-    let margin = if high > low { MARGIN * (high - low) } else { 0.5 * if low == 0.0 { 1.0 } else { low.abs() } };
+    let margin = if high > low {
+        MARGIN * (high - low)
+    } else {
+        0.5 * if low == 0.0 { 1.0 } else { low.abs() }
+    };
     (low - margin, high + margin)
 }
 
@@ -254,23 +355,35 @@ pub(super) fn widened((low, high): (f64, f64)) -> (f64, f64) {
 pub(super) fn angle_bounds(angles: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = bounds(angles).unwrap_or((-PI, PI));
     let low = (low / FRAC_PI_2).floor() * FRAC_PI_2;
-    (low, ((high / FRAC_PI_2).ceil() * FRAC_PI_2).max(low + FRAC_PI_2))
+    (
+        low,
+        ((high / FRAC_PI_2).ceil() * FRAC_PI_2).max(low + FRAC_PI_2),
+    )
 }
 
 /// Least and largest of the values that can be.
 pub(super) fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    values.filter(|value| value.abs() < LARGEST).fold(None, |bounds, value| {
-        let (low, high) = bounds.unwrap_or((value, value));
-        Some((value.min(low), value.max(high)))
-    })
+    values
+        .filter(|value| value.abs() < LARGEST)
+        .fold(None, |bounds, value| {
+            let (low, high) = bounds.unwrap_or((value, value));
+            Some((value.min(low), value.max(high)))
+        })
 }
 
 /// The upper end of an axis, also where the data are a single value.
 fn above(low: f64, high: f64) -> f64 {
-    if high > low { high } else { low + low.abs().max(1.0) }
+    if high > low {
+        high
+    } else {
+        low + low.abs().max(1.0)
+    }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the decimal exponent of a double")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the decimal exponent of a double"
+)]
 fn exponent(value: f64) -> i32 {
     // The logarithm of a power of ten may round to just below a whole number.
     (libm::log10(value) + 1e-9).floor() as i32
@@ -279,15 +392,23 @@ fn exponent(value: f64) -> i32 {
 /// The least of 1, 2, 5 times a power of ten that is not below `step`.
 fn nice_step(step: f64) -> f64 {
     let decade = libm::exp10(f64::from(exponent(step)));
-    let nice = [1.0, 2.0, 5.0].into_iter().find(|mantissa| mantissa * decade >= step * (1.0 - 1e-9)).unwrap_or(10.0);
+    let nice = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|mantissa| mantissa * decade >= step * (1.0 - 1e-9))
+        .unwrap_or(10.0);
     nice * decade
 }
 
 fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = f64> {
     let slack = 1e-6;
     #[expect(clippy::cast_possible_truncation, reason = "a few dozen multiples")]
-    let (first, last) = ((low / step - slack).ceil() as i64, (high / step + slack).floor() as i64);
-    (first..=last).take(MAX_MULTIPLES).map(move |multiple| multiple as f64 * step)
+    let (first, last) = (
+        (low / step - slack).ceil() as i64,
+        (high / step + slack).floor() as i64,
+    );
+    (first..=last)
+        .take(MAX_MULTIPLES)
+        .map(move |multiple| multiple as f64 * step)
 }
 
 /// Decimals that the multiples of a step need.
@@ -311,19 +432,30 @@ fn with_power(label: &str, power: i32) -> String {
 fn number(value: f64, decimals: usize) -> String {
     let digits = format!("{:.decimals$}", value.abs());
     let is_zero = digits.chars().all(|digit| digit == '0' || digit == '.');
-    if value < 0.0 && !is_zero { format!("−{digits}") } else { digits }
+    if value < 0.0 && !is_zero {
+        format!("−{digits}")
+    } else {
+        digits
+    }
 }
 
 fn plain_power(mantissa: f64, power: i32) -> String {
     let more = i32::from(mantissa.fract() != 0.0);
-    number(mantissa * libm::exp10(f64::from(power)), usize::try_from(more - power).unwrap_or(0))
+    number(
+        mantissa * libm::exp10(f64::from(power)),
+        usize::try_from(more - power).unwrap_or(0),
+    )
 }
 
 fn halves_of_pi(angle: f64) -> String {
     #[expect(clippy::cast_possible_truncation, reason = "a few halves")]
     let halves = (angle / FRAC_PI_2).round() as i64;
     let sign = if halves < 0 { "−" } else { "" };
-    let (count, over) = if halves % 2 == 0 { (halves.abs() / 2, "") } else { (halves.abs(), "/2") };
+    let (count, over) = if halves % 2 == 0 {
+        (halves.abs() / 2, "")
+    } else {
+        (halves.abs(), "/2")
+    };
     match count {
         0 => "0".to_owned(),
         1 => format!("{sign}π{over}"),
@@ -347,7 +479,10 @@ mod tests {
         let logarithmic = [(-1.0, 1.0), (0.0, 1.0), (1.0, f64::INFINITY)];
         for (low, high) in logarithmic {
             let axis = Axis::logarithmic("", low, high);
-            assert!(axis.ticks.len() + axis.minor.len() <= 2 * MAX_MULTIPLES && axis.place(1.0).is_finite());
+            assert!(
+                axis.ticks.len() + axis.minor.len() <= 2 * MAX_MULTIPLES
+                    && axis.place(1.0).is_finite()
+            );
         }
         for axis in [
             Axis::angle("", 0.0, 1e300),
@@ -360,12 +495,30 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_have_no_more_digits_than_they_need() {
-        assert_eq!(labels(&Axis::linear("", 0.0, 0.25)), ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25"]);
-        assert_eq!(labels(&Axis::linear("", -210.0, 480.0)), ["−200", "0", "200", "400"]);
-        assert_eq!(labels(&Axis::logarithmic("", 0.2, 1000.0)), ["1", "10", "100", "1000"]);
-        assert_eq!(labels(&Axis::logarithmic("", 0.05, 0.6)), ["0.05", "0.1", "0.2", "0.5"]);
-        assert_eq!(labels(&Axis::logarithmic("", 1e-12, 1e-6))[0..2], ["10⁻¹²", "10⁻¹¹"]);
-        assert_eq!(labels(&Axis::angle("", -1.5 * PI, PI)), ["−3π/2", "−π", "−π/2", "0", "π/2", "π"]);
+        assert_eq!(
+            labels(&Axis::linear("", 0.0, 0.25)),
+            ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25"]
+        );
+        assert_eq!(
+            labels(&Axis::linear("", -210.0, 480.0)),
+            ["−200", "0", "200", "400"]
+        );
+        assert_eq!(
+            labels(&Axis::logarithmic("", 0.2, 1000.0)),
+            ["1", "10", "100", "1000"]
+        );
+        assert_eq!(
+            labels(&Axis::logarithmic("", 0.05, 0.6)),
+            ["0.05", "0.1", "0.2", "0.5"]
+        );
+        assert_eq!(
+            labels(&Axis::logarithmic("", 1e-12, 1e-6))[0..2],
+            ["10⁻¹²", "10⁻¹¹"]
+        );
+        assert_eq!(
+            labels(&Axis::angle("", -1.5 * PI, PI)),
+            ["−3π/2", "−π", "−π/2", "0", "π/2", "π"]
+        );
     }
 
     #[test]
@@ -375,10 +528,19 @@ mod tests {
                 let low = 3.3 * libm::exp10(f64::from(exponent));
                 let (start, end) = widened((low, low * (1.0 + span)));
                 let linear = Axis::linear("", start, end);
-                assert!((2..=8).contains(&linear.ticks.len()), "{low} {span}: {:?}", linear.ticks);
-                let (low, high) = logarithmic_bounds([low, low * (1.0 + span)].into_iter()).unwrap();
+                assert!(
+                    (2..=8).contains(&linear.ticks.len()),
+                    "{low} {span}: {:?}",
+                    linear.ticks
+                );
+                let (low, high) =
+                    logarithmic_bounds([low, low * (1.0 + span)].into_iter()).unwrap();
                 let logarithmic = Axis::logarithmic("", low, high);
-                assert!((1..=9).contains(&logarithmic.ticks.len()), "{low} {high}: {:?}", logarithmic.ticks);
+                assert!(
+                    (1..=9).contains(&logarithmic.ticks.len()),
+                    "{low} {high}: {:?}",
+                    logarithmic.ticks
+                );
             }
         }
     }
@@ -386,17 +548,52 @@ mod tests {
     #[test]
     fn an_axis_with_one_or_two_numbers_gets_three_or_more() {
         let enough = |axis: Axis| axis.with_enough_numbers();
-        assert_eq!(labels(&enough(Axis::logarithmic("", 40.0, 125.0))), ["40", "60", "80", "100"]);
-        assert_eq!(labels(&enough(Axis::logarithmic("", 0.012, 0.05))), ["0.015", "0.02", "0.03", "0.04"]);
-        assert_eq!(labels(&enough(Axis::logarithmic("", 0.3, 60.0))), ["0.5", "1", "2", "5", "10", "20", "50"]);
-        assert_eq!(labels(&enough(Axis::sparse("", 0.0, 78.0))), ["0", "20", "40", "60"]);
-        assert!(enough(Axis { minor: Vec::new(), ..Axis::sparse("", 0.0, 78.0) }).minor.is_empty());
-        assert_eq!(labels(&enough(Axis::logarithmic("", 1.0, 1e5))).len(), 6, "it has enough");
-        assert_eq!(labels(&enough(Axis::categories("", &["one", "two"]))), ["one", "two"]);
+        assert_eq!(
+            labels(&enough(Axis::logarithmic("", 40.0, 125.0))),
+            ["40", "60", "80", "100"]
+        );
+        assert_eq!(
+            labels(&enough(Axis::logarithmic("", 0.012, 0.05))),
+            ["0.015", "0.02", "0.03", "0.04"]
+        );
+        assert_eq!(
+            labels(&enough(Axis::logarithmic("", 0.3, 60.0))),
+            ["0.5", "1", "2", "5", "10", "20", "50"]
+        );
+        assert_eq!(
+            labels(&enough(Axis::sparse("", 0.0, 78.0))),
+            ["0", "20", "40", "60"]
+        );
+        assert!(
+            enough(Axis {
+                minor: Vec::new(),
+                ..Axis::sparse("", 0.0, 78.0)
+            })
+            .minor
+            .is_empty()
+        );
+        assert_eq!(
+            labels(&enough(Axis::logarithmic("", 1.0, 1e5))).len(),
+            6,
+            "it has enough"
+        );
+        assert_eq!(
+            labels(&enough(Axis::categories("", &["one", "two"]))),
+            ["one", "two"]
+        );
         for exponent in -12..12 {
-            for (start, span) in [(1.01, 3.2), (2.1, 3.2), (3.3, 10.0), (5.5, 3.2), (9.9, 11.0)] {
+            for (start, span) in [
+                (1.01, 3.2),
+                (2.1, 3.2),
+                (3.3, 10.0),
+                (5.5, 3.2),
+                (9.9, 11.0),
+            ] {
                 let low = start * libm::exp10(f64::from(exponent));
-                for axis in [Axis::logarithmic("", low, span * low), Axis::sparse("", low, span * low)] {
+                for axis in [
+                    Axis::logarithmic("", low, span * low),
+                    Axis::sparse("", low, span * low),
+                ] {
                     let count = enough(axis).ticks.len();
                     assert!((3..=9).contains(&count), "{low} {span}: {count}");
                 }
@@ -407,12 +604,21 @@ mod tests {
     #[test]
     fn numbers_with_many_zeros_are_over_a_power_of_ten_that_the_label_shows() {
         let axis = Axis::linear("Amplitude Δ (m)", 0.0, 4e-6);
-        assert_eq!((axis.label.as_str(), labels(&axis)), ("Amplitude Δ (10⁻⁶ m)", vec!["0", "1", "2", "3", "4"]));
+        assert_eq!(
+            (axis.label.as_str(), labels(&axis)),
+            ("Amplitude Δ (10⁻⁶ m)", vec!["0", "1", "2", "3", "4"])
+        );
         let axis = Axis::linear("K_d (N/m)", 0.0, 4e7);
-        assert_eq!((axis.label.as_str(), labels(&axis)), ("K_d (10⁶ N/m)", vec!["0", "10", "20", "30", "40"]));
+        assert_eq!(
+            (axis.label.as_str(), labels(&axis)),
+            ("K_d (10⁶ N/m)", vec!["0", "10", "20", "30", "40"])
+        );
         assert_eq!(Axis::linear("share", 0.0, 1e-5).label, "share (10⁻⁶)");
         let axis = Axis::linear("Period T (s)", 0.0, 0.05);
-        assert_eq!((axis.label.as_str(), labels(&axis)[1]), ("Period T (s)", "0.01"));
+        assert_eq!(
+            (axis.label.as_str(), labels(&axis)[1]),
+            ("Period T (s)", "0.01")
+        );
     }
 
     #[test]

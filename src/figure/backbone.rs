@@ -34,14 +34,24 @@ const FAINTEST: f64 = 0.25 / (2.0 * PI);
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
-pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], look: &Look) -> Option<Picture> {
-    let slips: Vec<Place> =
-        points.iter().filter_map(|point| Some((point.eta, point.phase?)).filter(|_| point.eta > 0.0)).collect();
+pub(super) fn backbone(
+    points: &[Point],
+    bins: &[BackboneBin],
+    sets: &[SetRow],
+    look: &Look,
+) -> Option<Picture> {
+    let slips: Vec<Place> = points
+        .iter()
+        .filter_map(|point| Some((point.eta, point.phase?)).filter(|_| point.eta > 0.0))
+        .collect();
     let (shades, cells) = density(&slips);
     let (low, high) = bounds(cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?;
     let averages = averages(bins, sets);
     let entries = [
-        entry(Mark::Bar(AVERAGE), "mean of all sets with a phase in a bin of η, 95 %"),
+        entry(
+            Mark::Bar(AVERAGE),
+            "mean of all sets with a phase in a bin of η, 95 %",
+        ),
         entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
         entry(Mark::Line(REFERENCE), "η = 1"),
@@ -50,9 +60,13 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
     let curve = |phase: fn(f64) -> Option<f64>| {
         let modulated = x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
-        modulated.filter_map(|eta| Some((eta, phase(eta)?))).collect()
+        modulated
+            .filter_map(|eta| Some((eta, phase(eta)?)))
+            .collect()
     };
-    let coloured = cells.iter().map(|&(cell, density)| (cell, shade(shades.place(density))));
+    let coloured = cells
+        .iter()
+        .map(|&(cell, density)| (cell, shade(shades.place(density))));
     let mut layers = vec![Layer::Cells(coloured.collect(), OVERLAP)];
     let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
     layers.extend([
@@ -60,25 +74,51 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
         Layer::Curve(curve(|eta| Some(minimum_phase_asymptote(eta))), ASYMPTOTE),
         Layer::Curve(curve(minimum_phase), EXACT),
         Layer::Bars(
-            averages.iter().filter_map(|&(eta, _, ends)| Some((eta, ends?))).collect(),
+            averages
+                .iter()
+                .filter_map(|&(eta, _, ends)| Some((eta, ends?)))
+                .collect(),
             Stroke::solid(BLUE, BAR_WIDTH),
         ),
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
     let bar = Some(ColourBar::of_axis(&shades, shade));
-    let panel = Panel { bar, ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers) };
-    Some(panel::draw("phi-eta", look, Layout::column(WIDTH), &entries, vec![panel]))
+    let panel = Panel {
+        bar,
+        ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers)
+    };
+    Some(panel::draw(
+        "phi-eta",
+        look,
+        Layout::column(WIDTH),
+        &entries,
+        vec![panel],
+    ))
 }
 
 /// Mean η of the sets of each bin that have a phase, the mean of these phases in rad, and the ends of its interval.
 fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<(f64, f64, Option<Ends>)> {
     let average = |bin: &BackboneBin| {
         let within = |eta: &f64| (bin.eta_low..bin.eta_high).contains(eta);
-        let phased = sets.iter().filter(|set| set.has_phase).map(|set| set.parameters.eta()).filter(within);
-        let (count, sum) = phased.fold((0.0, 0.0), |(count, sum), eta| (count + 1.0, sum + libm::log(eta)));
-        let eta = if count > 0.0 { libm::exp(sum / count) } else { bin.eta_centre };
-        Some((eta, bin.set_phase_mean?, bin.set_phase_mean_low.zip(bin.set_phase_mean_high)))
+        let phased = sets
+            .iter()
+            .filter(|set| set.has_phase)
+            .map(|set| set.parameters.eta())
+            .filter(within);
+        let (count, sum) = phased.fold((0.0, 0.0), |(count, sum), eta| {
+            (count + 1.0, sum + libm::log(eta))
+        });
+        let eta = if count > 0.0 {
+            libm::exp(sum / count)
+        } else {
+            bin.eta_centre
+        };
+        Some((
+            eta,
+            bin.set_phase_mean?,
+            bin.set_phase_mean_low.zip(bin.set_phase_mean_high),
+        ))
     };
     bins.iter().filter_map(average).collect()
 }
@@ -89,7 +129,9 @@ fn density(slips: &[Place]) -> (Axis, Vec<(Cell, f64)>) {
     let height = PI / ROWS;
     let mut counts: Vec<BTreeMap<i64, u32>> = vec![BTreeMap::new(); columns.len()];
     for &(eta, phase) in slips {
-        let column = columns.partition_point(|column| column.1 <= eta).min(columns.len() - 1);
+        let column = columns
+            .partition_point(|column| column.1 <= eta)
+            .min(columns.len() - 1);
         #[expect(clippy::cast_possible_truncation, reason = "a few rows")]
         let row = (phase / height).floor() as i64;
         *counts[column].entry(row).or_default() += 1;
@@ -105,7 +147,10 @@ fn density(slips: &[Place]) -> (Axis, Vec<(Cell, f64)>) {
             })
         })
         .collect();
-    let most = cells.iter().map(|cell| cell.1).fold(10.0 * FAINTEST, f64::max);
+    let most = cells
+        .iter()
+        .map(|cell| cell.1)
+        .fold(10.0 * FAINTEST, f64::max);
     (Axis::logarithmic("density (1/rad)", FAINTEST, most), cells)
 }
 
@@ -117,19 +162,33 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     values.sort_by(f64::total_cmp);
     values.dedup_by(|next, value| *next <= *value * SAME);
     if values.len() <= MAX_COLUMNS {
-        let cells = Grid::logarithmic_cells(values.clone()).into_iter().zip(values);
+        let cells = Grid::logarithmic_cells(values.clone())
+            .into_iter()
+            .zip(values);
         let clipped = |((low, high), eta): ((f64, f64), f64)| {
             let (low, high) = (low.max(eta / WIDEST), high.min(eta * WIDEST));
             // None reaches over η = 1, where the load begins to fall in each period.
-            (if eta > SAME { low.max(1.0) } else { low }, if eta * SAME < 1.0 { high.min(1.0) } else { high })
+            (
+                if eta > SAME { low.max(1.0) } else { low },
+                if eta * SAME < 1.0 {
+                    high.min(1.0)
+                } else {
+                    high
+                },
+            )
         };
         return cells.map(clipped).collect();
     }
     let place = |eta: f64| libm::log10(eta) * COLUMNS_PER_DECADE;
     #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
-    let (first, last) = (place(values[0]).floor() as i32, place(values[values.len() - 1]).floor() as i32);
+    let (first, last) = (
+        place(values[0]).floor() as i32,
+        place(values[values.len() - 1]).floor() as i32,
+    );
     let edge = |column: i32| libm::exp10(f64::from(column) / COLUMNS_PER_DECADE);
-    (first..=last).map(|column| (edge(column), edge(column + 1))).collect()
+    (first..=last)
+        .map(|column| (edge(column), edge(column + 1)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -141,18 +200,32 @@ mod tests {
     fn columns_hold_every_slip_and_are_those_of_a_grid_where_there_is_one() {
         let grid = columns([1.0, 2.0, 4.0, 2.0, 4.0 * (1.0 + 1e-13)].into_iter());
         assert_eq!(grid.len(), 3);
-        assert!((grid[1].0 - 2.0_f64.sqrt()).abs() < 1e-12 && (grid[1].1 - 8.0_f64.sqrt()).abs() < 1e-12);
+        assert!(
+            (grid[1].0 - 2.0_f64.sqrt()).abs() < 1e-12
+                && (grid[1].1 - 8.0_f64.sqrt()).abs() < 1e-12
+        );
         let etas: Vec<f64> = (0..1000).map(|step| 0.2 * 1.008_f64.powi(step)).collect();
         let sample = columns(etas.iter().copied());
-        assert!(sample.len() < 50 && sample[0].0 <= etas[0] && sample[sample.len() - 1].1 > etas[999]);
+        assert!(
+            sample.len() < 50 && sample[0].0 <= etas[0] && sample[sample.len() - 1].1 > etas[999]
+        );
         assert!(sample.windows(2).all(|pair| pair[0].1 == pair[1].0));
         let [low, high] = [[0.5, 1.09], [0.9, 2.0]].map(|etas| columns(etas.into_iter()));
-        assert_eq!((low[1].0, high[0].1), (1.0, 1.0), "no column reaches over η = 1");
+        assert_eq!(
+            (low[1].0, high[0].1),
+            (1.0, 1.0),
+            "no column reaches over η = 1"
+        );
     }
 
     #[test]
     fn the_density_of_a_column_integrates_to_one() {
-        let point = |step: u32| (if step.is_multiple_of(3) { 2.0 } else { 8.0 }, 1e-3 * f64::from(step % 700) - 0.5);
+        let point = |step: u32| {
+            (
+                if step.is_multiple_of(3) { 2.0 } else { 8.0 },
+                1e-3 * f64::from(step % 700) - 0.5,
+            )
+        };
         let (_, cells) = density(&(0..3000).map(point).collect::<Vec<_>>());
         for eta in [2.0, 8.0] {
             let column = cells.iter().filter(|((x, _), _)| (x.0..x.1).contains(&eta));

@@ -25,9 +25,19 @@ impl ColourBar {
     /// A bar of all colours of a scale, with the numbers of an axis.
     pub(super) fn of_axis(axis: &Axis, colour: fn(f64) -> Color) -> Self {
         const STEPS: u32 = 64;
-        let colours = (0..STEPS).map(|step| colour(f64::from(step) / f64::from(STEPS - 1))).collect();
-        let ticks = axis.ticks.iter().map(|(value, number)| (axis.place(*value), number.clone())).collect();
-        Self { label: axis.label.clone(), colours, ticks }
+        let colours = (0..STEPS)
+            .map(|step| colour(f64::from(step) / f64::from(STEPS - 1)))
+            .collect();
+        let ticks = axis
+            .ticks
+            .iter()
+            .map(|(value, number)| (axis.place(*value), number.clone()))
+            .collect();
+        Self {
+            label: axis.label.clone(),
+            colours,
+            ticks,
+        }
     }
 
     /// Draws the bar right of a frame, and the label above it.
@@ -35,12 +45,26 @@ impl ColourBar {
         let (left, top, bottom) = (frame.right() + GAP, frame.top, frame.bottom());
         let height = frame.height / self.colours.len() as f64;
         let boxes = self.colours.iter().enumerate().map(|(step, colour)| {
-            let (top, overlap) = (bottom - (step + 1) as f64 * height, if step == 0 { 0.0 } else { OVERLAP });
+            let (top, overlap) = (
+                bottom - (step + 1) as f64 * height,
+                if step == 0 { 0.0 } else { OVERLAP },
+            );
             ([left, top, WIDTH, height + overlap], colour.clone())
         });
-        sheet.clipped([left, top, WIDTH, frame.height], |sheet| sheet.rectangles(boxes));
+        sheet.clipped([left, top, WIDTH, frame.height], |sheet| {
+            sheet.rectangles(boxes)
+        });
         let right = left + WIDTH;
-        sheet.line(vec![(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], AXIS);
+        sheet.line(
+            vec![
+                (left, top),
+                (right, top),
+                (right, bottom),
+                (left, bottom),
+                (left, top),
+            ],
+            AXIS,
+        );
         let mut free = f64::INFINITY;
         for (place, number) in &self.ticks {
             let y = bottom - place * frame.height;
@@ -51,7 +75,8 @@ impl ColourBar {
             }
         }
         let end = frame.right() + COLOUR_BAR - INSET;
-        let size = fitting(&self.label, LEGEND_TEXT, end - frame.y_label_end() - GAP).unwrap_or(NOTE_TEXT);
+        let size =
+            fitting(&self.label, LEGEND_TEXT, end - frame.y_label_end() - GAP).unwrap_or(NOTE_TEXT);
         sheet.text((end, top - 12.0), &self.label, size, Anchor::End);
     }
 }

@@ -14,9 +14,15 @@ use crate::sweep::label;
 const NUMBERS: f64 = 66.0;
 /// Middle of the numbers of lines that leave through the top, below it.
 const BELOW_TOP: f64 = 14.0;
-const LAYOUT: Layout = Layout { right: NUMBERS, ..Layout::column(520.0) };
+const LAYOUT: Layout = Layout {
+    right: NUMBERS,
+    ..Layout::column(520.0)
+};
 /// The stages of the ramp, their names and inks.
-const STAGES: [(RampStage, &str, Ink); 2] = [(RampStage::Up, "there", INKS[0]), (RampStage::Down, "back", INKS[1])];
+const STAGES: [(RampStage, &str, Ink); 2] = [
+    (RampStage::Up, "there", INKS[0]),
+    (RampStage::Down, "back", INKS[1]),
+];
 /// Share of the intervals at either end that the axis of the medians leaves out.
 const RARE: f64 = 0.02;
 /// Bins of the modulation, and least intervals in one that has a median.
@@ -31,22 +37,50 @@ type Slip = (usize, f64, f64, f64);
 /// Draws interval against period at the onset, or against amplitude if it is the amplitude alone that is ramped; `None`
 /// if no slip has an interval on a ramp.
 pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
-    let stage = |point: &Point| STAGES.iter().position(|(stage, ..)| point.ramp_stage == Some(*stage));
-    let ramped = || points.iter().filter(|point| stage(point).is_some() && point.interval.is_some());
-    let is_period = bounds(ramped().filter_map(|point| point.period)).is_some_and(|(low, high)| high > low);
-    let modulation = |point: &Point| if is_period { point.period } else { Some(point.amplitude) };
-    let (x_label, x_factor) = axis_of(if is_period { "T" } else { "Delta" }, ramped().filter_map(modulation));
-    let (factor, unit) = label("tau_mean").scale(bounds(ramped().filter_map(|point| point.interval))?.1);
+    let stage = |point: &Point| {
+        STAGES
+            .iter()
+            .position(|(stage, ..)| point.ramp_stage == Some(*stage))
+    };
+    let ramped = || {
+        points
+            .iter()
+            .filter(|point| stage(point).is_some() && point.interval.is_some())
+    };
+    let is_period =
+        bounds(ramped().filter_map(|point| point.period)).is_some_and(|(low, high)| high > low);
+    let modulation = |point: &Point| {
+        if is_period {
+            point.period
+        } else {
+            Some(point.amplitude)
+        }
+    };
+    let (x_label, x_factor) = axis_of(
+        if is_period { "T" } else { "Delta" },
+        ramped().filter_map(modulation),
+    );
+    let (factor, unit) =
+        label("tau_mean").scale(bounds(ramped().filter_map(|point| point.interval))?.1);
     let slip = |point: &Point| {
         let (period, interval) = (point.period?, point.interval?);
-        Some((stage(point)?, x_factor * modulation(point)?, factor * interval, interval / period))
+        Some((
+            stage(point)?,
+            x_factor * modulation(point)?,
+            factor * interval,
+            interval / period,
+        ))
     };
     let slips: Vec<Slip> = ramped().filter_map(slip).collect();
     let ends = bounds(slips.iter().map(|slip| slip.1))?;
     let taus = widened(bounds(slips.iter().map(|slip| slip.2))?);
     let ratios = ratios(slips.iter());
     let [least, most] = [quantile(&ratios, RARE)?, quantile(&ratios, 1.0 - RARE)?];
-    let multiples = || (1..=u32::MAX).map(f64::from).take_while(|&n| ratios.last().is_some_and(|most| n < most + 0.5));
+    let multiples = || {
+        (1..=u32::MAX)
+            .map(f64::from)
+            .take_while(|&n| ratios.last().is_some_and(|most| n < most + 0.5))
+    };
 
     let (low, high) = widened(ends);
     let x = Axis::linear(&x_label, low, high);
@@ -55,32 +89,63 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let entries: Vec<Entry> = medians.into_iter().chain([lines]).collect();
     // τ = nT is a curve in T, and level in Δ.
     let period = ramped().find_map(|point| point.period)?;
-    let line = |n: f64| [low, high].map(|at| (at, n * factor * if is_period { at / x_factor } else { period }));
+    let line = |n: f64| {
+        [low, high].map(|at| {
+            (
+                at,
+                n * factor * if is_period { at / x_factor } else { period },
+            )
+        })
+    };
     // Slip by slip, so that neither stage covers the other.
     let dots = slips.iter().map(|&(stage, x, tau, _)| {
-        Layer::Dots(vec![(x, tau)], Dot { ink: STAGES[stage].2, radius: 2.0, opacity: 0.45 })
+        Layer::Dots(
+            vec![(x, tau)],
+            Dot {
+                ink: STAGES[stage].2,
+                radius: 2.0,
+                opacity: 0.45,
+            },
+        )
     });
     // Where lines leave the frame: at its right, or through its top.
     let end = |n: f64| {
         let [(_, first), (right, last)] = line(n);
         let share = ((taus.1 - first) / (last - first)).min(1.0);
-        (first < taus.1 && last > taus.0).then(|| (n, (low + share * (right - low), last.min(taus.1))))
+        (first < taus.1 && last > taus.0)
+            .then(|| (n, (low + share * (right - low), last.min(taus.1))))
     };
     let ends_of_lines: Vec<_> = multiples().filter_map(end).collect();
     let numbers = Layer::Drawn(Box::new(move |sheet, frame| {
         for (n, end) in ends_of_lines {
             let (x, y) = frame.place(end);
             let y = y.max(frame.top + BELOW_TOP);
-            sheet.centred_text((x + 6.0, y), &format!("n = {n}"), LEGEND_TEXT, Anchor::Start);
+            sheet.centred_text(
+                (x + 6.0, y),
+                &format!("n = {n}"),
+                LEGEND_TEXT,
+                Anchor::Start,
+            );
         }
     }));
-    let lines = Layer::Inside(multiples().map(|n| Layer::Curve(line(n).into(), GRID)).chain(dots).collect());
+    let lines = Layer::Inside(
+        multiples()
+            .map(|n| Layer::Curve(line(n).into(), GRID))
+            .chain(dots)
+            .collect(),
+    );
     let tau = Axis::linear(&format!("Slip interval τ ({unit})"), taus.0, taus.1);
     let upper = Panel::new(320.0, x.clone(), tau, vec![lines, numbers]);
     let ratio = Axis::linear("Median and quartiles of τ / T", least - 0.3, most + 0.3);
     let levels = multiples().map(|n| Layer::Level(n, GRID));
     let lower = Panel::inside(210.0, x, ratio, levels.chain(medians_of(&slips, ends)));
-    Some(panel::draw("drag", look, LAYOUT, &entries, vec![upper, lower]))
+    Some(panel::draw(
+        "drag",
+        look,
+        LAYOUT,
+        &entries,
+        vec![upper, lower],
+    ))
 }
 
 /// Medians and quartiles of τ/T in bins of the modulation, of both stages.
@@ -90,14 +155,25 @@ fn medians_of<'a>(slips: &[Slip], (low, high): Ends) -> Vec<Layer<'a>> {
     for (stage, (_, _, ink)) in STAGES.into_iter().enumerate() {
         for bin in 0..BINS {
             let start = low + f64::from(bin) * width;
-            let end = if bin + 1 == BINS { f64::INFINITY } else { start + width };
-            let ratios = ratios(slips.iter().filter(|slip| slip.0 == stage && (start..end).contains(&slip.1)));
+            let end = if bin + 1 == BINS {
+                f64::INFINITY
+            } else {
+                start + width
+            };
+            let ratios = ratios(
+                slips
+                    .iter()
+                    .filter(|slip| slip.0 == stage && (start..end).contains(&slip.1)),
+            );
             let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share));
             if let [Some(first), Some(median), Some(third)] = quartiles
                 && ratios.len() >= MIN_INTERVALS
             {
                 let x = start + (0.5 + OFFSETS[stage]) * width;
-                layers.push(Layer::Bars(vec![(x, (first, third))], Stroke::solid(ink, 2.0)));
+                layers.push(Layer::Bars(
+                    vec![(x, (first, third))],
+                    Stroke::solid(ink, 2.0),
+                ));
                 layers.push(Layer::Dots(vec![(x, median)], Dot::solid(ink, 4.5)));
             }
         }
@@ -133,20 +209,31 @@ mod tests {
 
     #[test]
     fn both_stages_of_the_ramp_are_drawn_and_what_comes_after_is_not() {
-        let on = |stage, n| (0..200).map(move |step| point(Some(stage), 0.03 + 5e-5 * f64::from(step), n));
-        let points: Vec<Point> = on(RampStage::Up, 4.0).chain(on(RampStage::Down, 3.0)).collect();
+        let on = |stage, n| {
+            (0..200).map(move |step| point(Some(stage), 0.03 + 5e-5 * f64::from(step), n))
+        };
+        let points: Vec<Point> = on(RampStage::Up, 4.0)
+            .chain(on(RampStage::Down, 3.0))
+            .collect();
         let svg = drag(&points, &Look::default()).unwrap().svg();
         for text in ["n = 3", "n = 4", "there", "back", "τ / T"] {
             assert!(svg.contains(text), "{text}");
         }
-        let after: Vec<Point> = on(RampStage::After, 4.0).chain([point(None, 0.03, 4.0)]).collect();
+        let after: Vec<Point> = on(RampStage::After, 4.0)
+            .chain([point(None, 0.03, 4.0)])
+            .collect();
         assert!(drag(&after, &Look::default()).is_none());
     }
 
     #[test]
     fn a_ramp_of_the_amplitude_alone_is_drawn_over_the_amplitude() {
-        let ramped = |step: u32| Point { amplitude: 1e-8 * f64::from(step), ..point(Some(RampStage::Up), 0.03, 4.0) };
-        let svg = drag(&(0..100).map(ramped).collect::<Vec<_>>(), &Look::default()).unwrap().svg();
+        let ramped = |step: u32| Point {
+            amplitude: 1e-8 * f64::from(step),
+            ..point(Some(RampStage::Up), 0.03, 4.0)
+        };
+        let svg = drag(&(0..100).map(ramped).collect::<Vec<_>>(), &Look::default())
+            .unwrap()
+            .svg();
         assert!(svg.contains(">Amplitude Δ (µm)<"));
     }
 }

@@ -30,7 +30,11 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
         let [map, staircase] = [map::map, own::staircase].map(|map| map(&sets, look));
         // More values than colours would be a net of lines, which a map shows better; a single set would be a dot.
-        let is_net = || swept(&sets).get(1).is_some_and(|second| second.distinct.len() > INKS.len());
+        let is_net = || {
+            swept(&sets)
+                .get(1)
+                .is_some_and(|second| second.distinct.len() > INKS.len())
+        };
         if sets.len() > 1 && staircase.is_none() && !(map.is_some() && is_net()) {
             pictures.extend(own::overview(&sets, look));
         }
@@ -60,7 +64,12 @@ pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<
 }
 
 /// Puts a figure into `figures/`, in these formats.
-pub fn write_own(layout: &Layout<'_>, picture: Picture, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
+pub fn write_own(
+    layout: &Layout<'_>,
+    picture: Picture,
+    look: &Look,
+    formats: &[Format],
+) -> Result<Vec<PathBuf>> {
     let _alone = exclusive_lock(layout, WRITER)?;
     write(layout, &[picture], look, formats)
 }
@@ -87,8 +96,15 @@ fn check_size(picture: &Picture, look: &Look) -> Result<(), BadOption> {
     }
 }
 
-fn write(layout: &Layout<'_>, pictures: &[Picture], look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
-    pictures.iter().try_for_each(|picture| check_size(picture, look))?;
+fn write(
+    layout: &Layout<'_>,
+    pictures: &[Picture],
+    look: &Look,
+    formats: &[Format],
+) -> Result<Vec<PathBuf>> {
+    pictures
+        .iter()
+        .try_for_each(|picture| check_size(picture, look))?;
     let folder = layout.figures();
     layout.ensure_folder(&folder)?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
@@ -154,11 +170,25 @@ mod tests {
     fn figures_are_byte_identical_when_drawn_again() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
         let files = draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap();
-        let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect();
-        assert_eq!(names, ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"]);
-        let bytes = || files.iter().map(|file| fs::read(file).unwrap()).collect::<Vec<_>>();
+        let names: Vec<_> = files
+            .iter()
+            .map(|file| file.file_name().unwrap().to_string_lossy().into_owned())
+            .collect();
+        assert_eq!(
+            names,
+            ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"]
+        );
+        let bytes = || {
+            files
+                .iter()
+                .map(|file| fs::read(file).unwrap())
+                .collect::<Vec<_>>()
+        };
         let before = bytes();
-        assert_eq!(draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap(), files);
+        assert_eq!(
+            draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap(),
+            files
+        );
         assert!(bytes() == before);
         let (svg, png) = (String::from_utf8(before[0].clone()).unwrap(), &before[1]);
         assert!(svg.contains("φ (rad)") && svg.ends_with("</svg>"));
@@ -168,7 +198,10 @@ mod tests {
     #[test]
     fn a_pdf_is_whole_and_byte_identical_when_drawn_again_and_has_the_size_of_its_style() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
-        let look = Look { style: Style::Print, ..Look::default() };
+        let look = Look {
+            style: Style::Print,
+            ..Look::default()
+        };
         let drawn = || {
             let files = draw_all(&layout, &look, &[Format::Pdf]).unwrap();
             fs::read(&files[0]).unwrap()
@@ -176,7 +209,8 @@ mod tests {
         let pdf = drawn();
         assert!(pdf.starts_with(b"%PDF-") && pdf.trim_ascii_end().ends_with(b"%%EOF"));
         assert!(drawn() == pdf);
-        let svg = fs::read_to_string(&draw_all(&layout, &look, &[Format::Svg]).unwrap()[0]).unwrap();
+        let svg =
+            fs::read_to_string(&draw_all(&layout, &look, &[Format::Svg]).unwrap()[0]).unwrap();
         assert!(svg.contains(r#"width="86.00mm""#), "{}", &svg[..200]);
     }
 
@@ -184,17 +218,36 @@ mod tests {
     fn a_size_that_a_figure_does_not_fit_is_refused_with_the_least_one() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
         let drawn = |width, height| {
-            draw_all(&layout, &Look { size: Some(Size { width, height }), ..Look::default() }, &[Format::Svg])
+            draw_all(
+                &layout,
+                &Look {
+                    size: Some(Size { width, height }),
+                    ..Look::default()
+                },
+                &[Format::Svg],
+            )
         };
         let error = drawn(5.0, 5.0).unwrap_err().to_string();
-        assert!(error.starts_with("--size: figure phi-eta needs at least "), "{error}");
+        assert!(
+            error.starts_with("--size: figure phi-eta needs at least "),
+            "{error}"
+        );
         assert!(drawn(150.0, 100.0).is_ok());
     }
 
     #[test]
     fn without_modulation_no_phase_is_drawn() {
-        let still = Point { period: None, periods: None, phase: None, ..modulated(1) };
+        let still = Point {
+            period: None,
+            periods: None,
+            phase: None,
+            ..modulated(1)
+        };
         let (_root, layout) = reduced(&[still]);
-        assert!(draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap().is_empty());
+        assert!(
+            draw_all(&layout, &Look::default(), &Format::DEFAULT)
+                .unwrap()
+                .is_empty()
+        );
     }
 }

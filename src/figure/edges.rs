@@ -22,23 +22,41 @@ fn value(key: &str, edge: &EdgeRow) -> Option<f64> {
 /// `None` if nothing else differs, or more than one quantity.
 pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let refined = edges.first()?.axis.as_str();
-    let is_refined = |key: &str| key == refined || (key == FREQUENCY && ["T", "eta"].contains(&refined));
+    let is_refined =
+        |key: &str| key == refined || (key == FREQUENCY && ["T", "eta"].contains(&refined));
     let differs = |key: &str| ascending(edges.iter().filter_map(|edge| value(key, edge))).len() > 1;
-    let parameters = Symbol::ALL.into_iter().filter(|symbol| !matches!(symbol, Symbol::T | Symbol::Seed));
+    let parameters = Symbol::ALL
+        .into_iter()
+        .filter(|symbol| !matches!(symbol, Symbol::T | Symbol::Seed));
     let keys = parameters.map(Symbol::key).chain([FREQUENCY]);
-    let [key] = keys.filter(|key| !is_refined(key) && differs(key)).collect::<Vec<_>>()[..] else { return None };
+    let [key] = keys
+        .filter(|key| !is_refined(key) && differs(key))
+        .collect::<Vec<_>>()[..]
+    else {
+        return None;
+    };
     let (x_label, x_factor) = axis_of(key, edges.iter().filter_map(|edge| value(key, edge)));
     let (y_label, y_factor) = axis_of(refined, edges.iter().filter_map(|edge| edge.edge));
     let place = |edge: &EdgeRow| Some((x_factor * value(key, edge)?, y_factor * edge.edge?));
     let bar = |edge: &EdgeRow| {
         let interval = edge.edge_interval?;
-        Some((place(edge)?.0, (y_factor * interval.low, y_factor * interval.high)))
+        Some((
+            place(edge)?.0,
+            (y_factor * interval.low, y_factor * interval.high),
+        ))
     };
     let places = || edges.iter().filter_map(place);
-    let ends = edges.iter().filter_map(bar).flat_map(|(_, ends)| [ends.0, ends.1]);
+    let ends = edges
+        .iter()
+        .filter_map(bar)
+        .flat_map(|(_, ends)| [ends.0, ends.1]);
     let known = ascending(places().map(|place| place.0));
     let x = Axis::of_data(&x_label, known.iter().copied())?;
-    let x = if known.len() > MAX_TICKS { x } else { x.with_ticks_at(&x_label, known.into_iter()) };
+    let x = if known.len() > MAX_TICKS {
+        x
+    } else {
+        x.with_ticks_at(&x_label, known.into_iter())
+    };
     let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
     let mut statistics: Vec<&str> = Vec::new();
     for EdgeRow { statistic, .. } in edges {
@@ -49,11 +67,26 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let (mut legend, mut layers) = (Vec::new(), Vec::new());
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
-        legend.push(entry(Mark::Bar(dot(ink)), format!("{}, 95 %", of_it().next()?.crossed())));
-        layers.push(Layer::Bars(of_it().filter_map(bar).collect(), Stroke::solid(ink, BAR_WIDTH)));
-        layers.push(Layer::Dots(of_it().filter_map(place).collect(), Dot::solid(ink, 0.7 * RADIUS)));
+        legend.push(entry(
+            Mark::Bar(dot(ink)),
+            format!("{}, 95 %", of_it().next()?.crossed()),
+        ));
+        layers.push(Layer::Bars(
+            of_it().filter_map(bar).collect(),
+            Stroke::solid(ink, BAR_WIDTH),
+        ));
+        layers.push(Layer::Dots(
+            of_it().filter_map(place).collect(),
+            Dot::solid(ink, 0.7 * RADIUS),
+        ));
     }
-    Some(panel::draw("edges", look, Layout::column(490.0), &legend, vec![Panel::new(300.0, x, y, layers)]))
+    Some(panel::draw(
+        "edges",
+        look,
+        Layout::column(490.0),
+        &legend,
+        vec![Panel::new(300.0, x, y, layers)],
+    ))
 }
 
 #[cfg(test)]
@@ -65,12 +98,18 @@ mod tests {
 
     fn edge(drive_velocity: f64, statistic: &str, edge: Option<f64>) -> EdgeRow {
         EdgeRow {
-            parameters: Selected::new(Parameters { drive_velocity, ..Parameters::default() }),
+            parameters: Selected::new(Parameters {
+                drive_velocity,
+                ..Parameters::default()
+            }),
             axis: "Delta".to_owned(),
             statistic: statistic.to_owned(),
             threshold: 0.5,
             edge,
-            edge_interval: edge.map(|edge| Interval { low: 0.9 * edge, high: 1.1 * edge }),
+            edge_interval: edge.map(|edge| Interval {
+                low: 0.9 * edge,
+                high: 1.1 * edge,
+            }),
             ..EdgeRow::default()
         }
     }
@@ -87,8 +126,15 @@ mod tests {
         let svg = edges(&rows, &Look::default()).unwrap().svg();
         assert!(svg.contains("Drive velocity") && svg.contains("Amplitude Δ"));
         assert!(svg.contains(">R = 0.5, 95 %<") && svg.contains(">R, drive = 0.5, 95 %<"));
-        assert!([INKS[0], INKS[1]].iter().all(|ink| svg.matches(ink).count() > 2));
-        assert!(edges(&rows[..2], &Look::default()).is_none(), "nothing to draw it against");
+        assert!(
+            [INKS[0], INKS[1]]
+                .iter()
+                .all(|ink| svg.matches(ink).count() > 2)
+        );
+        assert!(
+            edges(&rows[..2], &Look::default()).is_none(),
+            "nothing to draw it against"
+        );
         assert!(edges(&rows[3..], &Look::default()).is_none(), "no edge");
         assert!(edges(&[], &Look::default()).is_none());
     }

@@ -18,7 +18,11 @@ pub(super) fn width(text: &str, size: u32) -> f64 {
         let glyph = face.glyph_index(letter).unwrap_or(GlyphId(0));
         Some(f64::from(face.glyph_hor_advance(glyph)?) / f64::from(face.units_per_em()))
     };
-    f64::from(size) * text.chars().map(|character| letter(character).unwrap_or(LETTER)).sum::<f64>()
+    f64::from(size)
+        * text
+            .chars()
+            .map(|character| letter(character).unwrap_or(LETTER))
+            .sum::<f64>()
 }
 
 #[cfg(test)]

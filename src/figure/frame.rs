@@ -60,11 +60,24 @@ pub(super) struct Layout {
 impl Layout {
     /// One under the other.
     pub(super) const fn column(width: f64) -> Self {
-        Self { columns: 1, width, column_gap: 0.0, row_gap: ROW_GAP, right: RIGHT, has_headings: false }
+        Self {
+            columns: 1,
+            width,
+            column_gap: 0.0,
+            row_gap: ROW_GAP,
+            right: RIGHT,
+            has_headings: false,
+        }
     }
 
     /// Frames with these heights of the rows on a sheet of the size that is asked for, under this legend.
-    pub(super) fn page(self, name: &str, look: &Look, legend: &[Entry], natural_heights: &[f64]) -> (Page, Picture) {
+    pub(super) fn page(
+        self,
+        name: &str,
+        look: &Look,
+        legend: &[Entry],
+        natural_heights: &[f64],
+    ) -> (Page, Picture) {
         let columns = self.columns as f64;
         let between = (columns - 1.0) * self.column_gap;
         let beside = LEFT + between + self.right;
@@ -77,26 +90,54 @@ impl Layout {
         let right = total - MARGIN;
         let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * LEGEND_ROW;
         // A journal has the small print in the caption.
-        let notes = if look.style == Style::Screen { wrapped(&look.note, right - MARGIN) } else { Vec::new() };
+        let notes = if look.style == Style::Screen {
+            wrapped(&look.note, right - MARGIN)
+        } else {
+            Vec::new()
+        };
         let rows = natural_heights.len() as f64;
         let heading = if self.has_headings { HEADING } else { 0.0 };
         let above_notes = top + rows * heading + (rows - 1.0) * self.row_gap + UNDER;
-        let around = above_notes + notes.len() as f64 * NOTE_ROW + if notes.is_empty() { 0.0 } else { 0.5 * NOTE_ROW };
+        let around = above_notes
+            + notes.len() as f64 * NOTE_ROW
+            + if notes.is_empty() {
+                0.0
+            } else {
+                0.5 * NOTE_ROW
+            };
         let natural: f64 = natural_heights.iter().sum();
         let scale = match asked {
             Some((_, height)) => (height - around) / natural,
             None => (width / self.width).min(1.0),
         };
-        let heights: Vec<f64> = natural_heights.iter().map(|height| (scale * height).max(SHORTEST)).collect();
+        let heights: Vec<f64> = natural_heights
+            .iter()
+            .map(|height| (scale * height).max(SHORTEST))
+            .collect();
         let frames: f64 = heights.iter().sum();
 
         let mut sheet = Picture::new(name, look, (total, frames + around));
         draw_legend(&mut sheet, legend, MARGIN, right, LEGEND_ROW);
         for (row, line) in (1..).map(f64::from).zip(&notes) {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
-            sheet.coloured_text(place, line, NOTE_TEXT, Anchor::Start, Some(Color::from(DARK_GREY)));
+            sheet.coloured_text(
+                place,
+                line,
+                NOTE_TEXT,
+                Anchor::Start,
+                Some(Color::from(DARK_GREY)),
+            );
         }
-        (Page { layout: Self { width, ..self }, heights, top, heading, end: right }, sheet)
+        (
+            Page {
+                layout: Self { width, ..self },
+                heights,
+                top,
+                heading,
+                end: right,
+            },
+            sheet,
+        )
     }
 }
 
@@ -112,7 +153,10 @@ fn wrapped(text: &str, width: f64) -> Vec<String> {
             _ => lines.push(word.to_owned()),
         }
     }
-    lines.into_iter().map(|line| line.replace('\u{a0}', " ")).collect()
+    lines
+        .into_iter()
+        .map(|line| line.replace('\u{a0}', " "))
+        .collect()
 }
 
 /// Where frames lie on a sheet.
@@ -128,13 +172,28 @@ pub(super) struct Page {
 impl Page {
     /// The frame in a row and a column, both from 0. One of several has a letter.
     pub(super) fn frame(&self, row: usize, column: usize, x: Axis, y: Axis) -> Frame {
-        let Layout { columns, width, column_gap, row_gap: gap, .. } = self.layout;
-        let above: f64 = self.heights[..row].iter().map(|height| height + gap + self.heading).sum();
+        let Layout {
+            columns,
+            width,
+            column_gap,
+            row_gap: gap,
+            ..
+        } = self.layout;
+        let above: f64 = self.heights[..row]
+            .iter()
+            .map(|height| height + gap + self.heading)
+            .sum();
         let is_alone = columns * self.heights.len() == 1;
-        let letter = u8::try_from(row * columns + column).ok().and_then(|index| b'a'.checked_add(index));
+        let letter = u8::try_from(row * columns + column)
+            .ok()
+            .and_then(|index| b'a'.checked_add(index));
         let start = |column: usize| MARGIN + column as f64 * (width + column_gap);
         // The same in all columns, so that they are labelled alike.
-        let end = if columns > 1 { self.end.min(start(column + 1) - LABEL_GAP) } else { self.end };
+        let end = if columns > 1 {
+            self.end.min(start(column + 1) - LABEL_GAP)
+        } else {
+            self.end
+        };
         Frame {
             left: start(column) - MARGIN + LEFT,
             room: (start(column), end),
@@ -201,9 +260,14 @@ impl Frame {
     pub(super) fn axes(&self, sheet: &mut Picture) {
         let (right, bottom) = (self.right(), self.bottom());
         let [x_axis, y_axis] =
-            [(&self.x, self.width), (&self.y, self.height)].map(|(axis, length)| match sheet.style {
-                Style::Screen => axis.clone(),
-                Style::Print => axis.clone().with_enough_numbers().without_dense_ticks(length),
+            [(&self.x, self.width), (&self.y, self.height)].map(|(axis, length)| {
+                match sheet.style {
+                    Style::Screen => axis.clone(),
+                    Style::Print => axis
+                        .clone()
+                        .with_enough_numbers()
+                        .without_dense_ticks(length),
+                }
             });
         for (value, length) in ticks(&x_axis) {
             let x = self.x_of(value);
@@ -215,7 +279,12 @@ impl Frame {
             sheet.line(vec![(self.left, y), (self.left + length, y)], AXIS);
             sheet.line(vec![(right, y), (right - length, y)], AXIS);
         }
-        let corners = [(self.left, self.top), (right, self.top), (right, bottom), (self.left, bottom)];
+        let corners = [
+            (self.left, self.top),
+            (right, self.top),
+            (right, bottom),
+            (self.left, bottom),
+        ];
         for corner in 0..4 {
             sheet.line(vec![corners[corner], corners[(corner + 1) % 4]], AXIS);
         }
@@ -234,27 +303,47 @@ impl Frame {
         for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
             let (x, half) = (self.x_of(*value), 0.5 * font::width(number, TICK_TEXT));
             if x - half >= free && x + half <= sheet.scene.width - EDGE {
-                sheet.text((x, bottom + 1.3 * height), number, TICK_TEXT, Anchor::Middle);
+                sheet.text(
+                    (x, bottom + 1.3 * height),
+                    number,
+                    TICK_TEXT,
+                    Anchor::Middle,
+                );
                 free = x + half + 0.3 * height;
             }
         }
         let (label, size) = self.y_label();
         if !label.is_empty() {
-            sheet.text((self.room.0, self.top - self.heading - Y_LABEL_RISE), &label, size, Anchor::Start);
+            sheet.text(
+                (self.room.0, self.top - self.heading - Y_LABEL_RISE),
+                &label,
+                size,
+                Anchor::Start,
+            );
         }
         if self.is_lowest {
             let (start, end) = self.room;
             let (label, size) = fitted_label("", &self.x, end - start);
             let half = 0.5 * font::width(&label, size);
-            let middle = (self.left + 0.5 * self.width).min(end - half).max(start + half);
-            sheet.text((middle, bottom + UNDER - 12.0), &label, size, Anchor::Middle);
+            let middle = (self.left + 0.5 * self.width)
+                .min(end - half)
+                .max(start + half);
+            sheet.text(
+                (middle, bottom + UNDER - 12.0),
+                &label,
+                size,
+                Anchor::Middle,
+            );
         }
     }
 
     /// Letter and label of the y axis, above its numbers, and their size; the letter of a frame with a heading goes there.
     fn y_label(&self) -> (String, u32) {
-        let letter =
-            self.letter.filter(|_| self.heading == 0.0).map(|letter| format!("({letter}) ")).unwrap_or_default();
+        let letter = self
+            .letter
+            .filter(|_| self.heading == 0.0)
+            .map(|letter| format!("({letter}) "))
+            .unwrap_or_default();
         fitted_label(&letter, &self.y, self.y_label_end - self.room.0)
     }
 
@@ -268,7 +357,12 @@ impl Frame {
     pub(super) fn heading(&self, sheet: &mut Picture, text: &str) {
         let y = self.top - 9.0;
         if let Some(letter) = self.letter {
-            sheet.text((self.left - LEFT + MARGIN, y), &format!("({letter})"), LABEL_TEXT, Anchor::Start);
+            sheet.text(
+                (self.left - LEFT + MARGIN, y),
+                &format!("({letter})"),
+                LABEL_TEXT,
+                Anchor::Start,
+            );
         }
         let (text, size) = fitted(text, LEGEND_TEXT, self.room.1 - self.left);
         sheet.text((self.left, y), &text, size, Anchor::Start);
@@ -277,7 +371,9 @@ impl Frame {
 
 /// The largest size, up to one, at which a text fits a width; `None` if it would be smaller than small print.
 pub(super) fn fitting(text: &str, size: u32, room: f64) -> Option<u32> {
-    (NOTE_TEXT..=size).rev().find(|&size| font::width(text, size) <= room)
+    (NOTE_TEXT..=size)
+        .rev()
+        .find(|&size| font::width(text, size) <= room)
 }
 
 /// A text and its size, up to one: smaller where there is little room, and cut at worst.
@@ -293,7 +389,11 @@ fn fitted(text: &str, size: u32, room: f64) -> (String, u32) {
 /// The label of an axis after a letter, in short where there is little room, and its size.
 fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
     let [long, short] = [&axis.label, axis.short_label()].map(|label| format!("{letter}{label}"));
-    let label = if font::width(&long, LABEL_TEXT) <= room { long } else { short };
+    let label = if font::width(&long, LABEL_TEXT) <= room {
+        long
+    } else {
+        short
+    };
     fitted(label.trim_end(), LABEL_TEXT, room)
 }
 
@@ -312,28 +412,61 @@ mod tests {
     fn a_sheet_has_the_size_that_is_asked_for_and_never_frames_too_small_to_read() {
         let layout = Layout::column(500.0);
         let drawn = |style, size| {
-            let look = Look { style, size, note: "small print ".repeat(40) };
+            let look = Look {
+                style,
+                size,
+                note: "small print ".repeat(40),
+            };
             layout.page("", &look, &[], &[300.0, 200.0]).1.size()
         };
         for style in [Style::Screen, Style::Print] {
-            let size = Size { width: 86.0, height: if style == Style::Print { 60.0 } else { 140.0 } };
+            let size = Size {
+                width: 86.0,
+                height: if style == Style::Print { 60.0 } else { 140.0 },
+            };
             let found = drawn(style, Some(size));
-            assert!((found.width - size.width).abs() < 1e-9 && (found.height - size.height).abs() < 1e-9, "{found:?}");
-            let found = drawn(style, Some(Size { width: 5.0, height: 5.0 }));
+            assert!(
+                (found.width - size.width).abs() < 1e-9
+                    && (found.height - size.height).abs() < 1e-9,
+                "{found:?}"
+            );
+            let found = drawn(
+                style,
+                Some(Size {
+                    width: 5.0,
+                    height: 5.0,
+                }),
+            );
             assert!(found.width > 15.0 && found.height > 15.0);
         }
         assert!((drawn(Style::Print, None).width - 86.0).abs() < 1e-9);
     }
 
     /// The text elements of a small figure: where each starts and ends, and what it says.
-    fn texts(style: Style, (width, height): (f64, f64), x: &Axis, y: &Axis) -> (f64, Vec<(f64, f64, String)>) {
-        let look = Look { style, size: Some(Size { width, height }), note: "Sweep test".to_owned() };
-        let layout = Layout { columns: 2, column_gap: LEFT, ..Layout::column(300.0) };
+    fn texts(
+        style: Style,
+        (width, height): (f64, f64),
+        x: &Axis,
+        y: &Axis,
+    ) -> (f64, Vec<(f64, f64, String)>) {
+        let look = Look {
+            style,
+            size: Some(Size { width, height }),
+            note: "Sweep test".to_owned(),
+        };
+        let layout = Layout {
+            columns: 2,
+            column_gap: LEFT,
+            ..Layout::column(300.0)
+        };
         let (page, mut sheet) = layout.page("", &look, &[], &[200.0]);
         for column in 0..2 {
             let frame = page.frame(0, column, x.clone(), y.clone());
             frame.axes(&mut sheet);
-            frame.heading(&mut sheet, "set with a long name, of which much is to be said");
+            frame.heading(
+                &mut sheet,
+                "set with a long name, of which much is to be said",
+            );
         }
         (sheet.scene.width, sheet.texts())
     }
@@ -345,12 +478,22 @@ mod tests {
         let y = Axis::logarithmic(long, 3e-9, 8e-9).with_short_label(Some("tau_sd (s)".to_owned()));
         for size in [(60.0, 40.0), (86.0, 60.0), (178.0, 60.0)] {
             let (width, texts) = texts(Style::Print, size, &x, &y);
-            assert!(texts.iter().all(|(start, end, _)| *start >= 0.0 && *end <= width), "{width} {texts:?}");
+            assert!(
+                texts
+                    .iter()
+                    .all(|(start, end, _)| *start >= 0.0 && *end <= width),
+                "{width} {texts:?}"
+            );
             let is_label = |text: &str| text.starts_with('(') && text.contains("tau");
             let kinds: [&dyn Fn(&str) -> bool; 3] =
-                [&is_label, &|text| text.starts_with("Standard"), &|text| text.starts_with("set")];
+                [&is_label, &|text| text.starts_with("Standard"), &|text| {
+                    text.starts_with("set")
+                }];
             for is_of_kind in kinds {
-                let row: Vec<_> = texts.iter().filter(|(_, _, text)| is_of_kind(text)).collect();
+                let row: Vec<_> = texts
+                    .iter()
+                    .filter(|(_, _, text)| is_of_kind(text))
+                    .collect();
                 assert!(row.len() == 2 && row[0].1 < row[1].0, "{row:?}");
             }
         }
@@ -358,17 +501,28 @@ mod tests {
 
     #[test]
     fn print_has_no_small_print_and_enough_numbers() {
-        let (x, y) = (Axis::logarithmic("x", 40.0, 125.0), Axis::sparse("y", 0.0, 78.0));
+        let (x, y) = (
+            Axis::logarithmic("x", 40.0, 125.0),
+            Axis::sparse("y", 0.0, 78.0),
+        );
         let of = |style| texts(style, (120.0, 80.0), &x, &y).1;
-        let has = |texts: &[(f64, f64, String)], wanted: &str| texts.iter().any(|(_, _, text)| text == wanted);
+        let has = |texts: &[(f64, f64, String)], wanted: &str| {
+            texts.iter().any(|(_, _, text)| text == wanted)
+        };
         let (screen, print) = (of(Style::Screen), of(Style::Print));
         assert!(has(&screen, "Sweep test") && !has(&print, "Sweep test"));
-        assert!(!has(&screen, "80") && has(&print, "80") && has(&print, "20"), "{print:?}");
+        assert!(
+            !has(&screen, "80") && has(&print, "80") && has(&print, "20"),
+            "{print:?}"
+        );
     }
 
     #[test]
     fn small_print_is_wrapped_at_spaces_and_complete() {
-        let lines = wrapped("alpha beta  gamma\u{a0}delta epsilon", font::width("alpha beta g", NOTE_TEXT));
+        let lines = wrapped(
+            "alpha beta  gamma\u{a0}delta epsilon",
+            font::width("alpha beta g", NOTE_TEXT),
+        );
         assert_eq!(lines, ["alpha beta", "gamma delta", "epsilon"]);
         assert_eq!(wrapped("longerthanaline", 10.0), ["longerthanaline"]);
         assert!(wrapped("", 10.0).is_empty());

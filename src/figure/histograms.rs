@@ -23,7 +23,10 @@ const HEIGHT: f64 = 150.0;
 const MAX_MULTIPLES: f64 = 40.0;
 /// Space in a panel for the numbers of the multiples.
 const NUMBERS: f64 = 24.0;
-const BAR: Fill = Fill { ink: "#9db4d6", opacity: 1.0 };
+const BAR: Fill = Fill {
+    ink: "#9db4d6",
+    opacity: 1.0,
+};
 const OUTLINE: Stroke = Stroke::solid(BLACK, 1.3);
 const OVERLAY: Stroke = Stroke::dashed(RED, 2.0, (6.0, 3.5));
 
@@ -42,13 +45,19 @@ struct Panel<'a> {
 
 impl<'a> Panel<'a> {
     fn all_bars(&self) -> impl Iterator<Item = &'a HistogramBin> {
-        self.bars.iter().chain(self.overlay.iter().flatten()).copied()
+        self.bars
+            .iter()
+            .chain(self.overlay.iter().flatten())
+            .copied()
     }
 
     /// What it shows, and the size of the sample.
     fn heading(&self) -> String {
         let count = |bars: &[&HistogramBin]| bars.iter().map(|bar| bar.count).sum::<u64>();
-        let overlay = self.overlay.as_ref().map_or(String::new(), |bars| format!(" and {}", count(bars)));
+        let overlay = self
+            .overlay
+            .as_ref()
+            .map_or(String::new(), |bars| format!(" and {}", count(bars)));
         format!("{}: {}{overlay} intervals", self.title, count(&self.bars))
     }
 }
@@ -67,7 +76,12 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
         })
         .collect();
     let panels = panels(sets, &bins);
-    let (low, high) = bounds(panels.iter().flat_map(Panel::all_bars).flat_map(|bar| [bar.low, bar.high]))?;
+    let (low, high) = bounds(
+        panels
+            .iter()
+            .flat_map(Panel::all_bars)
+            .flat_map(|bar| [bar.low, bar.high]),
+    )?;
     if panels.len() > MAX_PANELS {
         return None;
     }
@@ -75,23 +89,52 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
     let panel = |(index, panel): (usize, &Panel<'_>)| {
         let x = Axis::linear(&format!("Slip interval τ ({unit})"), low.max(0.0), high);
         let period = factor * panel.period.unwrap_or(0.0);
-        let multiples = panel.period.map_or_else(Vec::new, |_| x.multiples_of(period, MAX_MULTIPLES));
+        let multiples = panel
+            .period
+            .map_or_else(Vec::new, |_| x.multiples_of(period, MAX_MULTIPLES));
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
         let density = format!("Probability density (1/{unit})");
         // The numbers cover no bar.
         let head = if multiples.is_empty() { 1.1 } else { 1.25 };
         let y = Axis::sparse(if index == 0 { &density } else { "" }, 0.0, head * highest);
-        let bars = panel.bars.iter().map(|bar| (((bar.low, bar.high), (0.0, bar.density)), Color::from(BAR.ink)));
-        let outlines = outline(&panel.bars).into_iter().map(|line| Layer::Curve(line, OUTLINE));
-        let overlay = panel.overlay.iter().flat_map(|bars| outline(bars)).map(|line| Layer::Curve(line, OVERLAY));
-        let inside = std::iter::once(Layer::Cells(bars.collect(), OVERLAP)).chain(outlines).chain(overlay);
-        let numbered = Layer::Drawn(Box::new(move |sheet, frame| draw_multiples(sheet, frame, multiples, period)));
+        let bars = panel.bars.iter().map(|bar| {
+            (
+                ((bar.low, bar.high), (0.0, bar.density)),
+                Color::from(BAR.ink),
+            )
+        });
+        let outlines = outline(&panel.bars)
+            .into_iter()
+            .map(|line| Layer::Curve(line, OUTLINE));
+        let overlay = panel
+            .overlay
+            .iter()
+            .flat_map(|bars| outline(bars))
+            .map(|line| Layer::Curve(line, OVERLAY));
+        let inside = std::iter::once(Layer::Cells(bars.collect(), OVERLAP))
+            .chain(outlines)
+            .chain(overlay);
+        let numbered = Layer::Drawn(Box::new(move |sheet, frame| {
+            draw_multiples(sheet, frame, multiples, period)
+        }));
         let layers = vec![numbered, Layer::Inside(inside.collect())];
-        panel::Panel { heading: Some(panel.heading()), ..panel::Panel::new(HEIGHT, x, y, layers) }
+        panel::Panel {
+            heading: Some(panel.heading()),
+            ..panel::Panel::new(HEIGHT, x, y, layers)
+        }
     };
-    let layout = Layout { row_gap: 10.0, ..Layout::column(WIDTH) };
+    let layout = Layout {
+        row_gap: 10.0,
+        ..Layout::column(WIDTH)
+    };
     let drawn = panels.iter().enumerate().map(panel).collect();
-    Some(panel::draw("tau-histograms", look, layout, &legend(&panels), drawn))
+    Some(panel::draw(
+        "tau-histograms",
+        look,
+        layout,
+        &legend(&panels),
+        drawn,
+    ))
 }
 
 /// A panel per set by rising frequency, as in Fig. 2. One of identical contacts goes onto the panel of the set that it
@@ -101,27 +144,45 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
     let is_identical = |set: &&SetRow| set.parameters.threshold_deviation == 0.0;
     let (identical, others): (Vec<&SetRow>, Vec<&SetRow>) = sets.iter().partition(is_identical);
     let is_twin = |identical: &SetRow, other: &SetRow| {
-        *identical.parameters == Parameters { threshold_deviation: 0.0, ..other.parameters.parameters.clone() }
+        *identical.parameters
+            == Parameters {
+                threshold_deviation: 0.0,
+                ..other.parameters.parameters.clone()
+            }
     };
-    let is_shown = |set: &&SetRow| !is_identical(set) || !others.iter().any(|other| is_twin(set, other));
+    let is_shown =
+        |set: &&SetRow| !is_identical(set) || !others.iter().any(|other| is_twin(set, other));
     // Sets come in the order of Δ and then T.
     let mut shown: Vec<&SetRow> = sets.iter().filter(is_shown).collect();
     shown.sort_by(|left, right| {
-        left.parameters.modulation_frequency().total_cmp(&right.parameters.modulation_frequency())
+        left.parameters
+            .modulation_frequency()
+            .total_cmp(&right.parameters.modulation_frequency())
     });
     let mut others = differing(&shown.iter().copied());
     others.retain(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T));
     let panel = |set: &SetRow| {
-        let settings = others.iter().map(|&symbol| setting(&set.parameters, symbol));
-        let twin = identical.iter().find(|twin| !is_identical(&set) && is_twin(twin, set));
+        let settings = others
+            .iter()
+            .map(|&symbol| setting(&set.parameters, symbol));
+        let twin = identical
+            .iter()
+            .find(|twin| !is_identical(&set) && is_twin(twin, set));
         Panel {
-            title: std::iter::once(modulation(&set.parameters)).chain(settings).collect::<Vec<_>>().join(", "),
+            title: std::iter::once(modulation(&set.parameters))
+                .chain(settings)
+                .collect::<Vec<_>>()
+                .join(", "),
             bars: bars(set),
             overlay: twin.map(|twin| bars(twin)),
             period: set.parameters.modulation_period,
         }
     };
-    shown.into_iter().map(panel).filter(|panel| panel.all_bars().next().is_some()).collect()
+    shown
+        .into_iter()
+        .map(panel)
+        .filter(|panel| panel.all_bars().next().is_some())
+        .collect()
 }
 
 fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
@@ -129,17 +190,25 @@ fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
     let overlay = has_overlay.then(|| entry(Mark::Line(OVERLAY), "identical contacts, Δfₛ = 0"));
     let multiples = panels.iter().any(|panel| panel.period.is_some());
     let multiples = multiples.then(|| entry(Mark::Line(REFERENCE), "τ = nT"));
-    [entry(Mark::Patch(BAR), "slips of all seeds")].into_iter().chain(overlay).chain(multiples).collect()
+    [entry(Mark::Patch(BAR), "slips of all seeds")]
+        .into_iter()
+        .chain(overlay)
+        .chain(multiples)
+        .collect()
 }
 
 /// The multiples of a period, with the numbers for which there is room.
 fn draw_multiples(sheet: &mut Picture, frame: &Frame, multiples: Vec<f64>, period: f64) {
     let mut free = f64::NEG_INFINITY;
     for multiple in multiples {
-        let (x, n) = (frame.x_of(multiple), format!("{}", (multiple / period).round()));
+        let (x, n) = (
+            frame.x_of(multiple),
+            format!("{}", (multiple / period).round()),
+        );
         let half = 0.5 * font::width(&n, LEGEND_TEXT);
         // Before the first number, where there is room.
-        let is_led = free == f64::NEG_INFINITY && x - half - font::width("n = ", LEGEND_TEXT) > frame.left + 4.0;
+        let is_led = free == f64::NEG_INFINITY
+            && x - half - font::width("n = ", LEGEND_TEXT) > frame.left + 4.0;
         let lead = if is_led { "n = " } else { "" };
         let mut top = frame.top;
         if x - half > free.max(frame.left + 4.0) && x + half < frame.right() - 4.0 {
@@ -155,13 +224,19 @@ fn draw_multiples(sheet: &mut Picture, frame: &Frame, multiples: Vec<f64>, perio
 /// The upper edge of bars, down to zero where some are left out.
 fn outline(bars: &[&HistogramBin]) -> Vec<Vec<Place>> {
     // Edges of neighbours differ by rounding only.
-    let are_neighbours =
-        |left: &&HistogramBin, right: &&HistogramBin| right.low - left.high < 0.01 * (left.high - left.low);
+    let are_neighbours = |left: &&HistogramBin, right: &&HistogramBin| {
+        right.low - left.high < 0.01 * (left.high - left.low)
+    };
     bars.chunk_by(are_neighbours)
         .map(|run| {
             let (first, last) = (run[0], run[run.len() - 1]);
-            let tops = run.iter().flat_map(|bar| [(bar.low, bar.density), (bar.high, bar.density)]);
-            std::iter::once((first.low, 0.0)).chain(tops).chain([(last.high, 0.0)]).collect()
+            let tops = run
+                .iter()
+                .flat_map(|bar| [(bar.low, bar.density), (bar.high, bar.density)]);
+            std::iter::once((first.low, 0.0))
+                .chain(tops)
+                .chain([(last.high, 0.0)])
+                .collect()
         })
         .collect()
 }
@@ -178,11 +253,21 @@ mod tests {
             modulation_period: frequency.map(|frequency| 1.0 / frequency),
             ..Parameters::default()
         };
-        SetRow { set_id: id.to_owned(), parameters: Selected::new(parameters), ..SetRow::default() }
+        SetRow {
+            set_id: id.to_owned(),
+            parameters: Selected::new(parameters),
+            ..SetRow::default()
+        }
     }
 
     fn bin(id: &str, low: f64, high: f64, density: f64) -> HistogramBin {
-        HistogramBin { set_id: id.to_owned(), low, high, count: 1, density }
+        HistogramBin {
+            set_id: id.to_owned(),
+            low,
+            high,
+            count: 1,
+            density,
+        }
     }
 
     #[test]
@@ -200,12 +285,24 @@ mod tests {
         assert_eq!(panels[0].bars, [&bins[1]]);
         assert_eq!(panels[0].overlay, Some(vec![&bins[0]]));
         assert_eq!(panels[1].title, "Δ = 1 µm, 1/T = 29 Hz");
-        assert_eq!((panels[2].period, panels[2].overlay.as_ref()), (Some(1.0 / 58.0), None));
+        assert_eq!(
+            (panels[2].period, panels[2].overlay.as_ref()),
+            (Some(1.0 / 58.0), None)
+        );
         let svg = histograms(&sets, &bins, &Look::default()).unwrap().svg();
-        for text in ["(a)", "(c)", "Δ = 0: 1 and 1 intervals", "Δ = 1 µm, 1/T = 58 Hz: 1 intervals", "τ = nT"] {
+        for text in [
+            "(a)",
+            "(c)",
+            "Δ = 0: 1 and 1 intervals",
+            "Δ = 1 µm, 1/T = 58 Hz: 1 intervals",
+            "τ = nT",
+        ] {
             assert!(svg.contains(&format!(">{text}<")), "{text}");
         }
-        assert!(histograms(&sets, &[], &Look::default()).is_none() && histograms(&[], &[], &Look::default()).is_none());
+        assert!(
+            histograms(&sets, &[], &Look::default()).is_none()
+                && histograms(&[], &[], &Look::default()).is_none()
+        );
         let five = [1.0, 2.0, 3.0, 4.0, 5.0].map(|frequency| set("58", 6.9e-3, Some(frequency)));
         assert!(
             histograms(&five[..4], &bins, &Look::default()).is_some()
@@ -228,7 +325,10 @@ mod tests {
             .map(|(low, high, density)| bin("", low, high, density));
         let outlines = outline(&bars.iter().collect::<Vec<_>>());
         assert_eq!(outlines.len(), 2);
-        assert_eq!(outlines[1], [(0.5, 0.0), (0.5, 1.0), (0.6, 1.0), (0.6, 0.0)]);
+        assert_eq!(
+            outlines[1],
+            [(0.5, 0.0), (0.5, 1.0), (0.6, 1.0), (0.6, 0.0)]
+        );
         assert_eq!(outlines[0].len(), 6);
     }
 }

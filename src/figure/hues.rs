@@ -17,11 +17,22 @@ pub(super) enum Hues {
 
 impl Hues {
     /// For these values of a quantity with this label, each called as `word` says.
-    pub(super) fn of(label: &str, values: impl Iterator<Item = f64>, word: impl Fn(f64) -> String) -> Self {
+    pub(super) fn of(
+        label: &str,
+        values: impl Iterator<Item = f64>,
+        word: impl Fn(f64) -> String,
+    ) -> Self {
         let values = ascending(values.filter(|value| value.is_finite()));
         match values[..] {
-            [low, .., high] if values.len() > INKS.len() => Self::Scale(Axis::spanning(label, (low, high))),
-            _ => Self::Inks(values.into_iter().map(|value| (value, word(value))).collect()),
+            [low, .., high] if values.len() > INKS.len() => {
+                Self::Scale(Axis::spanning(label, (low, high)))
+            }
+            _ => Self::Inks(
+                values
+                    .into_iter()
+                    .map(|value| (value, word(value)))
+                    .collect(),
+            ),
         }
     }
 
@@ -30,12 +41,23 @@ impl Hues {
             Self::Inks(values) => {
                 // What is off is black, so that others have the colours that they have without it.
                 let first = usize::from(values.first().is_some_and(|(least, _)| *least == 0.0));
-                let index = values.iter().position(|(known, _)| is_same(*known, value)).unwrap_or(0);
-                if index < first { BLACK } else { INKS[(index - first) % INKS.len()] }
+                let index = values
+                    .iter()
+                    .position(|(known, _)| is_same(*known, value))
+                    .unwrap_or(0);
+                if index < first {
+                    BLACK
+                } else {
+                    INKS[(index - first) % INKS.len()]
+                }
             }
             Self::Scale(axis) => {
                 let steps = SCALE.len() as f64;
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "an index"
+                )]
                 let step = (axis.place(value).clamp(0.0, 1.0) * steps).min(steps - 1.0) as usize;
                 SCALE[step]
             }
@@ -44,15 +66,22 @@ impl Hues {
 
     /// Entries of the legend, with dots of this radius, of values that are shown.
     pub(super) fn entries(&self, radius: f64, is_shown: impl Fn(f64) -> bool) -> Vec<Entry> {
-        let Self::Inks(values) = self else { return Vec::new() };
+        let Self::Inks(values) = self else {
+            return Vec::new();
+        };
         let values = values.iter().filter(|(value, _)| is_shown(*value));
-        values.map(|(value, name)| entry(Mark::Dot(Dot::solid(self.ink(*value), radius)), name)).collect()
+        values
+            .map(|(value, name)| entry(Mark::Dot(Dot::solid(self.ink(*value), radius)), name))
+            .collect()
     }
 
     /// The colour bar, if there is a scale.
     pub(super) fn bar(&self) -> Option<ColourBar> {
         let Self::Scale(axis) = self else { return None };
-        Some(ColourBar { colours: SCALE.map(Color::from).to_vec(), ..ColourBar::of_axis(axis, shade) })
+        Some(ColourBar {
+            colours: SCALE.map(Color::from).to_vec(),
+            ..ColourBar::of_axis(axis, shade)
+        })
     }
 }
 
@@ -62,13 +91,23 @@ mod tests {
 
     #[test]
     fn few_values_have_inks_and_many_a_scale() {
-        let hues = |count: u32| Hues::of("", (0..count).map(|step| f64::from(1 << step)), |value| value.to_string());
+        let hues = |count: u32| {
+            Hues::of("", (0..count).map(|step| f64::from(1 << step)), |value| {
+                value.to_string()
+            })
+        };
         let few = hues(3);
-        assert_eq!([1.0, 2.0, 4.0].map(|value| few.ink(value)), [INKS[0], INKS[1], INKS[2]]);
+        assert_eq!(
+            [1.0, 2.0, 4.0].map(|value| few.ink(value)),
+            [INKS[0], INKS[1], INKS[2]]
+        );
         assert!(few.entries(1.0, |_| true).len() == 3 && few.bar().is_none());
         let many = hues(7);
         assert!(many.entries(1.0, |_| true).is_empty() && many.bar().is_some());
-        assert_eq!((many.ink(1.0), many.ink(8.0), many.ink(64.0)), (SCALE[0], SCALE[5], SCALE[9]));
+        assert_eq!(
+            (many.ink(1.0), many.ink(8.0), many.ink(64.0)),
+            (SCALE[0], SCALE[5], SCALE[9])
+        );
         assert!(SCALE.contains(&many.ink(f64::NAN)), "no panic");
     }
 }

@@ -12,7 +12,11 @@ use crate::reduce::Point;
 use crate::sweep::label;
 
 const RADIUS: f64 = 1.8;
-const OTHER: Dot = Dot { ink: LIGHT_GREY, radius: RADIUS, opacity: 0.6 };
+const OTHER: Dot = Dot {
+    ink: LIGHT_GREY,
+    radius: RADIUS,
+    opacity: 0.6,
+};
 /// Whole numbers whose lines can be distinguished.
 const LINES: u32 = 12;
 
@@ -23,7 +27,10 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         let (period, interval) = (point.period?, point.interval?);
         Some((period, interval / period))
     };
-    let mut slips: Vec<(&Point, Place)> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
+    let mut slips: Vec<(&Point, Place)> = points
+        .iter()
+        .filter_map(|point| Some((point, place(point)?)))
+        .collect();
     let (x_label, factor) = axis_of("T", slips.iter().map(|slip| slip.1.0));
     for slip in &mut slips {
         slip.1.0 *= factor;
@@ -33,33 +40,68 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;
     let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
     let few = "τ / T: up to 12 periods";
-    let few = Axis::linear(few, 0.0, f64::from(LINES) + 0.5).with_ticks_at(few, (0..=LINES).map(f64::from));
+    let few = Axis::linear(few, 0.0, f64::from(LINES) + 0.5)
+        .with_ticks_at(few, (0..=LINES).map(f64::from));
 
     let phased = slips.iter().filter(|slip| slip.0.has_phase);
     let phased: Vec<f64> = phased.map(|slip| slip.0.drive_velocity).collect();
     // The same colours whatever has a phase.
     let velocity = label("V0");
-    let hues = Hues::of(&velocity.short("m/s"), points.iter().map(|point| point.drive_velocity), |value| {
-        velocity.setting(value)
-    });
+    let hues = Hues::of(
+        &velocity.short("m/s"),
+        points.iter().map(|point| point.drive_velocity),
+        |value| velocity.setting(value),
+    );
     let mut entries: Vec<Entry> = hues.entries(3.0, |value| phased.contains(&value));
     if hues.bar().is_some() {
-        entries.push(entry(Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)), "slips of sets with a phase"));
+        entries.push(entry(
+            Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)),
+            "slips of sets with a phase",
+        ));
     }
     if slips.iter().any(|slip| !slip.0.has_phase) {
-        entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "slips of sets without a phase"));
+        entries.push(entry(
+            Mark::Dot(Dot { ink: GREY, ..OTHER }),
+            "slips of sets without a phase",
+        ));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
-        let mut layers: Vec<Layer<'_>> = (1..=lines).map(|n| Layer::Level(f64::from(n), GRID)).collect();
-        let others = slips.iter().filter(|slip| !slip.0.has_phase).map(|slip| slip.1);
+        let mut layers: Vec<Layer<'_>> = (1..=lines)
+            .map(|n| Layer::Level(f64::from(n), GRID))
+            .collect();
+        let others = slips
+            .iter()
+            .filter(|slip| !slip.0.has_phase)
+            .map(|slip| slip.1);
         layers.push(Layer::Dots(others.collect(), OTHER));
-        layers.extend(slips.iter().filter(|slip| slip.0.has_phase).map(|&(point, place)| {
-            Layer::Dots(vec![place], Dot { ink: hues.ink(point.drive_velocity), radius: RADIUS, opacity: 0.8 })
-        }));
-        Panel { bar: hues.bar(), ..Panel::inside(height, x.clone(), y, layers) }
+        layers.extend(
+            slips
+                .iter()
+                .filter(|slip| slip.0.has_phase)
+                .map(|&(point, place)| {
+                    Layer::Dots(
+                        vec![place],
+                        Dot {
+                            ink: hues.ink(point.drive_velocity),
+                            radius: RADIUS,
+                            opacity: 0.8,
+                        },
+                    )
+                }),
+        );
+        Panel {
+            bar: hues.bar(),
+            ..Panel::inside(height, x.clone(), y, layers)
+        }
     });
-    Some(panel::draw("tau-T", look, Layout::column(560.0), &entries, panels.into()))
+    Some(panel::draw(
+        "tau-T",
+        look,
+        Layout::column(560.0),
+        &entries,
+        panels.into(),
+    ))
 }
 
 #[cfg(test)]
@@ -88,15 +130,38 @@ mod tests {
             let svg = intervals(points, &Look::default()).unwrap().svg();
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
         };
-        assert!(texts(&points, &["V₀ = 10⁻⁴ m/s", "slips of sets without a phase", "τ = nT", "4", "12"]));
+        assert!(texts(
+            &points,
+            &[
+                "V₀ = 10⁻⁴ m/s",
+                "slips of sets without a phase",
+                "τ = nT",
+                "4",
+                "12"
+            ]
+        ));
         let first = points[0];
-        points.extend((1..9).map(|step| Point { drive_velocity: 1e-6 * f64::from(1 << step), ..first }));
-        assert!(texts(&points, &["V₀ (m/s)", "slips of sets with a phase", "slips of sets without a phase"]));
+        points.extend((1..9).map(|step| Point {
+            drive_velocity: 1e-6 * f64::from(1 << step),
+            ..first
+        }));
+        assert!(texts(
+            &points,
+            &[
+                "V₀ (m/s)",
+                "slips of sets with a phase",
+                "slips of sets without a phase"
+            ]
+        ));
     }
 
     #[test]
     fn without_modulation_there_is_nothing_to_draw() {
-        let still = Point { period: None, periods: None, ..point(1, false) };
+        let still = Point {
+            period: None,
+            periods: None,
+            ..point(1, false)
+        };
         assert!(intervals(&[still], &Look::default()).is_none());
     }
 }

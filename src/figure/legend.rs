@@ -64,13 +64,24 @@ pub(super) fn legend_rows(entries: &[Entry], room: f64) -> Vec<Vec<&Entry>> {
 }
 
 /// Draws entries at the top of a sheet, between two edges.
-pub(super) fn draw_legend(sheet: &mut Picture, entries: &[Entry], left: f64, right: f64, row_height: f64) {
+pub(super) fn draw_legend(
+    sheet: &mut Picture,
+    entries: &[Entry],
+    left: f64,
+    right: f64,
+    row_height: f64,
+) {
     for (row, entries) in legend_rows(entries, right - left).into_iter().enumerate() {
         let middle = TOP + (row as f64 + 0.5) * row_height;
         let mut start = left;
         for entry in entries {
             draw_mark(sheet, entry.0, (start, middle));
-            sheet.centred_text((start + mark_width(entry.0) + GAP, middle), &entry.1, LEGEND_TEXT, Anchor::Start);
+            sheet.centred_text(
+                (start + mark_width(entry.0) + GAP, middle),
+                &entry.1,
+                LEGEND_TEXT,
+                Anchor::Start,
+            );
             start += width(entry) + ENTRY_GAP;
         }
     }
@@ -81,7 +92,11 @@ fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
     match mark {
         Mark::Dot(dot) => {
             // A single faint dot could not be seen.
-            let dot = Dot { radius: dot.radius.max(3.0), opacity: dot.opacity.max(0.7), ..dot };
+            let dot = Dot {
+                radius: dot.radius.max(3.0),
+                opacity: dot.opacity.max(0.7),
+                ..dot
+            };
             sheet.discs([centre], dot);
         }
         Mark::Ring(ink, radius, hole) => {
@@ -89,7 +104,10 @@ fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
             sheet.discs([centre], Dot::solid(WHITE, hole));
         }
         Mark::Bar(dot) => {
-            sheet.line(vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)], Stroke::solid(dot.ink, 1.6));
+            sheet.line(
+                vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)],
+                Stroke::solid(dot.ink, 1.6),
+            );
             sheet.discs([centre], dot);
         }
         Mark::Line(stroke) => sheet.line(vec![(start, middle), (end, middle)], stroke),
@@ -104,11 +122,20 @@ mod tests {
 
     #[test]
     fn a_legend_takes_as_many_rows_as_it_needs() {
-        let entries: Vec<Entry> =
-            ["short", "a longer text", "another"].map(|text| entry(Mark::Line(GRID), text)).to_vec();
-        let rows = |room: f64| legend_rows(&entries, room).iter().map(Vec::len).collect::<Vec<_>>();
+        let entries: Vec<Entry> = ["short", "a longer text", "another"]
+            .map(|text| entry(Mark::Line(GRID), text))
+            .to_vec();
+        let rows = |room: f64| {
+            legend_rows(&entries, room)
+                .iter()
+                .map(Vec::len)
+                .collect::<Vec<_>>()
+        };
         assert_eq!(rows(1000.0), [3]);
-        assert_eq!(rows(width(&entries[0]) + ENTRY_GAP + width(&entries[1])), [2, 1]);
+        assert_eq!(
+            rows(width(&entries[0]) + ENTRY_GAP + width(&entries[1])),
+            [2, 1]
+        );
         assert_eq!(rows(1.0), [1, 1, 1]);
         assert!(legend_rows(&[], 100.0).is_empty());
     }

@@ -41,21 +41,38 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     // The drive velocity is the x axis wherever it is one.
     let [horizontal, vertical] = match differing(&sets.iter())[..] {
         [first, Symbol::V0] => [Symbol::V0, first],
-        [first, second] if first == Symbol::Delta || ![first, second].contains(&Symbol::T) => [first, second],
+        [first, second] if first == Symbol::Delta || ![first, second].contains(&Symbol::T) => {
+            [first, second]
+        }
         _ => return None,
     };
     let is_locking = vertical == Symbol::T;
-    let columns = if is_locking { [period_column(sets), "Delta"] } else { [horizontal.key(), vertical.key()] };
+    let columns = if is_locking {
+        [period_column(sets), "Delta"]
+    } else {
+        [horizontal.key(), vertical.key()]
+    };
     let of = |column: &str| Asked::of(sets, "map", column).ok();
     let [x, y] = [of(columns[0])?, of(columns[1])?];
     let map = Map::of(&x, &y, if is_locking { 8 } else { 4 })?;
-    let (x_axis, y_axis) = (map.columns.axis(&x.axis_label()), map.rows.axis(&y.axis_label()));
-    let modulated = sets.iter().find(|set| set.parameters.modulation_period.is_some());
+    let (x_axis, y_axis) = (
+        map.columns.axis(&x.axis_label()),
+        map.rows.axis(&y.axis_label()),
+    );
+    let modulated = sets
+        .iter()
+        .find(|set| set.parameters.modulation_period.is_some());
     let lines = || match modulated.filter(|_| is_locking) {
         Some(set) => {
-            let amplitude = |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
-            let places: Vec<Place> = x_axis.evenly_placed(200).map(|place| (place, amplitude(place))).collect();
-            [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke)).into()
+            let amplitude =
+                |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
+            let places: Vec<Place> = x_axis
+                .evenly_placed(200)
+                .map(|place| (place, amplitude(place)))
+                .collect();
+            [CASING, LINE]
+                .map(|stroke| Layer::Curve(places.clone(), stroke))
+                .into()
         }
         None => map.borders(|set| sets[set].regime, BORDER),
     };
@@ -65,14 +82,24 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let is_known = |set: &usize| !is_of_periods || sets[*set].has_phase;
         let number = |set: usize| quantity.number(set).filter(|_| is_known(&set));
         let ends = || {
-            bounds((0..sets.len()).filter_map(number).map(|n| if is_of_periods { n.min(MAX_PERIODS + 1.0) } else { n }))
+            bounds((0..sets.len()).filter_map(number).map(|n| {
+                if is_of_periods {
+                    n.min(MAX_PERIODS + 1.0)
+                } else {
+                    n
+                }
+            }))
         };
         let label = quantity.axis_label();
         let scale = match column {
             "periods" => {
                 let (first, last) = ends().unwrap_or_default();
                 let steps = (last - first).max(1.0);
-                Axis::linear("n = τ / T", first - steps * FIRST_SHADE / (1.0 - FIRST_SHADE), first + steps)
+                Axis::linear(
+                    "n = τ / T",
+                    first - steps * FIRST_SHADE / (1.0 - FIRST_SHADE),
+                    first + steps,
+                )
             }
             "resultant_excess" => {
                 let (low, high) = ends()?;
@@ -82,42 +109,105 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
             "slip_share" | "locking_index" => Axis::linear(&label, 0.0, 1.0),
             _ => {
                 let ends = ends()?;
-                Axis::spanning(&label, if is_wide(ends) { ends } else { (ends.0.min(0.0), ends.1) })
+                Axis::spanning(
+                    &label,
+                    if is_wide(ends) {
+                        ends
+                    } else {
+                        (ends.0.min(0.0), ends.1)
+                    },
+                )
             }
         };
-        let colour = if column == "resultant_excess" { diverging } else { shade };
+        let colour = if column == "resultant_excess" {
+            diverging
+        } else {
+            shade
+        };
         let mut bar = ColourBar::of_axis(&scale, colour);
         if is_of_periods {
             let (first, last) = ends().unwrap_or_default();
-            let all = || (0..=u32::MAX).map(|step| first + f64::from(step)).take_while(|&n| n <= last);
-            let text = |n: f64| if n > MAX_PERIODS { format!(">{MAX_PERIODS}") } else { n.to_string() };
+            let all = || {
+                (0..=u32::MAX)
+                    .map(|step| first + f64::from(step))
+                    .take_while(|&n| n <= last)
+            };
+            let text = |n: f64| {
+                if n > MAX_PERIODS {
+                    format!(">{MAX_PERIODS}")
+                } else {
+                    n.to_string()
+                }
+            };
             bar.colours = all().map(|n| shade(scale.place(n))).collect();
-            bar.ticks = all().map(|n| ((n - first + 0.5) / (last - first + 1.0), text(n))).collect();
+            bar.ticks = all()
+                .map(|n| ((n - first + 0.5) / (last - first + 1.0), text(n)))
+                .collect();
         }
         let none = is_of_periods.then(|| Color::from(FREE));
-        let cells = map.coloured(|set| number(set).map(|n| colour(scale.place(n))).or_else(|| none.clone()));
+        let cells = map.coloured(|set| {
+            number(set)
+                .map(|n| colour(scale.place(n)))
+                .or_else(|| none.clone())
+        });
         let word = |set: usize| match column {
             "periods" => number(set).map(|n| (n.to_string(), scale.place(n))),
-            "slip_share" => sets[set]
-                .regime
-                .map(|regime| (regime.word().to_owned(), f64::from(u8::from(regime != Regime::StickSlip)))),
+            "slip_share" => sets[set].regime.map(|regime| {
+                (
+                    regime.word().to_owned(),
+                    f64::from(u8::from(regime != Regime::StickSlip)),
+                )
+            }),
             _ => None,
         };
-        let layers = std::iter::once(Layer::Inside(std::iter::once(cells).chain(lines()).collect()));
+        let layers = std::iter::once(Layer::Inside(
+            std::iter::once(cells).chain(lines()).collect(),
+        ));
         let layers = layers.chain(map.words(word)).collect();
         let height = if is_locking { 280.0 } else { 220.0 };
-        Some(Panel { bar: Some(bar), ..Panel::new(height, x_axis.clone(), y_axis.clone(), layers) })
+        Some(Panel {
+            bar: Some(bar),
+            ..Panel::new(height, x_axis.clone(), y_axis.clone(), layers)
+        })
     };
     let (name, width, legend, found) = if is_locking {
-        let free = entry(Mark::Patch(Fill { ink: FREE, opacity: 1.0 }), "no phase");
-        let legend = vec![entry(Mark::Line(LINE), "η = 1; above, the drive turns back"), free];
-        ("locking-map", 560.0, legend, ["periods", "locking_index", "resultant_excess"])
+        let free = entry(
+            Mark::Patch(Fill {
+                ink: FREE,
+                opacity: 1.0,
+            }),
+            "no phase",
+        );
+        let legend = vec![
+            entry(Mark::Line(LINE), "η = 1; above, the drive turns back"),
+            free,
+        ];
+        (
+            "locking-map",
+            560.0,
+            legend,
+            ["periods", "locking_index", "resultant_excess"],
+        )
     } else {
-        let borders = entry(Mark::Line(BORDER), "borders of stick-slip, mixed, sliding; no slips where white");
-        ("regime-map", 490.0, vec![borders], ["slip_share", "mean_friction", "tau_mean"])
+        let borders = entry(
+            Mark::Line(BORDER),
+            "borders of stick-slip, mixed, sliding; no slips where white",
+        );
+        (
+            "regime-map",
+            490.0,
+            vec![borders],
+            ["slip_share", "mean_friction", "tau_mean"],
+        )
     };
     let panels = found.into_iter().filter_map(panel).collect();
-    Some(panel::draw(name, look, Layout::column(width), &legend, panels))
+    Some(panel::draw(
+        name,
+        look,
+        Layout::column(width),
+        &legend,
+        panels,
+    ))
 }
 
 struct Map {
@@ -131,12 +221,23 @@ impl Map {
     /// `None` for fewer values of either quantity than `min_values`, or if less than half of their grid is filled.
     fn of(x: &Asked<'_>, y: &Asked<'_>, min_values: usize) -> Option<Self> {
         let [columns, rows] = [x, y].map(|asked| Grid::of(asked.distinct().collect()));
-        let position = |set| Some((columns.index_of(x.number(set)?), rows.index_of(y.number(set)?)));
-        let sets: Vec<(usize, Position)> =
-            (0..x.column.values.numbers.len()).filter_map(|set| Some((set, position(set)?))).collect();
+        let position = |set| {
+            Some((
+                columns.index_of(x.number(set)?),
+                rows.index_of(y.number(set)?),
+            ))
+        };
+        let sets: Vec<(usize, Position)> = (0..x.column.values.numbers.len())
+            .filter_map(|set| Some((set, position(set)?)))
+            .collect();
         let counts = [columns.count(), rows.count()];
-        let is_grid = counts.iter().all(|count| *count >= min_values) && 2 * sets.len() >= counts[0] * counts[1];
-        is_grid.then_some(Self { columns, rows, sets })
+        let is_grid = counts.iter().all(|count| *count >= min_values)
+            && 2 * sets.len() >= counts[0] * counts[1];
+        is_grid.then_some(Self {
+            columns,
+            rows,
+            sets,
+        })
     }
 
     fn cell(&self, (column, row): Position) -> Cell {
@@ -145,34 +246,69 @@ impl Map {
 
     /// The sets that have a colour.
     fn coloured<'l>(&self, colour: impl Fn(usize) -> Option<Color>) -> Layer<'l> {
-        let cells = self.sets.iter().filter_map(|&(set, position)| Some((self.cell(position), colour(set)?)));
+        let cells = self
+            .sets
+            .iter()
+            .filter_map(|&(set, position)| Some((self.cell(position), colour(set)?)));
         Layer::Cells(cells.collect(), OVERLAP)
     }
 
     /// Lines between neighbours that are of different kinds.
-    fn borders<'l, K: PartialEq>(&self, kind: impl Fn(usize) -> K, stroke: Stroke) -> Vec<Layer<'l>> {
-        let kinds: BTreeMap<Position, K> = self.sets.iter().map(|&(set, position)| (position, kind(set))).collect();
-        let differs = |position, next| kinds.get(&next).is_some_and(|other| *other != kinds[&position]);
+    fn borders<'l, K: PartialEq>(
+        &self,
+        kind: impl Fn(usize) -> K,
+        stroke: Stroke,
+    ) -> Vec<Layer<'l>> {
+        let kinds: BTreeMap<Position, K> = self
+            .sets
+            .iter()
+            .map(|&(set, position)| (position, kind(set)))
+            .collect();
+        let differs = |position, next| {
+            kinds
+                .get(&next)
+                .is_some_and(|other| *other != kinds[&position])
+        };
         let border = |&(_, (column, row)): &(usize, Position)| {
             let ((left, right), (bottom, top)) = self.cell((column, row));
-            let upright = differs((column, row), (column + 1, row)).then(|| vec![(right, bottom), (right, top)]);
-            let level = differs((column, row), (column, row + 1)).then(|| vec![(left, top), (right, top)]);
+            let upright = differs((column, row), (column + 1, row))
+                .then(|| vec![(right, bottom), (right, top)]);
+            let level =
+                differs((column, row), (column, row + 1)).then(|| vec![(left, top), (right, top)]);
             upright.into_iter().chain(level)
         };
-        self.sets.iter().flat_map(border).map(|line| Layer::Curve(line, stroke)).collect()
+        self.sets
+            .iter()
+            .flat_map(border)
+            .map(|line| Layer::Curve(line, stroke))
+            .collect()
     }
 
     /// The words of regions with equal ones, each with its shade.
-    fn words<'l>(&self, word: impl Fn(usize) -> Option<(String, f64)>) -> impl Iterator<Item = Layer<'l>> {
-        let words = self.sets.iter().filter_map(|&(set, position)| Some((position, word(set)?))).collect();
-        middles(&words).into_iter().map(|(position, (text, share))| Layer::Word(self.cell(position), text, share))
+    fn words<'l>(
+        &self,
+        word: impl Fn(usize) -> Option<(String, f64)>,
+    ) -> impl Iterator<Item = Layer<'l>> {
+        let words = self
+            .sets
+            .iter()
+            .filter_map(|&(set, position)| Some((position, word(set)?)))
+            .collect();
+        middles(&words)
+            .into_iter()
+            .map(|(position, (text, share))| Layer::Word(self.cell(position), text, share))
     }
 }
 
 /// The innermost cell of each region that has room for its word. A region is what hangs together of equal words.
 fn middles<K: PartialEq + Clone>(words: &BTreeMap<Position, K>) -> Vec<(Position, K)> {
     let around = |(column, row): Position| {
-        [(column + 1, row), (column.wrapping_sub(1), row), (column, row + 1), (column, row.wrapping_sub(1))]
+        [
+            (column + 1, row),
+            (column.wrapping_sub(1), row),
+            (column, row + 1),
+            (column, row.wrapping_sub(1)),
+        ]
     };
     let mut left: BTreeSet<Position> = words.keys().copied().collect();
     let mut found = Vec::new();
@@ -189,15 +325,22 @@ fn middles<K: PartialEq + Clone>(words: &BTreeMap<Position, K>) -> Vec<(Position
         // Layer by layer, as long as something is left.
         let mut across = 1;
         loop {
-            let inner: BTreeSet<Position> =
-                region.iter().copied().filter(|&cell| around(cell).iter().all(|next| region.contains(next))).collect();
+            let inner: BTreeSet<Position> = region
+                .iter()
+                .copied()
+                .filter(|&cell| around(cell).iter().all(|next| region.contains(next)))
+                .collect();
             if inner.is_empty() {
                 break;
             }
             (region, across) = (inner, across + 2);
         }
         let middle = region.iter().nth(region.len() / 2).copied();
-        found.extend(middle.filter(|_| across >= MIN_ACROSS).map(|cell| (cell, word.clone())));
+        found.extend(
+            middle
+                .filter(|_| across >= MIN_ACROSS)
+                .map(|cell| (cell, word.clone())),
+        );
     }
     found
 }
@@ -211,7 +354,13 @@ mod tests {
 
     fn grid(amplitudes: u32, periods: u32) -> Vec<SetRow> {
         let row = |row: u32| {
-            (1..=periods).map(move |column| set(1e-7 * f64::from(row), 0.01 * f64::from(column), f64::from(column)))
+            (1..=periods).map(move |column| {
+                set(
+                    1e-7 * f64::from(row),
+                    0.01 * f64::from(column),
+                    f64::from(column),
+                )
+            })
         };
         (1..=amplitudes).flat_map(row).collect()
     }
@@ -220,24 +369,40 @@ mod tests {
     fn only_a_grid_of_modulations_becomes_a_map() {
         let mut sets = grid(8, 9);
         assert!(map(&sets, &Look::default()).is_some());
-        assert!(map(&sets[..30], &Look::default()).is_none(), "four amplitudes");
+        assert!(
+            map(&sets[..30], &Look::default()).is_none(),
+            "four amplitudes"
+        );
         assert!(map(&grid(9, 7), &Look::default()).is_none());
         sets.push(set(0.0, 1.0, 1.0));
-        assert!(map(&sets, &Look::default()).is_some(), "a set without modulation lies on no grid");
-        sets[3].parameters.parameters = Parameters { drive_velocity: 1e-5, ..sets[3].parameters.parameters.clone() };
+        assert!(
+            map(&sets, &Look::default()).is_some(),
+            "a set without modulation lies on no grid"
+        );
+        sets[3].parameters.parameters = Parameters {
+            drive_velocity: 1e-5,
+            ..sets[3].parameters.parameters.clone()
+        };
         assert!(map(&sets, &Look::default()).is_none(), "two velocities");
     }
 
     #[test]
     fn a_diagonal_is_no_grid() {
-        let sets: Vec<SetRow> = (1..=20).map(|step| set(1e-7 * f64::from(step), 0.01 * f64::from(step), 3.0)).collect();
+        let sets: Vec<SetRow> = (1..=20)
+            .map(|step| set(1e-7 * f64::from(step), 0.01 * f64::from(step), 3.0))
+            .collect();
         assert!(map(&sets, &Look::default()).is_none());
     }
 
     #[test]
     fn large_numbers_of_periods_share_a_colour() {
         let mut sets = grid(8, 8);
-        let bar = |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg().contains(">&gt;12<");
+        let bar = |sets: &[SetRow]| {
+            map(sets, &Look::default())
+                .unwrap()
+                .svg()
+                .contains(">&gt;12<")
+        };
         assert!(!bar(&sets));
         sets[0].periods = Some(40);
         assert!(bar(&sets));
@@ -254,14 +419,23 @@ mod tests {
         let svg = drawn(&sets);
         assert!(svg.contains("Resultant length beyond"));
         for share in [0.0, 0.5, 1.0] {
-            assert!(svg.matches(&diverging(share).to_svg_string()).count() > 20, "{share}");
+            assert!(
+                svg.matches(&diverging(share).to_svg_string()).count() > 20,
+                "{share}"
+            );
         }
     }
 
     #[test]
     fn sets_without_a_phase_are_as_pale_as_the_ground() {
         let mut sets = grid(8, 8);
-        let free = |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg().matches(FREE).count();
+        let free = |sets: &[SetRow]| {
+            map(sets, &Look::default())
+                .unwrap()
+                .svg()
+                .matches(FREE)
+                .count()
+        };
         let none = free(&sets);
         for set in &mut sets {
             set.has_phase = false;
@@ -271,12 +445,21 @@ mod tests {
 
     fn at(velocity: f64, delay: f64, share: f64) -> SetRow {
         let plain = set(0.0, 1.0, 1e-5 / velocity);
-        let parameters =
-            Parameters { drive_velocity: velocity, reattachment_time: delay, ..plain.parameters.parameters.clone() };
+        let parameters = Parameters {
+            drive_velocity: velocity,
+            reattachment_time: delay,
+            ..plain.parameters.parameters.clone()
+        };
         let regime = Some(Regime::at(share));
         let is_sliding = regime == Some(Regime::Sliding);
         let tau_mean = plain.tau_mean.filter(|_| !is_sliding);
-        SetRow { parameters: Selected::new(parameters), slip_share: Some(share), regime, tau_mean, ..plain }
+        SetRow {
+            parameters: Selected::new(parameters),
+            slip_share: Some(share),
+            regime,
+            tau_mean,
+            ..plain
+        }
     }
 
     #[test]
@@ -285,16 +468,31 @@ mod tests {
             (0..4)
                 .flat_map(|row| {
                     (0..5).map(move |column| {
-                        at(1e-5 * f64::from(1 << column), 1e-3 * f64::from(1 << row), shares(row, column))
+                        at(
+                            1e-5 * f64::from(1 << column),
+                            1e-3 * f64::from(1 << row),
+                            shares(row, column),
+                        )
                     })
                 })
                 .collect()
         };
-        let drawn =
-            |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg().matches("stroke-width=\"1.6\"").count();
+        let drawn = |sets: &[SetRow]| {
+            map(sets, &Look::default())
+                .unwrap()
+                .svg()
+                .matches("stroke-width=\"1.6\"")
+                .count()
+        };
         let without = drawn(&grid(|_, _| 0.05));
-        assert_eq!(drawn(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })), without + 3 * 4);
-        assert!(map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(), "two rows");
+        assert_eq!(
+            drawn(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })),
+            without + 3 * 4
+        );
+        assert!(
+            map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(),
+            "two rows"
+        );
     }
 
     #[test]

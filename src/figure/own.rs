@@ -8,7 +8,9 @@ use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Ends, Layer, Panel, Place};
 use super::picture::{Dot, Ink, Picture, Stroke};
 use super::sets::period_column;
-use super::style::{BAR_WIDTH, BLACK, GREY, GRID, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, dot, drive_alone};
+use super::style::{
+    BAR_WIDTH, BLACK, GREY, GRID, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, dot, drive_alone,
+};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{FREQUENCY, SetRow, Swept, Values, ascending, differing, is_same, swept};
@@ -17,7 +19,13 @@ use clap::Args;
 use std::collections::BTreeMap;
 
 /// Quantities of the overview: intervals, friction, time within slips, phases.
-const QUANTITIES: [&str; 5] = ["tau_mean", "tau_sd", "mean_friction", "slip_share", "resultant_length"];
+const QUANTITIES: [&str; 5] = [
+    "tau_mean",
+    "tau_sd",
+    "mean_friction",
+    "slip_share",
+    "resultant_length",
+];
 /// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
 const REDUCTION: Ends = (0.2, 0.3);
 /// The median interval in periods, which makes a staircase of this many periods or more and of so few amplitudes.
@@ -88,7 +96,12 @@ fn limits(text: &str) -> Result<Limits, &'static str> {
     const WANTED: &str = "must be LOW:HIGH with finite numbers, such as 1e-6:1e-3, 0: or :5";
     let end = |text: &str| match text.trim() {
         "" => Ok(None),
-        number => number.parse().ok().filter(|end: &f64| end.is_finite()).map(Some).ok_or(WANTED),
+        number => number
+            .parse()
+            .ok()
+            .filter(|end: &f64| end.is_finite())
+            .map(Some)
+            .ok_or(WANTED),
     };
     match text.split_once(':') {
         Some((low, high)) if text.trim() != ":" => Ok((end(low)?, end(high)?)),
@@ -126,26 +139,58 @@ struct Chart<'a> {
 /// Draws a dot for each set; those that differ in the parameter on the x axis alone are joined. If no colour is asked for, it
 /// shows a second swept parameter; an axis is logarithmic where it was swept so, or where its values lie decades apart.
 pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Picture, BadOption> {
-    let asked = |option, name: &Option<String>| Asked::of(rows, option, name.as_deref().unwrap_or_default());
+    let asked = |option, name: &Option<String>| {
+        Asked::of(rows, option, name.as_deref().unwrap_or_default())
+    };
     let axis = |option, name, limits: Option<Limits>, label| -> Result<_, BadOption> {
         let asked: Asked<'_> = asked(option, name)?;
-        let is_log = figure.log.as_ref().map_or(asked.is_log, |axes| axes.contains(option));
-        Ok(Asked { is_log, limits: limits.unwrap_or_default(), label, ..asked })
+        let is_log = figure
+            .log
+            .as_ref()
+            .map_or(asked.is_log, |axes| axes.contains(option));
+        Ok(Asked {
+            is_log,
+            limits: limits.unwrap_or_default(),
+            label,
+            ..asked
+        })
     };
     let x = axis("x", &figure.x, figure.xlim, figure.xlabel.as_deref())?;
     let y = axis("y", &figure.y, figure.ylim, figure.ylabel.as_deref())?;
-    let panels = figure.panels.is_some().then(|| asked("panels", &figure.panels)).transpose()?;
+    let panels = figure
+        .panels
+        .is_some()
+        .then(|| asked("panels", &figure.panels))
+        .transpose()?;
     let swept = swept(rows);
     let is_free = |swept: &&Swept| {
         let shown = [Some(&x), panels.as_ref()].into_iter().flatten();
-        shown.into_iter().all(|shown| shown.symbol != parameter(swept.name()))
+        shown
+            .into_iter()
+            .all(|shown| shown.symbol != parameter(swept.name()))
     };
-    let second = || swept.iter().find(is_free).map(|swept| swept.name().to_owned());
+    let second = || {
+        swept
+            .iter()
+            .find(is_free)
+            .map(|swept| swept.name().to_owned())
+    };
     let colour = figure.colour.clone().or_else(second);
-    let colour = colour.is_some().then(|| asked("colour", &colour)).transpose()?;
+    let colour = colour
+        .is_some()
+        .then(|| asked("colour", &colour))
+        .transpose()?;
     let name = format!("{}-{}", y.name(), x.name());
     let panels = panels.map(|panels| panels.column.values);
-    Chart { rows, swept: &swept, x, ys: vec![y], colour, panels }.draw(&name, look)
+    Chart {
+        rows,
+        swept: &swept,
+        x,
+        ys: vec![y],
+        colour,
+        panels,
+    }
+    .draw(&name, look)
 }
 
 /// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third panels.
@@ -155,24 +200,49 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     let is_plain = rows.iter().all(|row| row.regime == Some(Regime::StickSlip));
     let asked = |place: usize, option| Asked::of(rows, option, swept.get(place)?.name()).ok();
     let x = asked(0, "x").or_else(|| Asked::of(rows, "x", "V0").ok())?;
-    let found = QUANTITIES.into_iter().filter(|name| !is_plain || *name != "slip_share");
+    let found = QUANTITIES
+        .into_iter()
+        .filter(|name| !is_plain || *name != "slip_share");
     let found = found.filter_map(|name| Asked::of(rows, "y", name).ok());
-    let shown = |y: &Asked<'_>| (0..rows.len()).filter(|&set| x.has(set) && y.has(set)).collect::<Vec<_>>();
+    let shown = |y: &Asked<'_>| {
+        (0..rows.len())
+            .filter(|&set| x.has(set) && y.has(set))
+            .collect::<Vec<_>>()
+    };
     let ys: Vec<Asked<'_>> = found.filter(|y| !shown(y).is_empty()).collect();
     // No panel is to be empty.
     let fills = |place: &usize| {
-        let Some(swept) = swept.get(*place) else { return false };
+        let Some(swept) = swept.get(*place) else {
+            return false;
+        };
         let places = swept.places();
         let mut values = places.clone();
         values.sort();
         values.dedup();
-        let has_all = |y| values.iter().all(|value| shown(y).iter().any(|&set| places[set] == *value));
+        let has_all = |y| {
+            values
+                .iter()
+                .all(|value| shown(y).iter().any(|&set| places[set] == *value))
+        };
         values.len() <= MAX_COLUMNS && ys.iter().all(has_all)
     };
-    let panels = if swept.len() > 2 { [2, 1].into_iter().find(fills) } else { None };
+    let panels = if swept.len() > 2 {
+        [2, 1].into_iter().find(fills)
+    } else {
+        None
+    };
     let colour = asked(if panels == Some(1) { 2 } else { 1 }, "colour");
     let panels = panels.map(|place| swept[place].values.clone());
-    Chart { rows, swept: &swept, x, ys, colour, panels }.draw("overview", look).ok()
+    Chart {
+        rows,
+        swept: &swept,
+        x,
+        ys,
+        colour,
+        panels,
+    }
+    .draw("overview", look)
+    .ok()
 }
 
 /// Draws the staircase of sets that differ in the modulation alone, with 24 periods or more and at most 3 amplitudes: the
@@ -180,9 +250,18 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
 pub(super) fn staircase(rows: &[SetRow], look: &Look) -> Option<Picture> {
     let is_of_modulation = |symbol: &Symbol| matches!(symbol, Symbol::Delta | Symbol::T);
     let asked = |column| Asked::of(rows, "y", column).ok();
-    let [x, ratio, index, colour] =
-        [asked(period_column(rows))?, asked(RATIO)?, asked("locking_index")?, asked("Delta")?];
-    let amplitudes = colour.column.distinct.iter().filter(|amplitude| **amplitude > 0.0).count();
+    let [x, ratio, index, colour] = [
+        asked(period_column(rows))?,
+        asked(RATIO)?,
+        asked("locking_index")?,
+        asked("Delta")?,
+    ];
+    let amplitudes = colour
+        .column
+        .distinct
+        .iter()
+        .filter(|amplitude| **amplitude > 0.0)
+        .count();
     if !differing(&rows.iter()).iter().all(is_of_modulation)
         || x.column.distinct.len() < MIN_PERIODS
         || amplitudes > MAX_AMPLITUDES
@@ -190,33 +269,55 @@ pub(super) fn staircase(rows: &[SetRow], look: &Look) -> Option<Picture> {
         return None;
     }
     let (least, largest) = bounds(ratio.distinct())?;
-    let mut ratio =
-        Asked { label: Some("Slip interval τ / T, median"), is_log: largest > WIDE_RATIOS * least, ..ratio };
+    let mut ratio = Asked {
+        label: Some("Slip interval τ / T, median"),
+        is_log: largest > WIDE_RATIOS * least,
+        ..ratio
+    };
     let quartiles = |row: &SetRow| {
         let period = row.parameters.modulation_period?;
         Some((row.tau_25? / period, row.tau_75? / period))
     };
     ratio.column.values.intervals = rows.iter().map(quartiles).collect();
     let swept = swept(rows);
-    let chart = Chart { rows, swept: &swept, x, ys: vec![ratio, index], colour: Some(colour), panels: None };
+    let chart = Chart {
+        rows,
+        swept: &swept,
+        x,
+        ys: vec![ratio, index],
+        colour: Some(colour),
+        panels: None,
+    };
     chart.draw("staircase", look).ok()
 }
 
 /// The parameter that a column shows.
 fn parameter(column: &str) -> Option<Symbol> {
-    if ["eta", FREQUENCY].contains(&column) { Some(Symbol::T) } else { Symbol::from_key(column) }
+    if ["eta", FREQUENCY].contains(&column) {
+        Some(Symbol::T)
+    } else {
+        Symbol::from_key(column)
+    }
 }
 
 impl<'a> Chart<'a> {
     fn draw(&self, name: &str, look: &Look) -> Result<Picture, BadOption> {
         let Self { rows, x, ys, .. } = self;
-        let sets: Vec<usize> = (0..rows.len()).filter(|&set| x.has(set) && ys.iter().any(|y| y.has(set))).collect();
+        let sets: Vec<usize> = (0..rows.len())
+            .filter(|&set| x.has(set) && ys.iter().any(|y| y.has(set)))
+            .collect();
         if sets.is_empty() {
             let is_log = x.is_log && x.column.distinct.first().is_none_or(|least| *least <= 0.0);
-            let kind =
-                if is_log || ys.iter().any(|y| y.is_log) { "no set has a value > 0" } else { "no set has a value" };
+            let kind = if is_log || ys.iter().any(|y| y.is_log) {
+                "no set has a value > 0"
+            } else {
+                "no set has a value"
+            };
             let names: Vec<&str> = std::iter::once(x).chain(ys).map(Asked::name).collect();
-            let problem = format!("{kind} of both {}; nothing can be drawn", names.join(" and "));
+            let problem = format!(
+                "{kind} of both {}; nothing can be drawn",
+                names.join(" and ")
+            );
             return Err(ys.first().unwrap_or(x).refuse(&problem));
         }
         let free = self.free();
@@ -225,35 +326,69 @@ impl<'a> Chart<'a> {
             let all = sets.iter().chain(&free).copied();
             y.axis(&all.filter(|&set| y.has(set)).collect::<Vec<_>>())
         };
-        let y_axes = ys.iter().map(of_y).collect::<Result<Vec<Axis>, BadOption>>()?;
-        let is_on = |axis: &Axis, asked: &Asked<'_>, set| asked.number(set).is_some_and(|value| axis.contains(value));
-        let is_inside =
-            |set: usize| is_on(&x_axis, x, set) && ys.iter().zip(&y_axes).any(|(y, axis)| is_on(axis, y, set));
+        let y_axes = ys
+            .iter()
+            .map(of_y)
+            .collect::<Result<Vec<Axis>, BadOption>>()?;
+        let is_on = |axis: &Axis, asked: &Asked<'_>, set| {
+            asked.number(set).is_some_and(|value| axis.contains(value))
+        };
+        let is_inside = |set: usize| {
+            is_on(&x_axis, x, set) && ys.iter().zip(&y_axes).any(|(y, axis)| is_on(axis, y, set))
+        };
         let inside: Vec<usize> = sets.iter().copied().filter(|&set| is_inside(set)).collect();
         if inside.is_empty() {
-            let problem = format!("none of {} sets lies within --xlim and --ylim; give wider ones", sets.len());
+            let problem = format!(
+                "none of {} sets lies within --xlim and --ylim; give wider ones",
+                sets.len()
+            );
             return Err(x.refuse(&problem));
         }
         let hues = self.colour.as_ref().map(hues).transpose()?;
         let groups = groups(self.panels.as_ref(), &sets)?;
         let (columns, [width, height]) = match (ys.len(), groups.len()) {
             (1, 1) => (1, [WIDTH, HEIGHT]),
-            (1, count) => (if count == 4 { 2 } else { count.min(MAX_COLUMNS) }, [PANEL_WIDTH, PANEL_HEIGHT]),
+            (1, count) => (
+                if count == 4 {
+                    2
+                } else {
+                    count.min(MAX_COLUMNS)
+                },
+                [PANEL_WIDTH, PANEL_HEIGHT],
+            ),
             // Quantities one under the other, or two and two.
             (2 | 3, 1) => (1, [WIDTH, 0.5 * HEIGHT]),
             (_, 1) => (2, [1.25 * PANEL_WIDTH, PANEL_HEIGHT]),
             (_, count) => (count, [PANEL_WIDTH, 0.8 * PANEL_HEIGHT]),
         };
         let stack = Layout::column(width);
-        let row_gap = if ys.len() == 1 { PANEL_GAP } else { stack.row_gap };
-        let layout = Layout { columns, column_gap: LEFT + LABEL_GAP, row_gap, ..stack };
-        let radius = if inside.len() > FEW_SETS { SMALL_RADIUS } else { RADIUS };
+        let row_gap = if ys.len() == 1 {
+            PANEL_GAP
+        } else {
+            stack.row_gap
+        };
+        let layout = Layout {
+            columns,
+            column_gap: LEFT + LABEL_GAP,
+            row_gap,
+            ..stack
+        };
+        let radius = if inside.len() > FEW_SETS {
+            SMALL_RADIUS
+        } else {
+            RADIUS
+        };
         let lines = self.lines(&sets);
         let mut cells: Vec<Panel<'_>> = Vec::new();
         for (y, axis) in ys.iter().zip(y_axes) {
-            let height = if y.name() == RATIO { 1.5 * height } else { height };
+            let height = if y.name() == RATIO {
+                1.5 * height
+            } else {
+                height
+            };
             for (title, members) in &groups {
-                let layers = self.layers(y, &x_axis, hues.as_ref(), radius, [members, &free], &lines);
+                let layers =
+                    self.layers(y, &x_axis, hues.as_ref(), radius, [members, &free], &lines);
                 let mut panel = Panel::new(height, x_axis.clone(), axis.clone(), layers);
                 if groups.len() > 1 {
                     if !cells.len().is_multiple_of(columns) {
@@ -261,12 +396,21 @@ impl<'a> Chart<'a> {
                     }
                     panel.heading = Some(title.clone());
                 }
-                panel.bar = hues.as_ref().and_then(Hues::bar).filter(|_| cells.len() + 1 == columns);
+                panel.bar = hues
+                    .as_ref()
+                    .and_then(Hues::bar)
+                    .filter(|_| cells.len() + 1 == columns);
                 cells.push(panel);
             }
         }
         let look = look.with_note(&self.note(&inside, free.len()));
-        Ok(panel::draw(name, &look, layout, &self.legend(&inside, &free, hues.as_ref(), !lines.is_empty()), cells))
+        Ok(panel::draw(
+            name,
+            &look,
+            layout,
+            &self.legend(&inside, &free, hues.as_ref(), !lines.is_empty()),
+            cells,
+        ))
     }
 
     /// Sets without modulation, where the axis is that of the modulation: they have no place on it, but a level.
@@ -277,34 +421,57 @@ impl<'a> Chart<'a> {
                 && !self.x.has(set)
         };
         let free: Vec<usize> = (0..self.rows.len()).filter(is_free).collect();
-        if free.len() > INKS.len() { Vec::new() } else { free }
+        if free.len() > INKS.len() {
+            Vec::new()
+        } else {
+            free
+        }
     }
 
     /// Sets that differ in the x axis alone, in its order.
     fn lines(&self, sets: &[usize]) -> Vec<Vec<usize>> {
-        let Some(symbol) = self.x.symbol else { return Vec::new() };
+        let Some(symbol) = self.x.symbol else {
+            return Vec::new();
+        };
         // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.
-        if self.colour.as_ref().is_some_and(|colour| colour.symbol.is_none())
+        if self
+            .colour
+            .as_ref()
+            .is_some_and(|colour| colour.symbol.is_none())
             || self.ys.iter().any(|y| y.symbol.is_some())
         {
             return Vec::new();
         }
-        let others: Vec<_> =
-            self.swept.iter().filter(|other| parameter(other.name()) != Some(symbol)).map(Swept::places).collect();
+        let others: Vec<_> = self
+            .swept
+            .iter()
+            .filter(|other| parameter(other.name()) != Some(symbol))
+            .map(Swept::places)
+            .collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
         for &set in sets {
-            lines.entry(others.iter().map(|places| places[set]).collect()).or_default().push(set);
+            lines
+                .entry(others.iter().map(|places| places[set]).collect())
+                .or_default()
+                .push(set);
         }
-        let mut lines: Vec<Vec<usize>> = lines.into_values().filter(|line| line.len() > 1).collect();
+        let mut lines: Vec<Vec<usize>> =
+            lines.into_values().filter(|line| line.len() > 1).collect();
         let number = |set| self.x.number(set).unwrap_or(f64::NAN);
         for line in &mut lines {
             line.sort_by(|&left, &right| number(left).total_cmp(&number(right)));
         }
-        if lines.len() > MAX_LINES { Vec::new() } else { lines }
+        if lines.len() > MAX_LINES {
+            Vec::new()
+        } else {
+            lines
+        }
     }
 
     fn ink(&self, hues: Option<&Hues>, set: usize) -> Ink {
-        let Some((colour, hues)) = self.colour.as_ref().zip(hues) else { return INKS[0] };
+        let Some((colour, hues)) = self.colour.as_ref().zip(hues) else {
+            return INKS[0];
+        };
         colour.number(set).map_or(GREY, |value| hues.ink(value))
     }
 
@@ -325,7 +492,9 @@ impl<'a> Chart<'a> {
         let level = |set: &usize| {
             if y.name() == RATIO {
                 let tau = self.rows[*set].tau_50?;
-                let ratios = x_axis.evenly_placed(200).map(|place| (place, tau / x.period(place)));
+                let ratios = x_axis
+                    .evenly_placed(200)
+                    .map(|place| (place, tau / x.period(place)));
                 return Some(Layer::Curve(ratios.collect(), REFERENCE));
             }
             let ink = if hues.is_some() { ink(set) } else { GREY };
@@ -341,11 +510,21 @@ impl<'a> Chart<'a> {
         }
         layers.extend(free.iter().filter_map(level));
         for line in lines {
-            let line: Vec<usize> = line.iter().copied().filter(|set| members.contains(set)).collect();
+            let line: Vec<usize> = line
+                .iter()
+                .copied()
+                .filter(|set| members.contains(set))
+                .collect();
             let alone: Vec<Place> = line.iter().filter_map(drive).collect();
-            layers.extend(line.first().map(|first| Layer::Curve(alone, drive_alone(ink(first)))));
+            layers.extend(
+                line.first()
+                    .map(|first| Layer::Curve(alone, drive_alone(ink(first)))),
+            );
             let known: Vec<usize> = line.into_iter().filter(|&set| y.has(set)).collect();
-            for pair in known.windows(2).filter(|pair| ink(&pair[0]) == ink(&pair[1])) {
+            for pair in known
+                .windows(2)
+                .filter(|pair| ink(&pair[0]) == ink(&pair[1]))
+            {
                 layers.push(Layer::Curve(
                     pair.iter().filter_map(place).collect(),
                     Stroke::solid(ink(&pair[0]), LINE_WIDTH),
@@ -353,21 +532,46 @@ impl<'a> Chart<'a> {
             }
         }
         if lines.is_empty() {
-            layers.push(Layer::Dots(members.iter().filter_map(drive).collect(), Dot::solid(GREY, SMALL_RADIUS)));
+            layers.push(Layer::Dots(
+                members.iter().filter_map(drive).collect(),
+                Dot::solid(GREY, SMALL_RADIUS),
+            ));
         }
         for set in members {
-            let Some((at_x, at_y)) = place(set) else { continue };
-            let stroke = Stroke::solid(ink(set), if radius < RADIUS { LINE_WIDTH } else { BAR_WIDTH });
-            layers.extend(y.interval(*set).map(|ends| Layer::Bars(vec![(at_x, ends)], stroke)));
+            let Some((at_x, at_y)) = place(set) else {
+                continue;
+            };
+            let stroke = Stroke::solid(
+                ink(set),
+                if radius < RADIUS {
+                    LINE_WIDTH
+                } else {
+                    BAR_WIDTH
+                },
+            );
+            layers.extend(
+                y.interval(*set)
+                    .map(|ends| Layer::Bars(vec![(at_x, ends)], stroke)),
+            );
             layers.extend(x.interval(*set).map(|(low, high)| {
-                let left = if x_axis.place(low).is_finite() { low } else { x_axis.low };
+                let left = if x_axis.place(low).is_finite() {
+                    low
+                } else {
+                    x_axis.low
+                };
                 Layer::Curve(vec![(left, at_y), (high, at_y)], stroke)
             }));
         }
         let dots = members.iter().flat_map(|set| {
             let dot = |dot| Layer::Dots(place(set).into_iter().collect(), dot);
-            let hole = self.slides(*set).then(|| dot(Dot::solid(WHITE, radius - HOLE)));
-            std::iter::once(dot(Dot { opacity: 0.9, ..Dot::solid(ink(set), radius) })).chain(hole)
+            let hole = self
+                .slides(*set)
+                .then(|| dot(Dot::solid(WHITE, radius - HOLE)));
+            std::iter::once(dot(Dot {
+                opacity: 0.9,
+                ..Dot::solid(ink(set), radius)
+            }))
+            .chain(hole)
         });
         std::iter::once(Layer::Inside(layers)).chain(dots).collect()
     }
@@ -378,20 +582,35 @@ impl<'a> Chart<'a> {
 
     /// Amplitudes at which the paper finds a significant reduction of the friction to begin, on the x axis.
     fn reduction(&self, y: &Asked<'_>) -> Option<Ends> {
-        let is_fixed = |symbol| self.swept.iter().all(|swept| parameter(swept.name()) != Some(symbol));
+        let is_fixed = |symbol| {
+            self.swept
+                .iter()
+                .all(|swept| parameter(swept.name()) != Some(symbol))
+        };
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
-        let free = self.rows.iter().find(|row| row.parameters.modulation_period.is_none());
+        let free = self
+            .rows
+            .iter()
+            .find(|row| row.parameters.modulation_period.is_none());
         let free = free.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
         Some((REDUCTION.0 * unit, REDUCTION.1 * unit))
     }
 
     /// What each mark means that is drawn.
-    fn legend(&self, inside: &[usize], free: &[usize], hues: Option<&Hues>, has_lines: bool) -> Vec<Entry> {
+    fn legend(
+        &self,
+        inside: &[usize],
+        free: &[usize],
+        hues: Option<&Hues>,
+        has_lines: bool,
+    ) -> Vec<Entry> {
         let mut entries = Vec::new();
         if let Some((colour, hues)) = self.colour.as_ref().zip(hues) {
             let numbers = || inside.iter().map(|&set| colour.number(set));
-            entries.extend(hues.entries(RADIUS, |value| numbers().any(|number| number == Some(value))));
+            entries.extend(hues.entries(RADIUS, |value| {
+                numbers().any(|number| number == Some(value))
+            }));
             let none = || entry(Mark::Dot(dot(GREY)), without_value(&colour.column.values));
             entries.extend(numbers().any(|number| number.is_none()).then(none));
         }
@@ -400,13 +619,20 @@ impl<'a> Chart<'a> {
         entries.extend(slides.then(|| entry(Mark::Ring(BLACK, RADIUS, RADIUS - 1.6), "sliding")));
         if self.ys.iter().any(|y| y.name() == "slip_share") {
             let [mixed, sliding] = Regime::MIN_SHARES;
-            entries.push(entry(Mark::Line(REFERENCE), format!("mixed above {mixed}, sliding above {sliding}")));
+            entries.push(entry(
+                Mark::Line(REFERENCE),
+                format!("mixed above {mixed}, sliding above {sliding}"),
+            ));
         }
         if self.ys.iter().any(|y| y.name() == RATIO) {
             entries.push(entry(Mark::Line(GRID), "τ = nT; bars: 25 to 75 % of slips"));
         }
         let has_drive = self.ys.iter().any(|y| y.drive.is_some());
-        let alone = if has_lines { Mark::Line(drive_alone(BLACK)) } else { Mark::Dot(Dot::solid(GREY, SMALL_RADIUS)) };
+        let alone = if has_lines {
+            Mark::Line(drive_alone(BLACK))
+        } else {
+            Mark::Dot(Dot::solid(GREY, SMALL_RADIUS))
+        };
         entries.extend(has_drive.then(|| entry(alone, "by the drive alone")));
         let is_reduced = self.ys.iter().any(|y| self.reduction(y).is_some());
         let stripe = "K_d Δ = 0.2 to 0.3 of the peak force: friction falls, says the paper";
@@ -416,32 +642,49 @@ impl<'a> Chart<'a> {
 
     /// Swept parameters that nothing shows.
     fn pooled(&self) -> Option<String> {
-        let asked = [Some(&self.x), self.colour.as_ref()].into_iter().flatten().chain(&self.ys).map(Asked::name);
+        let asked = [Some(&self.x), self.colour.as_ref()]
+            .into_iter()
+            .flatten()
+            .chain(&self.ys)
+            .map(Asked::name);
         let names = asked.chain(self.panels.as_ref().map(|panels| &*panels.column.name));
-        let words = names.flat_map(|name| name.split(|letter: char| !letter.is_alphanumeric() && letter != '_'));
+        let words = names
+            .flat_map(|name| name.split(|letter: char| !letter.is_alphanumeric() && letter != '_'));
         let shown: Vec<Option<Symbol>> = words.map(parameter).collect();
-        let pooled = self.swept.iter().filter(|swept| !shown.contains(&parameter(swept.name())));
+        let pooled = self
+            .swept
+            .iter()
+            .filter(|swept| !shown.contains(&parameter(swept.name())));
         let symbols: Vec<String> = pooled.map(|swept| swept.values.label().symbol).collect();
-        (!symbols.is_empty()).then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))
+        (!symbols.is_empty())
+            .then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))
     }
 
     /// What bars are, and what is not there.
     fn note(&self, inside: &[usize], levels: usize) -> String {
         let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));
-        let is_still = |set: &usize| shows_intervals && self.slides(*set) && self.rows[*set].tau_mean.is_none();
+        let is_still = |set: &usize| {
+            shows_intervals && self.slides(*set) && self.rows[*set].tau_mean.is_none()
+        };
         let still: Vec<usize> = (0..self.rows.len()).filter(is_still).collect();
         let still_outside = still.iter().filter(|set| !inside.contains(set)).count();
         let count = self.rows.len();
         let left_out = count - inside.len() - levels - still_outside;
-        let still = (!still.is_empty()).then(|| format!("{} of {count} sets slide: no intervals", still.len()));
-        let left_out = (left_out > 0)
-            .then(|| format!("not shown: {left_out} of {count} sets, without a value or outside the axes"));
+        let still = (!still.is_empty())
+            .then(|| format!("{} of {count} sets slide: no intervals", still.len()));
+        let left_out = (left_out > 0).then(|| {
+            format!("not shown: {left_out} of {count} sets, without a value or outside the axes")
+        });
         let bars = self
             .ys
             .iter()
             .any(|y| inside.iter().any(|&set| y.interval(set).is_some()))
             .then(|| "bars: 95 %".to_owned());
-        [bars, still, left_out, self.pooled()].into_iter().flatten().collect::<Vec<_>>().join("; ")
+        [bars, still, left_out, self.pooled()]
+            .into_iter()
+            .flatten()
+            .collect::<Vec<_>>()
+            .join("; ")
     }
 }
 
@@ -450,7 +693,8 @@ const FEW_VALUES: usize = 8;
 
 impl Asked<'_> {
     pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, BadOption> {
-        let column = Swept::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
+        let column =
+            Swept::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
         let drive = match name {
             "resultant_length" => Values::of(rows, "resultant_drive").ok(),
             "locking_index" => Values::of(rows, "locking_index_drive").ok(),
@@ -462,7 +706,13 @@ impl Asked<'_> {
         let is_log = match (symbol, &column.distinct[..]) {
             (Some(_), _) => column.is_logarithmic(),
             (None, values @ [least, .., _]) => {
-                let low = column.values.intervals.iter().flatten().map(|(low, _)| *low).fold(*least, f64::min);
+                let low = column
+                    .values
+                    .intervals
+                    .iter()
+                    .flatten()
+                    .map(|(low, _)| *low)
+                    .fold(*least, f64::min);
                 // One set of its own, such as the only one that slides, changes no scale.
                 let alone = usize::from(values.len() >= FEW_VALUES);
                 let ends = (values[alone], values[values.len() - 1 - alone]);
@@ -470,7 +720,17 @@ impl Asked<'_> {
             }
             _ => false,
         };
-        Ok(Self { option, column, symbol, drive, factor, unit, is_log, limits: (None, None), label: None })
+        Ok(Self {
+            option,
+            column,
+            symbol,
+            drive,
+            factor,
+            unit,
+            is_log,
+            limits: (None, None),
+            label: None,
+        })
     }
 
     fn name(&self) -> &str {
@@ -482,7 +742,8 @@ impl Asked<'_> {
     }
 
     pub(super) fn axis_label(&self) -> String {
-        self.label.map_or_else(|| self.label().axis(self.unit), str::to_owned)
+        self.label
+            .map_or_else(|| self.label().axis(self.unit), str::to_owned)
     }
 
     /// Each value once, ascending.
@@ -492,7 +753,11 @@ impl Asked<'_> {
 
     /// The period in s at a place on an axis of periods or frequencies.
     pub(super) fn period(&self, place: f64) -> f64 {
-        if self.name() == FREQUENCY { self.factor / place } else { place / self.factor }
+        if self.name() == FREQUENCY {
+            self.factor / place
+        } else {
+            place / self.factor
+        }
     }
 
     pub(super) fn number(&self, set: usize) -> Option<f64> {
@@ -508,13 +773,19 @@ impl Asked<'_> {
     }
 
     fn refuse_limits(&self, problem: &str) -> BadOption {
-        let [low, high] = [self.limits.0, self.limits.1].map(|end| end.map_or_else(String::new, |end| end.to_string()));
-        BadOption::new(&format!("{}lim", self.option), &format!("{low}:{high}"), problem)
+        let [low, high] = [self.limits.0, self.limits.1]
+            .map(|end| end.map_or_else(String::new, |end| end.to_string()));
+        BadOption::new(
+            &format!("{}lim", self.option),
+            &format!("{low}:{high}"),
+            problem,
+        )
     }
 
     /// Whether a set has a place on the axis.
     fn has(&self, set: usize) -> bool {
-        self.number(set).is_some_and(|value| !self.is_log || self.column.values.is_worded() || value > 0.0)
+        self.number(set)
+            .is_some_and(|value| !self.is_log || self.column.values.is_worded() || value > 0.0)
     }
 
     /// The axis, from one limit or end of the data to the other.
@@ -530,42 +801,69 @@ impl Asked<'_> {
                 return Err(BadOption::new("log", self.option, &problem));
             }
             if self.limits != (None, None) {
-                return Err(self.refuse_limits(&format!("{name} holds words; limits are for numbers")));
+                return Err(
+                    self.refuse_limits(&format!("{name} holds words; limits are for numbers"))
+                );
             }
             if count > MAX_WORDS {
-                let problem = format!("has {count} words, and {MAX_WORDS} fit an axis; take another column");
+                let problem =
+                    format!("has {count} words, and {MAX_WORDS} fit an axis; take another column");
                 return Err(self.refuse(&problem));
             }
             let words: Vec<&str> = values.words.iter().map(String::as_str).collect();
             return Ok(Axis::categories(&label, &words).with_short_label(short_label));
         }
-        if self.is_log && [self.limits.0, self.limits.1].into_iter().flatten().any(|end| end <= 0.0) {
+        if self.is_log
+            && [self.limits.0, self.limits.1]
+                .into_iter()
+                .flatten()
+                .any(|end| end <= 0.0)
+        {
             return Err(self.refuse_limits("must be > 0 on a logarithmic axis"));
         }
         let ends = |&set: &usize| {
             let bar = self.interval(set).map(|(low, high)| [low, high]);
             let drive = self.drive.as_ref().and_then(|drive| drive.numbers[set]);
-            self.number(set).into_iter().chain(bar.into_iter().flatten()).chain(drive)
+            self.number(set)
+                .into_iter()
+                .chain(bar.into_iter().flatten())
+                .chain(drive)
         };
         let values = sets.iter().flat_map(ends);
-        let natural = if self.is_log { logarithmic_bounds(values) } else { bounds(values).map(widened) };
+        let natural = if self.is_log {
+            logarithmic_bounds(values)
+        } else {
+            bounds(values).map(widened)
+        };
         let (low, high) = natural.ok_or_else(|| self.refuse("has no finite value"))?;
         // Values at a limit are shown, however they are rounded.
-        let low = self.limits.0.map_or(low, |end| self.factor * (end - SLACK * end.abs()));
-        let high = self.limits.1.map_or(high, |end| self.factor * (end + SLACK * end.abs()));
+        let low = self
+            .limits
+            .0
+            .map_or(low, |end| self.factor * (end - SLACK * end.abs()));
+        let high = self
+            .limits
+            .1
+            .map_or(high, |end| self.factor * (end + SLACK * end.abs()));
         if low >= high {
-            return Err(
-                self.refuse_limits("the lower end must be less than the upper; with one end given, than the data's")
-            );
+            return Err(self.refuse_limits(
+                "the lower end must be less than the upper; with one end given, than the data's",
+            ));
         }
-        let axis = if self.is_log { Axis::logarithmic } else { Axis::linear };
+        let axis = if self.is_log {
+            Axis::logarithmic
+        } else {
+            Axis::linear
+        };
         let has_few = (2..=MAX_TICKS).contains(&self.column.distinct.len());
         if self.symbol.is_some() && self.limits == (None, None) && has_few {
             let axis = axis(&label, low, high).with_ticks_at(&label, self.distinct());
             return Ok(axis.with_short_label(short_label));
         }
         let short_label = short_label.map(|label| axis(&label, low, high).label);
-        Ok(axis(&label, low, high).with_short_label(short_label).with_enough_numbers())
+        Ok(axis(&label, low, high)
+            .with_short_label(short_label)
+            .with_enough_numbers())
     }
 }
 
@@ -577,12 +875,20 @@ fn refuse(option: &str, values: &Values, problem: &str) -> BadOption {
 fn hues(colour: &Asked<'_>) -> Result<Hues, BadOption> {
     let (count, inks) = (colour.column.values.words.len(), INKS.len());
     if count > inks {
-        return Err(colour.refuse(&format!("has {count} words, and there are {inks} colours; take another column")));
+        return Err(colour.refuse(&format!(
+            "has {count} words, and there are {inks} colours; take another column"
+        )));
     }
     if colour.column.distinct.is_empty() {
         return Err(colour.refuse("no set has a value of it"));
     }
-    let known = colour.column.values.numbers.iter().flatten().map(|value| colour.factor * value);
+    let known = colour
+        .column
+        .values
+        .numbers
+        .iter()
+        .flatten()
+        .map(|value| colour.factor * value);
     let word = |value: f64| colour.column.values.setting(value / colour.factor);
     Ok(Hues::of(&colour.label().short(colour.unit), known, word))
 }
@@ -590,27 +896,45 @@ fn hues(colour: &Asked<'_>) -> Result<Hues, BadOption> {
 /// What is said of sets without a value of a column: of a period, that they have no modulation.
 fn without_value(values: &Values) -> String {
     let is_period = parameter(&values.column.name) == Some(Symbol::T);
-    if is_period { "Δ = 0".to_owned() } else { format!("no {}", values.label().symbol) }
+    if is_period {
+        "Δ = 0".to_owned()
+    } else {
+        format!("no {}", values.label().symbol)
+    }
 }
 
 /// The sets of each panel and its title.
 fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<usize>)>, BadOption> {
-    let Some(values) = panels else { return Ok(vec![(String::new(), sets.to_vec())]) };
+    let Some(values) = panels else {
+        return Ok(vec![(String::new(), sets.to_vec())]);
+    };
     let of = |value: f64| {
         let is_of = |set: &usize| values.numbers[*set].is_some_and(|number| is_same(value, number));
-        (values.setting(value), sets.iter().copied().filter(is_of).collect::<Vec<_>>())
+        (
+            values.setting(value),
+            sets.iter().copied().filter(is_of).collect::<Vec<_>>(),
+        )
     };
-    let mut groups: Vec<_> = ascending(values.numbers.iter().copied().flatten()).into_iter().map(of).collect();
+    let mut groups: Vec<_> = ascending(values.numbers.iter().copied().flatten())
+        .into_iter()
+        .map(of)
+        .collect();
     groups.retain(|(_, sets)| !sets.is_empty());
     // Sets without a value, such as a frequency at Δ = 0, have a panel of their own.
-    let without: Vec<usize> = sets.iter().copied().filter(|&set| values.numbers[set].is_none()).collect();
+    let without: Vec<usize> = sets
+        .iter()
+        .copied()
+        .filter(|&set| values.numbers[set].is_none())
+        .collect();
     if !groups.is_empty() && !without.is_empty() {
         groups.insert(0, (without_value(values), without));
     }
     let problem = match groups.len() {
         0 => "no set has a value of it".to_owned(),
         1..=MAX_PANELS => return Ok(groups),
-        count => format!("has {count} values, and {MAX_PANELS} panels fit a page; show it with --colour"),
+        count => {
+            format!("has {count} values, and {MAX_PANELS} panels fit a page; show it with --colour")
+        }
     };
     Err(refuse("panels", values, &problem))
 }
@@ -637,7 +961,10 @@ pub(super) mod tests {
                 frequency: parameters.modulation_period.map(|period| 1.0 / period),
                 parameters: Selected::new(parameters.validated().unwrap()),
                 tau_mean: Some(tau),
-                tau_interval: Some(Interval { low: 0.9 * tau, high: 1.1 * tau }),
+                tau_interval: Some(Interval {
+                    low: 0.9 * tau,
+                    high: 1.1 * tau,
+                }),
                 ..SetRow::default()
             }
         };
@@ -645,7 +972,11 @@ pub(super) mod tests {
     }
 
     fn figure() -> OwnFigure {
-        OwnFigure { x: Some("V0".into()), y: Some("tau_mean".into()), ..OwnFigure::default() }
+        OwnFigure {
+            x: Some("V0".into()),
+            y: Some("tau_mean".into()),
+            ..OwnFigure::default()
+        }
     }
 
     fn svg(figure: &OwnFigure) -> String {
@@ -653,14 +984,20 @@ pub(super) mod tests {
     }
 
     fn problem(figure: &OwnFigure) -> String {
-        own(&rows(8), figure, &Look::default()).err().unwrap().to_string()
+        own(&rows(8), figure, &Look::default())
+            .err()
+            .unwrap()
+            .to_string()
     }
 
     #[test]
     fn either_end_of_an_axis_may_be_left_out() {
         let ends = |text: &str| limits(text).map(|limits| (limits.0, limits.1));
         assert_eq!(ends("1e-6:1e-3"), Ok((Some(1e-6), Some(1e-3))));
-        assert_eq!((ends("-1:"), ends(":5")), (Ok((Some(-1.0), None)), Ok((None, Some(5.0)))));
+        assert_eq!(
+            (ends("-1:"), ends(":5")),
+            (Ok((Some(-1.0), None)), Ok((None, Some(5.0))))
+        );
         for wrong in ["", ":", "1", "a:b", "1:nan", "1:2:3", "inf:"] {
             assert!(ends(wrong).is_err(), "{wrong}");
         }
@@ -670,63 +1007,158 @@ pub(super) mod tests {
     fn each_option_changes_what_it_says() {
         let plain = svg(&figure());
         // Velocities that double, and intervals that halve.
-        assert!(plain.contains(">Drive velocity V₀ (m/s)<") && plain.contains(">Mean interval ⟨τ⟩ (s)<"));
-        assert!(plain.contains(">10⁻⁵<") && plain.contains(">Δ = 0<") && plain.contains(">Δ = 1 µm<"));
-        let bars = |svg: &str| svg.matches(&format!(r#"stroke-width="{BAR_WIDTH}""#)).count();
-        let no_interval = OwnFigure { y: Some("eta".into()), ..figure() };
+        assert!(
+            plain.contains(">Drive velocity V₀ (m/s)<")
+                && plain.contains(">Mean interval ⟨τ⟩ (s)<")
+        );
+        assert!(
+            plain.contains(">10⁻⁵<") && plain.contains(">Δ = 0<") && plain.contains(">Δ = 1 µm<")
+        );
+        let bars = |svg: &str| {
+            svg.matches(&format!(r#"stroke-width="{BAR_WIDTH}""#))
+                .count()
+        };
+        let no_interval = OwnFigure {
+            y: Some("eta".into()),
+            ..figure()
+        };
         assert_eq!((bars(&plain), bars(&svg(&no_interval))), (8, 0));
-        let linear = svg(&OwnFigure { log: Some("none".into()), ..figure() });
+        let linear = svg(&OwnFigure {
+            log: Some("none".into()),
+            ..figure()
+        });
         assert!(linear.contains(">Drive velocity V₀ (10⁻⁶ m/s)<") && !linear.contains(">10⁻⁵<"));
-        let scale = svg(&OwnFigure { colour: Some("V0".into()), ..figure() });
-        assert!(scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = ") && !scale.contains("Δ = "));
-        let panels = svg(&OwnFigure { panels: Some("Delta".into()), ..figure() });
+        let scale = svg(&OwnFigure {
+            colour: Some("V0".into()),
+            ..figure()
+        });
+        assert!(
+            scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = ") && !scale.contains("Δ = ")
+        );
+        let panels = svg(&OwnFigure {
+            panels: Some("Delta".into()),
+            ..figure()
+        });
         assert!(panels.contains(">(a)<") && panels.contains(">(b)<") && panels.contains(">Δ = 0<"));
-        let limits = svg(&OwnFigure { xlim: Some((Some(1e-6), Some(1e-5))), ..figure() });
-        assert!(limits.contains("not shown: 4 of 8 sets, without a value or outside the axes"), "{limits}");
-        let label = svg(&OwnFigure { ylabel: Some("τ".into()), ..figure() });
+        let limits = svg(&OwnFigure {
+            xlim: Some((Some(1e-6), Some(1e-5))),
+            ..figure()
+        });
+        assert!(
+            limits.contains("not shown: 4 of 8 sets, without a value or outside the axes"),
+            "{limits}"
+        );
+        let label = svg(&OwnFigure {
+            ylabel: Some("τ".into()),
+            ..figure()
+        });
         assert!(label.contains(">τ<") && !label.contains("Mean interval"));
-        let without = svg(&OwnFigure { colour: Some("T".into()), ..figure() });
+        let without = svg(&OwnFigure {
+            colour: Some("T".into()),
+            ..figure()
+        });
         assert!(without.contains(">T = 20 ms<") && without.contains(">Δ = 0<"));
-        let words = svg(&OwnFigure { x: Some("break_on".into()), ..figure() });
+        let words = svg(&OwnFigure {
+            x: Some("break_on".into()),
+            ..figure()
+        });
         assert!(words.contains(">magnitude<"));
     }
 
     #[test]
     fn mistakes_are_refused_with_what_to_do() {
         for (figure, expected) in [
-            (OwnFigure { x: Some("v0".into()), ..figure() }, "--x v0: no such column; did you mean V0?"),
             (
-                OwnFigure { colour: Some("colour".into()), ..figure() },
+                OwnFigure {
+                    x: Some("v0".into()),
+                    ..figure()
+                },
+                "--x v0: no such column; did you mean V0?",
+            ),
+            (
+                OwnFigure {
+                    colour: Some("colour".into()),
+                    ..figure()
+                },
                 "--colour colour: no such column; `stickslip plot --list`",
             ),
             (
-                OwnFigure { x: Some("break_on".into()), log: Some("x".into()), ..figure() },
+                OwnFigure {
+                    x: Some("break_on".into()),
+                    log: Some("x".into()),
+                    ..figure()
+                },
                 "--log x: break_on holds words",
             ),
             (
-                OwnFigure { x: Some("break_on".into()), xlim: Some((Some(1.0), None)), ..figure() },
+                OwnFigure {
+                    x: Some("break_on".into()),
+                    xlim: Some((Some(1.0), None)),
+                    ..figure()
+                },
                 "--xlim 1:: break_on holds words",
             ),
-            (OwnFigure { y: Some("drop_mean".into()), ..figure() }, "no set has a value of both V0 and drop_mean"),
             (
-                OwnFigure { y: Some("eta".into()), x: Some("T_to".into()), log: Some("y".into()), ..figure() },
+                OwnFigure {
+                    y: Some("drop_mean".into()),
+                    ..figure()
+                },
+                "no set has a value of both V0 and drop_mean",
+            ),
+            (
+                OwnFigure {
+                    y: Some("eta".into()),
+                    x: Some("T_to".into()),
+                    log: Some("y".into()),
+                    ..figure()
+                },
                 "no set has a value > 0",
             ),
-            (OwnFigure { xlim: Some((Some(2.0), Some(1.0))), ..figure() }, "--xlim 2:1: the lower end must be less"),
             (
-                OwnFigure { xlim: Some((Some(-1.0), None)), log: Some("x".into()), ..figure() },
+                OwnFigure {
+                    xlim: Some((Some(2.0), Some(1.0))),
+                    ..figure()
+                },
+                "--xlim 2:1: the lower end must be less",
+            ),
+            (
+                OwnFigure {
+                    xlim: Some((Some(-1.0), None)),
+                    log: Some("x".into()),
+                    ..figure()
+                },
                 "--xlim -1:: must be > 0",
             ),
-            (OwnFigure { xlim: Some((Some(1.0), Some(2.0))), ..figure() }, "none of 8 sets lies within"),
-            (OwnFigure { panels: Some("regime".into()), ..figure() }, "--panels regime: no set has a value of it"),
+            (
+                OwnFigure {
+                    xlim: Some((Some(1.0), Some(2.0))),
+                    ..figure()
+                },
+                "none of 8 sets lies within",
+            ),
+            (
+                OwnFigure {
+                    panels: Some("regime".into()),
+                    ..figure()
+                },
+                "--panels regime: no set has a value of it",
+            ),
         ] {
             let found = problem(&figure);
             assert!(found.contains(expected), "{found}");
         }
-        let many = OwnFigure { panels: Some("V0".into()), ..figure() };
-        let error = own(&rows(12), &many, &Look::default()).err().unwrap().to_string();
+        let many = OwnFigure {
+            panels: Some("V0".into()),
+            ..figure()
+        };
+        let error = own(&rows(12), &many, &Look::default())
+            .err()
+            .unwrap()
+            .to_string();
         assert!(
-            error.contains("--panels V0: has 12 values, and 9 panels fit a page; show it with --colour"),
+            error.contains(
+                "--panels V0: has 12 values, and 9 panels fit a page; show it with --colour"
+            ),
             "{error}"
         );
     }
@@ -736,7 +1168,15 @@ pub(super) mod tests {
         let lines = |rows: &[SetRow], name: &str| {
             let (swept, x) = (swept(rows), Asked::of(rows, "x", name).unwrap());
             let sets: Vec<usize> = (0..rows.len()).collect();
-            Chart { rows, swept: &swept, x, ys: Vec::new(), colour: None, panels: None }.lines(&sets)
+            Chart {
+                rows,
+                swept: &swept,
+                x,
+                ys: Vec::new(),
+                colour: None,
+                panels: None,
+            }
+            .lines(&sets)
         };
         let rows = rows(8);
         assert_eq!(lines(&rows, "V0"), [vec![1, 3, 5, 7], vec![0, 2, 4, 6]]);
@@ -751,12 +1191,25 @@ pub(super) mod tests {
 
     #[test]
     fn sets_of_one_measured_colour_are_not_joined_and_what_nothing_shows_is_said() {
-        let strokes = |figure: &OwnFigure| svg(figure).matches(&format!(r#"stroke-width="{LINE_WIDTH}""#)).count();
-        let measured = OwnFigure { colour: Some("tau_mean".into()), ..figure() };
+        let strokes = |figure: &OwnFigure| {
+            svg(figure)
+                .matches(&format!(r#"stroke-width="{LINE_WIDTH}""#))
+                .count()
+        };
+        let measured = OwnFigure {
+            colour: Some("tau_mean".into()),
+            ..figure()
+        };
         assert!(strokes(&figure()) > strokes(&measured));
         let pooled = "not told apart: sets that differ in Δ";
         assert!(svg(&measured).contains(pooled) && !svg(&figure()).contains(pooled));
-        assert!(!svg(&OwnFigure { x: Some("V0*Delta".into()), ..measured }).contains(pooled));
+        assert!(
+            !svg(&OwnFigure {
+                x: Some("V0*Delta".into()),
+                ..measured
+            })
+            .contains(pooled)
+        );
     }
 
     /// Sets with this spread of thresholds in N, under a modulation of this amplitude in m.
@@ -772,13 +1225,19 @@ pub(super) mod tests {
 
     #[test]
     fn an_overview_has_the_longest_axis_the_next_as_colours_and_the_third_as_panels() {
-        let mut sets: Vec<SetRow> =
-            [0.0, 0.0137, 0.137].iter().flat_map(|&dfs| [spread(dfs, 0.0), spread(dfs, 1e-6)]).collect();
+        let mut sets: Vec<SetRow> = [0.0, 0.0137, 0.137]
+            .iter()
+            .flat_map(|&dfs| [spread(dfs, 0.0), spread(dfs, 1e-6)])
+            .collect();
         let svg = overview_of(&sets);
         for text in ["(c) Mean friction ⟨Fₛ⟩ (N)", "Δ = 0", "Δ = 1 µm", "0.137"] {
             assert!(svg.contains(&format!(">{text}<")), "{text}");
         }
-        assert!(svg.contains("Δfₛ (N)<") && !svg.contains("Share of time") && !svg.contains("by the drive alone"));
+        assert!(
+            svg.contains("Δfₛ (N)<")
+                && !svg.contains("Share of time")
+                && !svg.contains("by the drive alone")
+        );
         let mut larger = sets.clone();
         for set in &mut larger {
             set.parameters.parameters.blocks = 9;
@@ -793,40 +1252,68 @@ pub(super) mod tests {
         assert!(with.contains(">by the drive alone<"));
         // A mark of few dashes, and curves of many.
         assert!(with.matches("<path").count() - svg.matches("<path").count() > 30);
-        assert!(overview_of(&sets[..1]).contains("Drive velocity V₀"), "a single set");
+        assert!(
+            overview_of(&sets[..1]).contains("Drive velocity V₀"),
+            "a single set"
+        );
         assert!(overview(&[], &Look::default()).is_none());
     }
 
     #[test]
     fn sets_without_modulation_are_levels_over_the_frequency_and_the_first_amplitude() {
-        let mut sets: Vec<SetRow> = [0.01, 0.02, 0.04].map(|period| set(1e-6, period, 4.0)).to_vec();
-        let dashes = |svg: &str| svg.matches(&format!(r#"stroke="{}""#, REFERENCE.ink)).count();
+        let mut sets: Vec<SetRow> = [0.01, 0.02, 0.04]
+            .map(|period| set(1e-6, period, 4.0))
+            .to_vec();
+        let dashes = |svg: &str| {
+            svg.matches(&format!(r#"stroke="{}""#, REFERENCE.ink))
+                .count()
+        };
         let without = overview_of(&sets);
         sets.push(set(0.0, 1.0, 0.1));
         let with = overview_of(&sets);
-        assert!(with.contains(">Δ = 0<") && !without.contains(">Δ = 0<") && dashes(&with) > dashes(&without) + 30);
+        assert!(
+            with.contains(">Δ = 0<")
+                && !without.contains(">Δ = 0<")
+                && dashes(&with) > dashes(&without) + 30
+        );
         assert!(with.contains(">Modulation frequency 1/T (Hz)<") && !with.contains("not shown"));
-        let amplitudes: Vec<SetRow> = (0..5).map(|step| set(1e-6 * f64::from(step), 0.02, 4.0)).collect();
+        let amplitudes: Vec<SetRow> = (0..5)
+            .map(|step| set(1e-6 * f64::from(step), 0.02, 4.0))
+            .collect();
         let svg = overview_of(&amplitudes);
         assert!(svg.contains(">Amplitude Δ (µm)<") && svg.contains("of the peak force"));
     }
 
     #[test]
     fn sets_that_slide_are_open_circles_and_counted_where_there_is_no_interval() {
-        let mut sets: Vec<SetRow> = (1..6).map(|step| spread(0.01 * f64::from(step), 0.0)).collect();
+        let mut sets: Vec<SetRow> = (1..6)
+            .map(|step| spread(0.01 * f64::from(step), 0.0))
+            .collect();
         assert!(!overview_of(&sets).contains("slide"));
         for set in &mut sets[3..] {
             (set.regime, set.tau_mean, set.tau_deviation) = (Some(Regime::Sliding), None, None);
         }
         let svg = overview_of(&sets);
-        assert!(svg.contains("2 of 5 sets slide: no") && svg.contains(">sliding<") && svg.contains("Share of time"));
+        assert!(
+            svg.contains("2 of 5 sets slide: no")
+                && svg.contains(">sliding<")
+                && svg.contains("Share of time")
+        );
         assert!(!svg.contains("not shown"));
     }
 
     #[test]
     fn many_periods_and_few_amplitudes_make_a_staircase() {
         let steps = |amplitude: f64, count: u32| -> Vec<SetRow> {
-            (1..=count).map(|step| set(amplitude, 0.01 * f64::from(step), (12.0 / f64::from(step)).ceil())).collect()
+            (1..=count)
+                .map(|step| {
+                    set(
+                        amplitude,
+                        0.01 * f64::from(step),
+                        (12.0 / f64::from(step)).ceil(),
+                    )
+                })
+                .collect()
         };
         let mut sets = steps(1e-6, 24);
         let svg = staircase(&sets, &Look::default()).unwrap().svg();
@@ -851,8 +1338,15 @@ pub(super) mod tests {
     fn a_style_does_not_change_the_data() {
         use super::super::style::Style;
         let dots = |style| {
-            let look = Look { style, ..Look::default() };
-            own(&rows(8), &figure(), &look).unwrap().svg().matches("<circle").count()
+            let look = Look {
+                style,
+                ..Look::default()
+            };
+            own(&rows(8), &figure(), &look)
+                .unwrap()
+                .svg()
+                .matches("<circle")
+                .count()
         };
         assert_eq!(dots(Style::Screen), dots(Style::Print));
     }

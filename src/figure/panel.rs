@@ -43,13 +43,19 @@ pub(super) enum Layer<'a> {
 impl Layer<'_> {
     fn draw(self, sheet: &mut Picture, frame: &Frame) {
         match self {
-            Self::Inside(layers) => sheet.clipped([frame.left, frame.top, frame.width, frame.height], |sheet| {
-                for layer in layers {
-                    layer.draw(sheet, frame);
-                }
-            }),
+            Self::Inside(layers) => sheet.clipped(
+                [frame.left, frame.top, frame.width, frame.height],
+                |sheet| {
+                    for layer in layers {
+                        layer.draw(sheet, frame);
+                    }
+                },
+            ),
             Self::Curve(points, stroke) => {
-                sheet.line(points.into_iter().map(|point| frame.place(point)).collect(), stroke);
+                sheet.line(
+                    points.into_iter().map(|point| frame.place(point)).collect(),
+                    stroke,
+                );
             }
             Self::Level(y, stroke) => {
                 Self::Curve(vec![(frame.x.low, y), (frame.x.high, y)], stroke).draw(sheet, frame);
@@ -58,13 +64,18 @@ impl Layer<'_> {
                 Self::Curve(vec![(x, frame.y.low), (x, frame.y.high)], stroke).draw(sheet, frame);
             }
             Self::Stripe((low, high), fill) => {
-                let (left, right) = (frame.x_of(low.max(frame.x.low)), frame.x_of(high.min(frame.x.high)));
+                let (left, right) = (
+                    frame.x_of(low.max(frame.x.low)),
+                    frame.x_of(high.min(frame.x.high)),
+                );
                 if right > left {
                     sheet.rectangle([left, frame.top, right - left, frame.height], fill);
                 }
             }
             Self::Dots(points, dot) => {
-                let inside = points.into_iter().filter(|&(x, y)| frame.x.contains(x) && frame.y.contains(y));
+                let inside = points
+                    .into_iter()
+                    .filter(|&(x, y)| frame.x.contains(x) && frame.y.contains(y));
                 let centres: Vec<Place> = inside.map(|point| frame.place(point)).collect();
                 if !centres.is_empty() {
                     sheet.discs(centres, dot);
@@ -73,18 +84,30 @@ impl Layer<'_> {
             Self::Bars(bars, stroke) => {
                 for (x, (low, high)) in bars {
                     let (x, is_finite) = (frame.x_of(x), frame.y.place(low).is_finite());
-                    let bottom = if is_finite { frame.y_of(low).min(2.0 * frame.bottom()) } else { frame.bottom() };
+                    let bottom = if is_finite {
+                        frame.y_of(low).min(2.0 * frame.bottom())
+                    } else {
+                        frame.bottom()
+                    };
                     sheet.line(vec![(x, bottom), (x, frame.y_of(high))], stroke);
                 }
             }
-            Self::Cells(cells, overlap) => sheet.rectangles(cells.into_iter().map(|(cell, colour)| {
-                let [left, top, width, height] = frame.box_of(cell);
-                ([left, top, width + overlap, height + overlap], colour)
-            })),
+            Self::Cells(cells, overlap) => {
+                sheet.rectangles(cells.into_iter().map(|(cell, colour)| {
+                    let [left, top, width, height] = frame.box_of(cell);
+                    ([left, top, width + overlap, height + overlap], colour)
+                }))
+            }
             Self::Word((x, y), text, share) => {
                 let (x, y) = frame.place((frame.x.middle(x.0, x.1), frame.y.middle(y.0, y.1)));
                 let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
-                sheet.coloured_text(place, &text, LEGEND_TEXT, Anchor::Middle, Some(ink_on(share)));
+                sheet.coloured_text(
+                    place,
+                    &text,
+                    LEGEND_TEXT,
+                    Anchor::Middle,
+                    Some(ink_on(share)),
+                );
             }
             Self::Drawn(draw) => draw(sheet, frame),
         }
@@ -104,26 +127,58 @@ pub(super) struct Panel<'a> {
 
 impl<'a> Panel<'a> {
     pub(super) const fn new(height: f64, x: Axis, y: Axis, layers: Vec<Layer<'a>>) -> Self {
-        Self { height, x, y, layers, heading: None, bar: None }
+        Self {
+            height,
+            x,
+            y,
+            layers,
+            heading: None,
+            bar: None,
+        }
     }
 
     /// With all layers inside the frame.
-    pub(super) fn inside(height: f64, x: Axis, y: Axis, layers: impl IntoIterator<Item = Layer<'a>>) -> Self {
-        Self::new(height, x, y, vec![Layer::Inside(layers.into_iter().collect())])
+    pub(super) fn inside(
+        height: f64,
+        x: Axis,
+        y: Axis,
+        layers: impl IntoIterator<Item = Layer<'a>>,
+    ) -> Self {
+        Self::new(
+            height,
+            x,
+            y,
+            vec![Layer::Inside(layers.into_iter().collect())],
+        )
     }
 }
 
 /// Draws panels row by row, under a legend. Those of a row are as high as the first.
-pub(super) fn draw(name: &str, look: &Look, mut layout: Layout, legend: &[Entry], panels: Vec<Panel<'_>>) -> Picture {
+pub(super) fn draw(
+    name: &str,
+    look: &Look,
+    mut layout: Layout,
+    legend: &[Entry],
+    panels: Vec<Panel<'_>>,
+) -> Picture {
     if panels.iter().any(|panel| panel.bar.is_some()) {
         layout.right = COLOUR_BAR;
     }
     layout.has_headings = panels.iter().any(|panel| panel.heading.is_some());
-    let heights: Vec<f64> = panels.iter().step_by(layout.columns).map(|panel| panel.height).collect();
+    let heights: Vec<f64> = panels
+        .iter()
+        .step_by(layout.columns)
+        .map(|panel| panel.height)
+        .collect();
     let (page, mut sheet) = layout.page(name, look, legend, &heights);
     let count = panels.len();
     for (index, panel) in panels.into_iter().enumerate() {
-        let mut frame = page.frame(index / layout.columns, index % layout.columns, panel.x, panel.y);
+        let mut frame = page.frame(
+            index / layout.columns,
+            index % layout.columns,
+            panel.x,
+            panel.y,
+        );
         frame.is_lowest = index + layout.columns >= count;
         for layer in panel.layers {
             layer.draw(&mut sheet, &frame);

@@ -4,7 +4,9 @@
 use super::font;
 use kuva::render::color::Color;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
-use pdf_writer::types::{CidFontType, FontFlags, LineCapStyle, LineJoinStyle, SystemInfo, UnicodeCmap};
+use pdf_writer::types::{
+    CidFontType, FontFlags, LineCapStyle, LineJoinStyle, SystemInfo, UnicodeCmap,
+};
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str};
 use std::collections::BTreeMap;
 use subsetter::GlyphRemapper;
@@ -13,7 +15,11 @@ use ttf_parser::{Face, GlyphId};
 const FONT: Name = Name(b"F");
 /// Six letters and a plus mark a font that is not whole.
 const FONT_NAME: Name = Name(b"STICKS+DejaVuSans");
-const SYSTEM: SystemInfo = SystemInfo { registry: Str(b"Adobe"), ordering: Str(b"Identity"), supplement: 0 };
+const SYSTEM: SystemInfo = SystemInfo {
+    registry: Str(b"Adobe"),
+    ordering: Str(b"Identity"),
+    supplement: 0,
+};
 /// Units of widths and heights per em, in a PDF.
 const EM: f32 = 1000.0;
 const COMPRESSION: u8 = 8;
@@ -31,7 +37,8 @@ pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
     };
     // From the upper left corner, downwards.
     let (scale, height) = (single(points), single(points * scene.height));
-    page.content.transform([scale, 0.0, 0.0, -scale, 0.0, height]);
+    page.content
+        .transform([scale, 0.0, 0.0, -scale, 0.0, height]);
     page.content.set_line_join(LineJoinStyle::RoundJoin);
     for element in &scene.elements {
         page.draw(element)?;
@@ -39,7 +46,10 @@ pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
     page.write(font, single(points * scene.width), height)
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "a PDF has single precision")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a PDF has single precision"
+)]
 const fn single(value: f64) -> f32 {
     value as f32
 }
@@ -58,25 +68,64 @@ struct Page<'a> {
 impl Page<'_> {
     fn draw(&mut self, element: &Primitive) -> Result<(), String> {
         match element {
-            Primitive::PolyLine { points, stroke, stroke_width, .. } => self.line(points, stroke, *stroke_width),
-            Primitive::Rect { x, y, width, height, fill, opacity, .. } => {
-                self.with_opacity(*opacity, |page| page.rectangle([*x, *y, *width, *height], fill));
+            Primitive::PolyLine {
+                points,
+                stroke,
+                stroke_width,
+                ..
+            } => self.line(points, stroke, *stroke_width),
+            Primitive::Rect {
+                x,
+                y,
+                width,
+                height,
+                fill,
+                opacity,
+                ..
+            } => {
+                self.with_opacity(*opacity, |page| {
+                    page.rectangle([*x, *y, *width, *height], fill)
+                });
             }
             Primitive::RectBatch { x, y, w, h, fills } => {
                 for ((((&x, &y), &w), &h), fill) in x.iter().zip(y).zip(w).zip(h).zip(fills) {
                     self.rectangle([x, y, w, h], fill);
                 }
             }
-            Primitive::CircleBatch { cx, cy, r, fill, fill_opacity, .. } => {
+            Primitive::CircleBatch {
+                cx,
+                cy,
+                r,
+                fill,
+                fill_opacity,
+                ..
+            } => {
                 self.with_opacity(*fill_opacity, |page| page.circles(cx, cy, *r, fill));
             }
-            Primitive::Text { x, y, content, size, anchor, color, .. } => {
+            Primitive::Text {
+                x,
+                y,
+                content,
+                size,
+                anchor,
+                color,
+                ..
+            } => {
                 self.text((*x, *y), content, *size, *anchor, color.as_ref());
             }
-            Primitive::ClipStart { x, y, width, height, .. } => {
+            Primitive::ClipStart {
+                x,
+                y,
+                width,
+                height,
+                ..
+            } => {
                 self.content.save_state();
                 let [x, y, width, height] = [*x, *y, *width, *height].map(single);
-                self.content.rect(x, y, width, height).clip_nonzero().end_path();
+                self.content
+                    .rect(x, y, width, height)
+                    .clip_nonzero()
+                    .end_path();
             }
             Primitive::ClipEnd => {
                 self.content.restore_state();
@@ -88,10 +137,16 @@ impl Page<'_> {
 
     fn line(&mut self, points: &[(f64, f64)], stroke: &Color, width: f64) {
         let [red, green, blue] = parts(stroke);
-        self.content.set_stroke_rgb(red, green, blue).set_line_width(single(width));
+        self.content
+            .set_stroke_rgb(red, green, blue)
+            .set_line_width(single(width));
         for (index, &(x, y)) in points.iter().enumerate() {
             let (x, y) = (single(x), single(y));
-            let _ = if index == 0 { self.content.move_to(x, y) } else { self.content.line_to(x, y) };
+            let _ = if index == 0 {
+                self.content.move_to(x, y)
+            } else {
+                self.content.line_to(x, y)
+            };
         }
         self.content.stroke();
     }
@@ -111,7 +166,9 @@ impl Page<'_> {
     fn circles(&mut self, xs: &[f64], ys: &[f64], radius: f64, fill: &Color) {
         let [red, green, blue] = parts(fill);
         self.content.save_state();
-        self.content.set_stroke_rgb(red, green, blue).set_line_cap(LineCapStyle::RoundCap);
+        self.content
+            .set_stroke_rgb(red, green, blue)
+            .set_line_cap(LineCapStyle::RoundCap);
         self.content.set_line_width(single(2.0 * radius));
         for (&x, &y) in xs.iter().zip(ys) {
             let (x, y) = (single(x), single(y));
@@ -121,19 +178,29 @@ impl Page<'_> {
     }
 
     fn with_opacity(&mut self, opacity: Option<f64>, draw: impl FnOnce(&mut Self)) {
-        let Some(opacity) = opacity else { return draw(self) };
+        let Some(opacity) = opacity else {
+            return draw(self);
+        };
         let known = self.opacities.iter().position(|known| *known == opacity);
         let index = known.unwrap_or_else(|| {
             self.opacities.push(opacity);
             self.opacities.len() - 1
         });
         self.content.save_state();
-        self.content.set_parameters(Name(state_name(index).as_bytes()));
+        self.content
+            .set_parameters(Name(state_name(index).as_bytes()));
         draw(self);
         self.content.restore_state();
     }
 
-    fn text(&mut self, (x, y): (f64, f64), text: &str, size: u32, anchor: TextAnchor, color: Option<&Color>) {
+    fn text(
+        &mut self,
+        (x, y): (f64, f64),
+        text: &str,
+        size: u32,
+        anchor: TextAnchor,
+        color: Option<&Color>,
+    ) {
         let em = f32::from(self.face.units_per_em());
         let (mut codes, mut width) = (Vec::new(), 0.0);
         for letter in text.chars() {
@@ -153,7 +220,8 @@ impl Page<'_> {
         self.fill(color.unwrap_or(&Color::Rgb(0, 0, 0)));
         let left = single(x) - shift * width * size / EM;
         self.content.begin_text().set_font(FONT, size);
-        self.content.set_text_matrix([1.0, 0.0, 0.0, -1.0, left, single(y)]);
+        self.content
+            .set_text_matrix([1.0, 0.0, 0.0, -1.0, left, single(y)]);
         self.content.show(Str(&codes)).end_text();
     }
 
@@ -161,12 +229,19 @@ impl Page<'_> {
         let mut next = (1..).map(Ref::new);
         let mut id = || next.next().ok_or("there are too many objects");
         let (catalog, pages, page, content, font_id) = (id()?, id()?, id()?, id()?, id()?);
-        let states: Vec<Ref> = self.opacities.iter().map(|_| id()).collect::<Result<_, _>>()?;
+        let states: Vec<Ref> = self
+            .opacities
+            .iter()
+            .map(|_| id())
+            .collect::<Result<_, _>>()?;
         let mut pdf = Pdf::new();
         pdf.catalog(catalog).pages(pages);
         pdf.pages(pages).kids([page]).count(1);
         let mut written = pdf.page(page);
-        written.media_box(Rect::new(0.0, 0.0, width, height)).parent(pages).contents(content);
+        written
+            .media_box(Rect::new(0.0, 0.0, width, height))
+            .parent(pages)
+            .contents(content);
         let mut resources = written.resources();
         resources.fonts().pair(FONT, font_id);
         let mut named = resources.ext_g_states();
@@ -177,19 +252,27 @@ impl Page<'_> {
         resources.finish();
         written.finish();
         for (&opacity, &state) in self.opacities.iter().zip(&states) {
-            pdf.ext_graphics(state).non_stroking_alpha(single(opacity)).stroking_alpha(single(opacity));
+            pdf.ext_graphics(state)
+                .non_stroking_alpha(single(opacity))
+                .stroking_alpha(single(opacity));
         }
         let drawn = compressed(&self.content.finish());
         pdf.stream(content, &drawn).filter(Filter::FlateDecode);
 
         let (descendant, descriptor, file, to_unicode) = (id()?, id()?, id()?, id()?);
         let mut whole = pdf.type0_font(font_id);
-        whole.base_font(FONT_NAME).encoding_predefined(Name(b"Identity-H"));
+        whole
+            .base_font(FONT_NAME)
+            .encoding_predefined(Name(b"Identity-H"));
         whole.descendant_font(descendant).to_unicode(to_unicode);
         whole.finish();
         let mut cid = pdf.cid_font(descendant);
-        cid.subtype(CidFontType::Type2).base_font(FONT_NAME).system_info(SYSTEM).font_descriptor(descriptor);
-        cid.cid_to_gid_map_predefined(Name(b"Identity")).default_width(0.0);
+        cid.subtype(CidFontType::Type2)
+            .base_font(FONT_NAME)
+            .system_info(SYSTEM)
+            .font_descriptor(descriptor);
+        cid.cid_to_gid_map_predefined(Name(b"Identity"))
+            .default_width(0.0);
         let mut widths = cid.widths();
         for (&code, &(_, width)) in &self.letters {
             widths.same(code, code, width);
@@ -200,18 +283,35 @@ impl Page<'_> {
         let ems = |units: i16| EM * f32::from(units) / em;
         let bounds = self.face.global_bounding_box();
         let mut described = pdf.font_descriptor(descriptor);
-        described.name(FONT_NAME).flags(FontFlags::SYMBOLIC).italic_angle(0.0).stem_v(80.0).font_file2(file);
-        described.bbox(Rect::new(ems(bounds.x_min), ems(bounds.y_min), ems(bounds.x_max), ems(bounds.y_max)));
-        described.ascent(ems(self.face.ascender())).descent(ems(self.face.descender()));
-        described.cap_height(ems(self.face.capital_height().unwrap_or(self.face.ascender())));
+        described
+            .name(FONT_NAME)
+            .flags(FontFlags::SYMBOLIC)
+            .italic_angle(0.0)
+            .stem_v(80.0)
+            .font_file2(file);
+        described.bbox(Rect::new(
+            ems(bounds.x_min),
+            ems(bounds.y_min),
+            ems(bounds.x_max),
+            ems(bounds.y_max),
+        ));
+        described
+            .ascent(ems(self.face.ascender()))
+            .descent(ems(self.face.descender()));
+        described.cap_height(ems(self
+            .face
+            .capital_height()
+            .unwrap_or(self.face.ascender())));
         described.finish();
         let mut cmap: UnicodeCmap = UnicodeCmap::new(Name(b"Letters"), SYSTEM);
         for (&code, &(letter, _)) in &self.letters {
             cmap.pair(code, letter);
         }
         pdf.cmap(to_unicode, &cmap.finish());
-        let letters = subsetter::subset(font, 0, &self.glyphs).map_err(|error| error.to_string())?;
-        pdf.stream(file, &compressed(&letters)).filter(Filter::FlateDecode);
+        let letters =
+            subsetter::subset(font, 0, &self.glyphs).map_err(|error| error.to_string())?;
+        pdf.stream(file, &compressed(&letters))
+            .filter(Filter::FlateDecode);
         Ok(pdf.finish())
     }
 }

@@ -69,7 +69,8 @@ impl Picture {
 
     /// Width and height in mm.
     pub fn size(&self) -> Size {
-        let [width, height] = [self.scene.width, self.scene.height].map(|side| self.style.millimetres(side));
+        let [width, height] =
+            [self.scene.width, self.scene.height].map(|side| self.style.millimetres(side));
         Size { width, height }
     }
 
@@ -93,14 +94,17 @@ impl Picture {
             self.scene.width, self.scene.height
         );
         match (svg.find("width="), svg.find(" font-family=")) {
-            (Some(start), Some(end)) if start < end => format!("{}{sides}{}", &svg[..start], &svg[end..]),
+            (Some(start), Some(end)) if start < end => {
+                format!("{}{sides}{}", &svg[..start], &svg[end..])
+            }
             _ => svg,
         }
     }
 
     /// The figure as a PDF file of one page.
     pub fn pdf(&self) -> Result<Vec<u8>> {
-        pdf(&self.scene, self.style.points()).map_err(|reason| self.not_encoded(Format::Pdf, &reason))
+        pdf(&self.scene, self.style.points())
+            .map_err(|reason| self.not_encoded(Format::Pdf, &reason))
     }
 
     pub fn png(&self) -> Result<Vec<u8>> {
@@ -122,7 +126,11 @@ impl Picture {
     }
 
     fn not_encoded(&self, format: Format, reason: &str) -> anyhow::Error {
-        anyhow!("figure {}: cannot be turned into {}: {reason}", self.name, format.extension().to_uppercase())
+        anyhow!(
+            "figure {}: cannot be turned into {}: {reason}",
+            self.name,
+            format.extension().to_uppercase()
+        )
     }
 }
 
@@ -144,11 +152,19 @@ pub(super) struct Stroke {
 
 impl Stroke {
     pub(super) const fn solid(ink: Ink, width: f64) -> Self {
-        Self { ink, width, dashes: None }
+        Self {
+            ink,
+            width,
+            dashes: None,
+        }
     }
 
     pub(super) const fn dashed(ink: Ink, width: f64, dashes: (f64, f64)) -> Self {
-        Self { ink, width, dashes: Some(dashes) }
+        Self {
+            ink,
+            width,
+            dashes: Some(dashes),
+        }
     }
 }
 
@@ -161,7 +177,11 @@ pub(super) struct Dot {
 
 impl Dot {
     pub(super) const fn solid(ink: Ink, radius: f64) -> Self {
-        Self { ink, radius, opacity: 1.0 }
+        Self {
+            ink,
+            radius,
+            opacity: 1.0,
+        }
     }
 }
 
@@ -177,14 +197,29 @@ impl Picture {
         let mut scene = Scene::new(width, height);
         scene.font_family = Some(FONTS.to_owned());
         scene.text_color = Some(BLACK.to_owned());
-        Self { name: name.to_owned(), style: look.style, note: look.note.clone(), scene, clips: 0 }
+        Self {
+            name: name.to_owned(),
+            style: look.style,
+            note: look.note.clone(),
+            scene,
+            clips: 0,
+        }
     }
 
     /// Where each text starts and ends, and what it says.
     #[cfg(test)]
     pub(super) fn texts(&self) -> Vec<(f64, f64, String)> {
         let text = |primitive: &Primitive| {
-            let Primitive::Text { x, content, size, anchor, .. } = primitive else { return None };
+            let Primitive::Text {
+                x,
+                content,
+                size,
+                anchor,
+                ..
+            } = primitive
+            else {
+                return None;
+            };
             let width = font::width(content, *size);
             let start = match anchor {
                 Anchor::Start => *x,
@@ -262,12 +297,28 @@ impl Picture {
         // An SVG may hold no control characters.
         let content = shown_text(text).to_string();
         let Some((before, (lower, after))) = subscript(&content) else {
-            self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
+            self.scene.add(Primitive::Text {
+                x,
+                y,
+                content,
+                size,
+                anchor,
+                rotate: None,
+                bold: false,
+                color,
+            });
             return;
         };
         let small = SMALL * size / 10;
-        let parts = [(before, size, y), (lower, small, y + LOWER * f64::from(size)), (after, size, y)];
-        let width: f64 = parts.iter().map(|(part, size, _)| font::width(part, *size)).sum();
+        let parts = [
+            (before, size, y),
+            (lower, small, y + LOWER * f64::from(size)),
+            (after, size, y),
+        ];
+        let width: f64 = parts
+            .iter()
+            .map(|(part, size, _)| font::width(part, *size))
+            .sum();
         let mut start = match anchor {
             Anchor::Start => x,
             Anchor::Middle => x - 0.5 * width,
@@ -280,18 +331,34 @@ impl Picture {
     }
 
     /// A text with the middle of its digits at this height.
-    pub(super) fn centred_text(&mut self, (x, y): (f64, f64), text: &str, size: u32, anchor: Anchor) {
+    pub(super) fn centred_text(
+        &mut self,
+        (x, y): (f64, f64),
+        text: &str,
+        size: u32,
+        anchor: Anchor,
+    ) {
         self.text((x, y + HALF_DIGIT * f64::from(size)), text, size, anchor);
     }
 
     /// Shows what `draw` draws inside the rectangle only.
-    pub(super) fn clipped(&mut self, [x, y, width, height]: [f64; 4], draw: impl FnOnce(&mut Self)) {
+    pub(super) fn clipped(
+        &mut self,
+        [x, y, width, height]: [f64; 4],
+        draw: impl FnOnce(&mut Self),
+    ) {
         let id = format!("frame-{}", self.clips);
         self.clips += 1;
         self.scene.defs.push(format!(
             r#"<clipPath id="{id}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath>"#
         ));
-        self.scene.add(Primitive::ClipStart { x, y, width, height, id });
+        self.scene.add(Primitive::ClipStart {
+            x,
+            y,
+            width,
+            height,
+            id,
+        });
         draw(self);
         self.scene.add(Primitive::ClipEnd);
     }
@@ -299,7 +366,10 @@ impl Picture {
 
 /// What stands before the first symbol with a subscript such as `K_d`, that subscript, and what follows it.
 fn subscript(text: &str) -> Option<(&str, (&str, &str))> {
-    let place = SUBSCRIPTED.into_iter().filter_map(|symbol| text.find(symbol)).min()?;
+    let place = SUBSCRIPTED
+        .into_iter()
+        .filter_map(|symbol| text.find(symbol))
+        .min()?;
     let (before, rest) = text.split_at_checked(place + 1)?;
     Some((before, rest.get(1..)?.split_at_checked(1)?))
 }
@@ -313,7 +383,12 @@ fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
         let length = libm::hypot(end_x - x, end_y - y);
         let mut done = 0.0;
         while done < length {
-            let at = |done: f64| (x + (end_x - x) * done / length, y + (end_y - y) * done / length);
+            let at = |done: f64| {
+                (
+                    x + (end_x - x) * done / length,
+                    y + (end_y - y) * done / length,
+                )
+            };
             let step = left.min(length - done);
             if draws {
                 if current.is_empty() {
@@ -344,7 +419,10 @@ mod tests {
 
     #[test]
     fn symbols_are_split_before_their_subscripts_and_names_are_not() {
-        assert_eq!(subscript("K = 1, K_d = 2, F_N"), Some(("K = 1, K", ("d", " = 2, F_N"))));
+        assert_eq!(
+            subscript("K = 1, K_d = 2, F_N"),
+            Some(("K = 1, K", ("d", " = 2, F_N")))
+        );
         assert_eq!(subscript("my_sweep, T_to, K"), None);
     }
 

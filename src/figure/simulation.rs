@@ -41,8 +41,15 @@ pub fn simulation(
     map: Option<&[MapRow]>,
     onsets: &[f64],
 ) -> Result<Picture> {
-    let note = format!("{}, seed {}", common(std::iter::once(parameters)), parameters.seed);
-    let look = &Look { note, ..Look::default() };
+    let note = format!(
+        "{}, seed {}",
+        common(std::iter::once(parameters)),
+        parameters.seed
+    );
+    let look = &Look {
+        note,
+        ..Look::default()
+    };
     let empty = |what| anyhow!("figure {NAME}: there are no {what} to draw");
     let blocks = parameters.blocks;
     if map.is_some_and(|map| map.len() < 2 * blocks || !map.len().is_multiple_of(blocks)) {
@@ -50,18 +57,27 @@ pub fn simulation(
     }
     let instants = trace.into_iter().flatten().map(|sample| sample.0);
     let instants = instants.chain(map.into_iter().flatten().map(|cell| cell.time));
-    let (first, last) =
-        bounds(instants).filter(|(first, last)| last > first).ok_or_else(|| empty("instants of the simulation"))?;
+    let (first, last) = bounds(instants)
+        .filter(|(first, last)| last > first)
+        .ok_or_else(|| empty("instants of the simulation"))?;
     let (factor, unit) = label("tau_mean").scale(last);
     let x = || Axis::linear(&format!("Time t ({unit})"), factor * first, factor * last);
     // One that is ramped, or too fast, is not drawn.
-    let is_drawn = |period: &f64| parameters.ramp_time == 0.0 && (last - first) / period <= MAX_PERIODS;
+    let is_drawn =
+        |period: &f64| parameters.ramp_time == 0.0 && (last - first) / period <= MAX_PERIODS;
     let period = parameters.modulation_period.filter(is_drawn);
-    let onsets: Vec<f64> = onsets.iter().copied().filter(|onset| (first..=last).contains(onset)).collect();
+    let onsets: Vec<f64> = onsets
+        .iter()
+        .copied()
+        .filter(|onset| (first..=last).contains(onset))
+        .collect();
 
-    let peaks = period.map_or_else(Vec::new, |period| x().multiples_of(factor * period, MAX_PEAKS));
+    let peaks = period.map_or_else(Vec::new, |period| {
+        x().multiples_of(factor * period, MAX_PEAKS)
+    });
     let legend = [
-        map.filter(|_| !onsets.is_empty()).map(|_| entry(Mark::Line(ONSET), "onset of a slip")),
+        map.filter(|_| !onsets.is_empty())
+            .map(|_| entry(Mark::Line(ONSET), "onset of a slip")),
         (!peaks.is_empty()).then(|| entry(Mark::Line(REFERENCE), "peaks of the modulation")),
     ];
     let legend: Vec<_> = legend.into_iter().flatten().collect();
@@ -69,43 +85,95 @@ pub fn simulation(
     let peaks = || peaks.iter().map(|&peak| Layer::Upright(peak, REFERENCE));
     let modulation = period.map(|period| {
         let amplitude = MICROMETRES * parameters.modulation_amplitude;
-        let mut y = Axis::sparse("Modulation Δ cos(2πt/T) (µm)", -1.2 * amplitude, 1.2 * amplitude);
+        let mut y = Axis::sparse(
+            "Modulation Δ cos(2πt/T) (µm)",
+            -1.2 * amplitude,
+            1.2 * amplitude,
+        );
         y.minor.clear();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand points")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "some thousand points"
+        )]
         let points = (POINTS_PER_PERIOD * (last - first) / period) as u32 + 2;
-        let curve = x().evenly_placed(points).map(|time| (time, amplitude * libm::cos(TAU * time / (factor * period))));
+        let curve = x()
+            .evenly_placed(points)
+            .map(|time| (time, amplitude * libm::cos(TAU * time / (factor * period))));
         let level = std::iter::once(Layer::Level(0.0, GRID));
-        Panel::inside(64.0, x(), y, level.chain(peaks()).chain([Layer::Curve(curve.collect(), MODULATION)]))
+        Panel::inside(
+            64.0,
+            x(),
+            y,
+            level
+                .chain(peaks())
+                .chain([Layer::Curve(curve.collect(), MODULATION)]),
+        )
     });
     let force = trace.map(|trace| {
-        let (low, high) = widened(bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0)));
+        let (low, high) =
+            widened(bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0)));
         let y = Axis::linear("Shear force Fₛ (N)", low, high);
-        let force = thinned(trace, width).into_iter().map(|(time, force)| (factor * time, force));
-        Panel::inside(230.0, x(), y, peaks().chain([Layer::Curve(force.collect(), TRACE)]))
+        let force = thinned(trace, width)
+            .into_iter()
+            .map(|(time, force)| (factor * time, force));
+        Panel::inside(
+            230.0,
+            x(),
+            y,
+            peaks().chain([Layer::Curve(force.collect(), TRACE)]),
+        )
     });
     let contacts = map.map(|map| {
         let length = parameters.slider_length * MILLIMETRES;
         let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, length);
         let cells = cells(map, blocks, first, length, width).into_iter();
-        let cells = cells.map(|(((left, right), y), colour)| (((factor * left, factor * right), y), colour));
+        let cells = cells
+            .map(|(((left, right), y), colour)| (((factor * left, factor * right), y), colour));
         let cells = Layer::Cells(cells.collect(), OVERLAP);
         // Many lines would cover the slips.
-        let bottom = if onsets.len() > MAX_LINES { 0.93 * length } else { 0.0 };
-        let onsets =
-            onsets.iter().map(|onset| Layer::Curve(vec![(factor * onset, length), (factor * onset, bottom)], ONSET));
+        let bottom = if onsets.len() > MAX_LINES {
+            0.93 * length
+        } else {
+            0.0
+        };
+        let onsets = onsets.iter().map(|onset| {
+            Layer::Curve(
+                vec![(factor * onset, length), (factor * onset, bottom)],
+                ONSET,
+            )
+        });
         let percent = ColourBar::of_axis(&Axis::linear("detached (%)", 0.0, 100.0), shade);
         Panel {
             bar: Some(percent),
-            ..Panel::inside(260.0, x(), y, std::iter::once(cells).chain(peaks()).chain(onsets))
+            ..Panel::inside(
+                260.0,
+                x(),
+                y,
+                std::iter::once(cells).chain(peaks()).chain(onsets),
+            )
         }
     });
-    let panels = [modulation, force, contacts].into_iter().flatten().collect();
-    Ok(panel::draw(NAME, look, Layout::column(width), &legend, panels))
+    let panels = [modulation, force, contacts]
+        .into_iter()
+        .flatten()
+        .collect();
+    Ok(panel::draw(
+        NAME,
+        look,
+        Layout::column(width),
+        &legend,
+        panels,
+    ))
 }
 
 /// The least and the largest of the samples of each column of a figure: no peak is lost.
 fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the width of a figure"
+    )]
     let columns = (2.0 * width) as usize;
     let samples = trace.len().div_ceil(columns).max(1);
     if samples <= 4 {
@@ -113,7 +181,10 @@ fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
     }
     let extremes = |column: &[(f64, f64)]| {
         let by_force = |left: &&(f64, f64), right: &&(f64, f64)| left.1.total_cmp(&right.1);
-        let (least, most) = (column.iter().min_by(by_force).copied(), column.iter().max_by(by_force).copied());
+        let (least, most) = (
+            column.iter().min_by(by_force).copied(),
+            column.iter().max_by(by_force).copied(),
+        );
         let mut pair: Vec<(f64, f64)> = least.into_iter().chain(most).collect();
         pair.sort_by(|left, right| left.0.total_cmp(&right.0));
         pair
@@ -124,8 +195,14 @@ fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
 /// Cells of the map on axes of this time and length: averages over the instants of a column one unit wide, equal
 /// neighbours joined.
 fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> Vec<(Cell, Color)> {
-    let (instants, time) = (map.len() / blocks, |instant: usize| map[instant * blocks].time);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
+    let (instants, time) = (map.len() / blocks, |instant: usize| {
+        map[instant * blocks].time
+    });
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the width of a figure"
+    )]
     let columns = (width as usize).min(instants);
     // Half a spacing on both sides of an instant belongs to it.
     let spacing = (time(instants - 1) - time(0)) / (instants - 1) as f64;
@@ -135,7 +212,9 @@ fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> 
     let level = |block: usize, column: usize| {
         let span = start_of(column)..start_of(column + 1);
         let count = span.len() as f64;
-        let sum: f64 = span.map(|instant| map[instant * blocks + block].attached_fraction).sum();
+        let sum: f64 = span
+            .map(|instant| map[instant * blocks + block].attached_fraction)
+            .sum();
         (sum / count * LEVELS).round()
     };
     let mut cells = Vec::new();
@@ -144,7 +223,10 @@ fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> 
         let mut column = 0;
         for run in levels.chunk_by(|left, right| left == right) {
             let times = (left_of(column), left_of(column + run.len()));
-            cells.push(((times, (bottom_of(block), bottom_of(block + 1))), shade(1.0 - run[0] / LEVELS)));
+            cells.push((
+                (times, (bottom_of(block), bottom_of(block + 1))),
+                shade(1.0 - run[0] / LEVELS),
+            ));
             column += run.len();
         }
     }
@@ -157,7 +239,8 @@ mod tests {
 
     #[test]
     fn a_thinned_trace_keeps_every_peak() {
-        let mut trace: Vec<(f64, f64)> = (0..1_000_000).map(|step| (f64::from(step), 1.0)).collect();
+        let mut trace: Vec<(f64, f64)> =
+            (0..1_000_000).map(|step| (f64::from(step), 1.0)).collect();
         trace[123_456].1 = 9.0;
         trace[654_321].1 = -9.0;
         let thin = thinned(&trace, 600.0);
@@ -168,14 +251,21 @@ mod tests {
 
     /// Of three blocks at two instants.
     fn map() -> Vec<MapRow> {
-        let cell =
-            |cell: u32| MapRow { time: f64::from(cell / 3), block: u64::from(cell % 3) + 1, attached_fraction: 1.0 };
+        let cell = |cell: u32| MapRow {
+            time: f64::from(cell / 3),
+            block: u64::from(cell % 3) + 1,
+            attached_fraction: 1.0,
+        };
         (0..6).map(cell).collect()
     }
 
     const FORCE: &[(f64, f64)] = &[(0.0, 1.0), (1.0, 2.0)];
 
-    fn drawn(trace: Option<&[(f64, f64)]>, map: Option<&[MapRow]>, period: Option<f64>) -> Option<String> {
+    fn drawn(
+        trace: Option<&[(f64, f64)]>,
+        map: Option<&[MapRow]>,
+        period: Option<f64>,
+    ) -> Option<String> {
         let amplitude = if period.is_some() { 1e-6 } else { 0.0 };
         let parameters = Parameters {
             blocks: 3,
@@ -190,18 +280,36 @@ mod tests {
     fn a_map_of_the_wrong_size_is_refused() {
         assert!(drawn(Some(FORCE), Some(&map()[..5]), None).is_none());
         assert!(drawn(Some(FORCE), Some(&map()), None).is_some());
-        assert!(drawn(Some(&FORCE[..1]), None, None).is_none() && drawn(None, None, None).is_none());
+        assert!(
+            drawn(Some(&FORCE[..1]), None, None).is_none() && drawn(None, None, None).is_none()
+        );
     }
 
     #[test]
     fn the_requested_panels_are_drawn_and_labelled_once() {
-        let (force, position, bar) = ("Shear force Fₛ (N)<", "Position x (mm), trailing edge at 0<", ">detached (%)<");
-        let panels =
-            [(true, false, vec![force]), (false, true, vec![position, bar]), (true, true, vec![force, position, bar])];
+        let (force, position, bar) = (
+            "Shear force Fₛ (N)<",
+            "Position x (mm), trailing edge at 0<",
+            ">detached (%)<",
+        );
+        let panels = [
+            (true, false, vec![force]),
+            (false, true, vec![position, bar]),
+            (true, true, vec![force, position, bar]),
+        ];
         for (has_trace, has_map, labels) in panels {
-            let svg = drawn(has_trace.then_some(FORCE), has_map.then_some(&map()[..]), None).unwrap();
+            let svg = drawn(
+                has_trace.then_some(FORCE),
+                has_map.then_some(&map()[..]),
+                None,
+            )
+            .unwrap();
             for label in [force, position, bar] {
-                assert_eq!(svg.matches(label).count(), usize::from(labels.contains(&label)), "{label}");
+                assert_eq!(
+                    svg.matches(label).count(),
+                    usize::from(labels.contains(&label)),
+                    "{label}"
+                );
             }
             assert_eq!(svg.matches(">Time t (s)<").count(), 1);
         }
@@ -210,11 +318,27 @@ mod tests {
     #[test]
     fn the_modulation_and_the_onsets_that_are_shown_are_drawn() {
         let modulated = drawn(None, Some(&map()), Some(0.25)).unwrap();
-        assert!(modulated.contains("Modulation Δ cos(2πt/T) (µm)") && modulated.contains("peaks of the modulation"));
+        assert!(
+            modulated.contains("Modulation Δ cos(2πt/T) (µm)")
+                && modulated.contains("peaks of the modulation")
+        );
         let still = drawn(None, Some(&map()), None).unwrap();
         assert!(!still.contains("Modulation") && still.contains("onset of a slip"));
-        assert!(!drawn(Some(FORCE), None, None).unwrap().contains("onset of a slip"), "onsets go with the map");
-        assert!(!drawn(None, Some(&map()), Some(1e-3)).unwrap().contains("Modulation"), "a thousand periods");
-        assert_eq!(Axis::linear("", 0.3, 1.0).multiples_of(0.25, MAX_PEAKS), [0.5, 0.75, 1.0]);
+        assert!(
+            !drawn(Some(FORCE), None, None)
+                .unwrap()
+                .contains("onset of a slip"),
+            "onsets go with the map"
+        );
+        assert!(
+            !drawn(None, Some(&map()), Some(1e-3))
+                .unwrap()
+                .contains("Modulation"),
+            "a thousand periods"
+        );
+        assert_eq!(
+            Axis::linear("", 0.3, 1.0).multiples_of(0.25, MAX_PEAKS),
+            [0.5, 0.75, 1.0]
+        );
     }
 }

@@ -43,7 +43,10 @@ impl Style {
     pub(super) fn width(self, natural: f64) -> f64 {
         match self {
             Self::Screen => natural,
-            Self::Print => COLUMNS[usize::from(natural > MAX_ONE_COLUMN)] * POINTS_PER_MILLIMETRE / self.points(),
+            Self::Print => {
+                COLUMNS[usize::from(natural > MAX_ONE_COLUMN)] * POINTS_PER_MILLIMETRE
+                    / self.points()
+            }
         }
     }
 
@@ -86,13 +89,20 @@ impl FromStr for Size {
                 "px" => 25.4 / 96.0,
                 _ => return None,
             };
-            number.parse::<f64>().ok().map(|number| number * millimetres).filter(|side| *side > 0.0 && *side <= LONGEST)
+            number
+                .parse::<f64>()
+                .ok()
+                .map(|number| number * millimetres)
+                .filter(|side| *side > 0.0 && *side <= LONGEST)
         };
         // The x of px is none between sides.
-        let between = text.match_indices('x').map(|(at, _)| at).find(|&at| !text[..at].ends_with('p'));
+        let between = text
+            .match_indices('x')
+            .map(|(at, _)| at)
+            .find(|&at| !text[..at].ends_with('p'));
         let sides = between.and_then(|at| Some((length(&text[..at])?, length(&text[at + 1..])?)));
-        let (width, height) =
-            sides.ok_or("must be WIDTHxHEIGHT in mm, cm, in, pt or px, up to 2 m, such as 86mmx60mm")?;
+        let (width, height) = sides
+            .ok_or("must be WIDTHxHEIGHT in mm, cm, in, pt or px, up to 2 m, such as 86mmx60mm")?;
         Ok(Self { width, height })
     }
 }
@@ -109,13 +119,23 @@ pub struct Look {
 impl Look {
     /// The usual look of the figures of a sweep with this name.
     pub fn of_sweep(name: &str) -> Self {
-        Self { note: format!("Sweep {name}"), ..Self::default() }
+        Self {
+            note: format!("Sweep {name}"),
+            ..Self::default()
+        }
     }
 
     /// The same look with more small print.
     pub fn with_note(&self, more: &str) -> Self {
-        let between = if self.note.is_empty() || more.is_empty() { "" } else { "; " };
-        Self { note: format!("{}{between}{more}", self.note), ..self.clone() }
+        let between = if self.note.is_empty() || more.is_empty() {
+            ""
+        } else {
+            "; "
+        };
+        Self {
+            note: format!("{}{between}{more}", self.note),
+            ..self.clone()
+        }
     }
 }
 
@@ -139,11 +159,15 @@ pub(super) const WHITE: Ink = "#ffffff";
 pub(super) const RED: Ink = "#d62020";
 pub(super) const BLUE: Ink = "#1f55c4";
 /// For lines side by side: colours that colour-blind readers can distinguish (Okabe and Ito).
-pub const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+pub const INKS: [Ink; 6] = [
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
+];
 
 /// For dots on a scale: the darker of the shades, which are seen on white.
-pub const SCALE: [Ink; 10] =
-    ["#abd4ce", "#8fc7c7", "#74b9c1", "#5ba9ba", "#4598b2", "#3586a8", "#2a749c", "#22618e", "#1e4e7c", "#1b3a68"];
+pub const SCALE: [Ink; 10] = [
+    "#abd4ce", "#8fc7c7", "#74b9c1", "#5ba9ba", "#4598b2", "#3586a8", "#2a749c", "#22618e",
+    "#1e4e7c", "#1b3a68",
+];
 
 /// Border and ticks of a frame.
 pub(super) const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
@@ -153,7 +177,10 @@ pub(super) const GRID: Stroke = Stroke::solid(LIGHT_GREY, 1.0);
 pub(super) const REFERENCE: Stroke = Stroke::dashed(GREY, 1.4, (6.0, 4.0));
 pub(super) const BAR_WIDTH: f64 = 1.6;
 /// A range that is pointed out.
-pub(super) const STRIPE: Fill = Fill { ink: LIGHT_GREY, opacity: 0.35 };
+pub(super) const STRIPE: Fill = Fill {
+    ink: LIGHT_GREY,
+    opacity: 0.35,
+};
 /// Radius of the dots of statistics.
 pub(super) const RADIUS: f64 = 4.2;
 
@@ -179,7 +206,11 @@ const SHADES: [[f64; 3]; 8] = [
 ];
 
 /// From blue, below, by nearly white to red, above: also for the colour-blind (ends of RdBu, ColorBrewer).
-const DIVERGING: [[f64; 3]; 3] = [[33.0, 102.0, 172.0], [247.0, 247.0, 247.0], [178.0, 24.0, 43.0]];
+const DIVERGING: [[f64; 3]; 3] = [
+    [33.0, 102.0, 172.0],
+    [247.0, 247.0, 247.0],
+    [178.0, 24.0, 43.0],
+];
 
 /// A share from 0 to 1 as a colour on a light ground, pale at 0.
 pub(super) fn shade(share: f64) -> Color {
@@ -192,22 +223,36 @@ pub(super) fn diverging(share: f64) -> Color {
 }
 
 fn colour([red, green, blue]: [f64; 3]) -> Color {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 255")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to 255"
+    )]
     let part = |part: f64| part.round() as u8;
     Color::Rgb(part(red), part(green), part(blue))
 }
 
 /// Black or white, whichever is read on this shade.
 pub(super) fn ink_on(share: f64) -> Color {
-    Color::from(if lightness(mixed(&SHADES, share)) < 0.55 { WHITE } else { BLACK })
+    Color::from(if lightness(mixed(&SHADES, share)) < 0.55 {
+        WHITE
+    } else {
+        BLACK
+    })
 }
 
 fn mixed(colours: &[[f64; 3]], share: f64) -> [f64; 3] {
     let place = share.clamp(0.0, 1.0) * (colours.len() - 1) as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an index"
+    )]
     let index = (place as usize).min(colours.len() - 2);
     let part = place - index as f64;
-    std::array::from_fn(|channel| (1.0 - part) * colours[index][channel] + part * colours[index + 1][channel])
+    std::array::from_fn(|channel| {
+        (1.0 - part) * colours[index][channel] + part * colours[index + 1][channel]
+    })
 }
 
 /// Lightness from 0 to 1, of the parts of a colour as they are stored.
@@ -228,20 +273,46 @@ mod tests {
             })
             .collect();
         let mean = steps.iter().sum::<f64>() / 70.0;
-        assert!(steps.iter().all(|step| (0.6 * mean..1.4 * mean).contains(step)), "{steps:?}");
+        assert!(
+            steps
+                .iter()
+                .all(|step| (0.6 * mean..1.4 * mean).contains(step)),
+            "{steps:?}"
+        );
         assert!(lightness(mixed(&SHADES, 0.0)) > 0.95);
     }
 
     #[test]
     fn sizes_are_read_in_their_units() {
         let size = |text: &str| text.parse::<Size>().unwrap();
-        assert_eq!(size("86mmx60mm"), Size { width: 86.0, height: 60.0 });
-        assert_eq!(size("8.6cmx6cm"), Size { width: 86.0, height: 60.0 });
+        assert_eq!(
+            size("86mmx60mm"),
+            Size {
+                width: 86.0,
+                height: 60.0
+            }
+        );
+        assert_eq!(
+            size("8.6cmx6cm"),
+            Size {
+                width: 86.0,
+                height: 60.0
+            }
+        );
         assert!((size("96pxx192px").height - 50.8).abs() < 1e-9);
         assert!((size("72ptx1in").width - 25.4).abs() < 1e-9);
-        for wrong in
-            ["", "86mm", "86x60", "0mmx60mm", "-1mmx5mm", "nanmmx5mm", "9e9mmx5mm", "86mmx60furlong", "mmxmm", "µmxµm"]
-        {
+        for wrong in [
+            "",
+            "86mm",
+            "86x60",
+            "0mmx60mm",
+            "-1mmx5mm",
+            "nanmmx5mm",
+            "9e9mmx5mm",
+            "86mmx60furlong",
+            "mmxmm",
+            "µmxµm",
+        ] {
             assert!(wrong.parse::<Size>().is_err(), "{wrong}");
         }
     }

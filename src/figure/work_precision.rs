@@ -51,20 +51,54 @@ pub struct ErrorPanel {
 
 impl ErrorPanel {
     fn usable(&self) -> impl Iterator<Item = &WorkPrecision> {
-        self.points.iter().filter(|point| point.error > 0.0 && point.work > 0.0)
+        self.points
+            .iter()
+            .filter(|point| point.error > 0.0 && point.work > 0.0)
     }
 
     /// A method under a drive, on an axis of errors that begins at `least`: joined by a line unless errors are chance.
-    fn layer<'a>(&self, of: (&str, &str), (ink, (dashes, radius, hole)): (Ink, Pattern), least: f64) -> Layer<'a> {
-        let points = || self.usable().filter(|point| (&*point.method, &*point.drive) == of);
+    fn layer<'a>(
+        &self,
+        of: (&str, &str),
+        (ink, (dashes, radius, hole)): (Ink, Pattern),
+        least: f64,
+    ) -> Layer<'a> {
+        let points = || {
+            self.usable()
+                .filter(|point| (&*point.method, &*point.drive) == of)
+        };
         let places = || points().map(|point| (point.error, point.work)).collect();
-        let line = self.by_chance.is_none().then(|| Layer::Curve(places(), Stroke { ink, width: 1.8, dashes }));
-        let bars = points().map(|WorkPrecision { uncertainty: (low, high), work, .. }| {
-            Layer::Curve(vec![(low.max(least), *work), (*high, *work)], Stroke::solid(ink, UNCERTAINTY))
+        let line = self.by_chance.is_none().then(|| {
+            Layer::Curve(
+                places(),
+                Stroke {
+                    ink,
+                    width: 1.8,
+                    dashes,
+                },
+            )
         });
+        let bars = points().map(
+            |WorkPrecision {
+                 uncertainty: (low, high),
+                 work,
+                 ..
+             }| {
+                Layer::Curve(
+                    vec![(low.max(least), *work), (*high, *work)],
+                    Stroke::solid(ink, UNCERTAINTY),
+                )
+            },
+        );
         let dots = Layer::Dots(places(), Dot::solid(ink, radius));
         let holes = (hole > 0.0).then(|| Layer::Dots(places(), Dot::solid(WHITE, hole)));
-        Layer::Inside(line.into_iter().chain(bars).chain([dots]).chain(holes).collect())
+        Layer::Inside(
+            line.into_iter()
+                .chain(bars)
+                .chain([dots])
+                .chain(holes)
+                .collect(),
+        )
     }
 }
 
@@ -72,37 +106,74 @@ impl ErrorPanel {
 /// given order; values that are not > 0 are left out.
 pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> Result<Picture> {
     let empty = || anyhow!("figure {NAME}: there are no errors and costs to draw");
-    let works = panels.iter().flat_map(ErrorPanel::usable).map(|point| point.work);
+    let works = panels
+        .iter()
+        .flat_map(ErrorPanel::usable)
+        .map(|point| point.work);
     let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
     let all = || panels.iter().flat_map(|panel| &panel.points);
-    let (methods, drives) = (distinct(all().map(|point| &*point.method)), distinct(all().map(|point| &*point.drive)));
+    let (methods, drives) = (
+        distinct(all().map(|point| &*point.method)),
+        distinct(all().map(|point| &*point.drive)),
+    );
     let inks = methods.iter().zip(INKS.into_iter().cycle());
     let looks = inks.flat_map(|(method, ink)| {
-        drives.iter().enumerate().map(move |(place, drive)| ((*method, *drive), (ink, pattern(place))))
+        drives
+            .iter()
+            .enumerate()
+            .map(move |(place, drive)| ((*method, *drive), (ink, pattern(place))))
     });
     let is_known = |of: (&str, &str)| all().any(|point| (&*point.method, &*point.drive) == of);
     let looks: Vec<_> = looks.filter(|(of, _)| is_known(*of)).collect();
-    let lines = looks.iter().map(|&((method, drive), (ink, (_, radius, hole)))| {
-        let dot = Mark::Dot(Dot::solid(ink, radius));
-        let mark = if hole > 0.0 { Mark::Ring(ink, radius, hole) } else { dot };
-        entry(mark, format!("{method}, {drive}"))
-    });
+    let lines = looks
+        .iter()
+        .map(|&((method, drive), (ink, (_, radius, hole)))| {
+            let dot = Mark::Dot(Dot::solid(ink, radius));
+            let mark = if hole > 0.0 {
+                Mark::Ring(ink, radius, hole)
+            } else {
+                dot
+            };
+            entry(mark, format!("{method}, {drive}"))
+        });
     let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
-    let chance = has_chance.then(|| entry(Mark::Patch(STRIPE), "what chance alone gives in 95 of 100 cases"));
+    let chance = has_chance.then(|| {
+        entry(
+            Mark::Patch(STRIPE),
+            "what chance alone gives in 95 of 100 cases",
+        )
+    });
     let legend: Vec<_> = lines.chain(chance).collect();
-    let layout = Layout { columns: panels.len(), column_gap: COLUMN_GAP, ..Layout::column(WIDTH) };
+    let layout = Layout {
+        columns: panels.len(),
+        column_gap: COLUMN_GAP,
+        ..Layout::column(WIDTH)
+    };
     let panel = |(column, panel): (usize, &ErrorPanel)| {
         // Lower ends may be 0: they run out of the panel.
-        let ends = panel.usable().flat_map(|point| [point.error, point.uncertainty.1]);
+        let ends = panel
+            .usable()
+            .flat_map(|point| [point.error, point.uncertainty.1]);
         let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance))?;
         let y = Axis::logarithmic(if column == 0 { work_label } else { "" }, least, most);
         let x = Axis::logarithmic(&panel.label, low, high);
-        let chance = panel.by_chance.map(|by_chance| Layer::Stripe((low, by_chance), STRIPE));
-        let layers = chance.into_iter().chain(looks.iter().map(|&(of, look)| panel.layer(of, look, x.low))).collect();
+        let chance = panel
+            .by_chance
+            .map(|by_chance| Layer::Stripe((low, by_chance), STRIPE));
+        let layers = chance
+            .into_iter()
+            .chain(looks.iter().map(|&(of, look)| panel.layer(of, look, x.low)))
+            .collect();
         Some(Panel::new(HEIGHT, x, y, layers))
     };
     let panels: Option<Vec<Panel<'_>>> = panels.iter().enumerate().map(panel).collect();
-    Ok(panel::draw(NAME, look, layout, &legend, panels.ok_or_else(empty)?))
+    Ok(panel::draw(
+        NAME,
+        look,
+        layout,
+        &legend,
+        panels.ok_or_else(empty)?,
+    ))
 }
 
 /// Each name once, in the order of first appearance.
@@ -121,8 +192,17 @@ mod tests {
 
     #[test]
     fn twelve_drives_look_different() {
-        let looks: Vec<(f64, f64)> = (0..12).map(pattern).map(|(_, radius, hole)| (radius, hole)).collect();
-        assert!(looks.iter().enumerate().all(|(place, look)| !looks[..place].contains(look)), "{looks:?}");
+        let looks: Vec<(f64, f64)> = (0..12)
+            .map(pattern)
+            .map(|(_, radius, hole)| (radius, hole))
+            .collect();
+        assert!(
+            looks
+                .iter()
+                .enumerate()
+                .all(|(place, look)| !looks[..place].contains(look)),
+            "{looks:?}"
+        );
     }
 
     #[test]
@@ -142,11 +222,25 @@ mod tests {
                 })
                 .collect(),
         };
-        let panels =
-            [panel(None, &[("a", "quiet"), ("b", "quiet")]), panel(Some(1e-5), &[("b", "quiet"), ("b", "loud")])];
-        let svg = work_precision("cost", &panels, &Look::default()).unwrap().svg();
-        let texts = [("error", 2), ("(a) cost", 1), ("a, quiet", 1), ("a, loud", 0), ("b, quiet", 1), ("b, loud", 1)];
-        for (text, times) in texts.into_iter().chain([("what chance alone gives in 95 of 100 cases", 1)]) {
+        let panels = [
+            panel(None, &[("a", "quiet"), ("b", "quiet")]),
+            panel(Some(1e-5), &[("b", "quiet"), ("b", "loud")]),
+        ];
+        let svg = work_precision("cost", &panels, &Look::default())
+            .unwrap()
+            .svg();
+        let texts = [
+            ("error", 2),
+            ("(a) cost", 1),
+            ("a, quiet", 1),
+            ("a, loud", 0),
+            ("b, quiet", 1),
+            ("b, loud", 1),
+        ];
+        for (text, times) in texts
+            .into_iter()
+            .chain([("what chance alone gives in 95 of 100 cases", 1)])
+        {
             assert_eq!(svg.matches(&format!(">{text}<")).count(), times, "{text}");
         }
         // Of each solid line in a panel the line itself, two bars and two dots, and the mark in the legend.

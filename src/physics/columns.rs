@@ -61,7 +61,13 @@ pub trait Part: Sized {
 
 impl<T: Field> Part for T {
     fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
-        vec![Column { name: name.into(), unit, meaning, kind: T::KIND, nullable: T::NULLABLE }]
+        vec![Column {
+            name: name.into(),
+            unit,
+            meaning,
+            kind: T::KIND,
+            nullable: T::NULLABLE,
+        }]
     }
 
     fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
@@ -77,7 +83,13 @@ impl<T: Field> Part for T {
 /// A text of a row's own is no [`Field`]: its value does not outlive the row.
 impl Part for String {
     fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
-        vec![Column { name: name.into(), unit, meaning, kind: Kind::Text, nullable: false }]
+        vec![Column {
+            name: name.into(),
+            unit,
+            meaning,
+            kind: Kind::Text,
+            nullable: false,
+        }]
     }
 
     fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
@@ -85,13 +97,20 @@ impl Part for String {
     }
 
     fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
-        <Option<Self> as Part>::take(name, next)?.ok_or_else(|| format!("column {name} cannot hold {:?}", Value::Null))
+        <Option<Self> as Part>::take(name, next)?
+            .ok_or_else(|| format!("column {name} cannot hold {:?}", Value::Null))
     }
 }
 
 impl Part for Option<String> {
     fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
-        vec![Column { name: name.into(), unit, meaning, kind: Kind::Text, nullable: true }]
+        vec![Column {
+            name: name.into(),
+            unit,
+            meaning,
+            kind: Kind::Text,
+            nullable: true,
+        }]
     }
 
     fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
@@ -117,9 +136,17 @@ pub struct Interval {
 /// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
 impl Part for Option<Interval> {
     fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
-        let column =
-            |name: String, meaning| Column { name: name.into(), unit, meaning, kind: Kind::Real, nullable: true };
-        vec![column(format!("{name}_low"), meaning), column(format!("{name}_high"), "upper end")]
+        let column = |name: String, meaning| Column {
+            name: name.into(),
+            unit,
+            meaning,
+            kind: Kind::Real,
+            nullable: true,
+        };
+        vec![
+            column(format!("{name}_low"), meaning),
+            column(format!("{name}_high"), "upper end"),
+        ]
     }
 
     fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
@@ -131,7 +158,9 @@ impl Part for Option<Interval> {
         match (next(), next()) {
             (Value::Real(low), Value::Real(high)) => Ok(Some(Interval { low, high })),
             (Value::Null, Value::Null) => Ok(None),
-            _ => Err(format!("column {name}_low or {name}_high: one end of an interval is missing")),
+            _ => Err(format!(
+                "column {name}_low or {name}_high: one end of an interval is missing"
+            )),
         }
     }
 }

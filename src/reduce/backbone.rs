@@ -90,9 +90,21 @@ impl Together {
     }
 
     fn estimate(self) -> Estimate<2> {
-        let squares: f64 = self.deviations.values().flatten().copied().map(square).sum();
-        let excess = if self.squares > 0.0 { squares / self.squares } else { 1.0 };
-        Sequences::of(self.deviations.into_values()).estimate().of_sums((self.count, self.total), excess)
+        let squares: f64 = self
+            .deviations
+            .values()
+            .flatten()
+            .copied()
+            .map(square)
+            .sum();
+        let excess = if self.squares > 0.0 {
+            squares / self.squares
+        } else {
+            1.0
+        };
+        Sequences::of(self.deviations.into_values())
+            .estimate()
+            .of_sums((self.count, self.total), excess)
     }
 }
 
@@ -106,7 +118,10 @@ fn edge(bin: i32) -> f64 {
 
 /// The bin that holds an η > 0.
 fn bin_of(eta: f64) -> i32 {
-    #[expect(clippy::cast_possible_truncation, reason = "the logarithm of a double is small")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "the logarithm of a double is small"
+    )]
     let bin = (libm::log10(eta) * f64::from(BINS_PER_DECADE)).floor() as i32;
     // The logarithm rounds; the edges decide.
     if eta < edge(bin) {
@@ -125,11 +140,14 @@ impl Backbone {
         if set.row.parameters.ramp_time > 0.0 || set.phases.1.count() < 2 {
             return;
         }
-        let Some(phase) = set.row.phase_mean else { return };
+        let Some(phase) = set.row.phase_mean else {
+            return;
+        };
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
         let all = (set.phases.1.count(), set.phases.1.total);
-        bin.phases.push(all, &set.seeds, &set.phases, |deviation| deviation);
+        bin.phases
+            .push(all, &set.seeds, &set.phases, |deviation| deviation);
         if set.row.has_phase {
             // The mean direction is off by the deviations across it, over the length of their sum.
             let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total);
@@ -137,7 +155,8 @@ impl Backbone {
                 let angle = (x * dy - y * dx) / libm::hypot(sum_x, sum_y);
                 [-y * angle, x * angle]
             };
-            bin.means.push((1, unit(phase)), &set.seeds, &set.phases, error);
+            bin.means
+                .push((1, unit(phase)), &set.seeds, &set.phases, error);
         }
     }
 
@@ -147,7 +166,8 @@ impl Backbone {
             let eta_centre = (eta_low * eta_high).sqrt();
             let limits = PhaseLimits::at(eta_centre);
             let [phases, means] = [bin.phases, bin.means].map(Together::estimate);
-            let [interval, means_interval] = [&phases, &means].map(|of| of.direction_interval(limits.top));
+            let [interval, means_interval] =
+                [&phases, &means].map(|of| of.direction_interval(limits.top));
             BackboneBin {
                 eta_low,
                 eta_high,
@@ -205,7 +225,10 @@ mod tests {
         push(0.0095, &[-4.0, -2.0, 0.0, 2.0]);
         let bins = backbone.finish();
         assert_eq!(bins.len(), 1);
-        assert_eq!((bins[0].sets, bins[0].phased_sets, bins[0].slips), (3, 2, 84));
+        assert_eq!(
+            (bins[0].sets, bins[0].phased_sets, bins[0].slips),
+            (3, 2, 84)
+        );
         assert!((bins[0].set_phase_mean.unwrap() + 0.8).abs() < 1e-12);
         assert!(bins[0].phase_mean.unwrap() > -0.8);
         assert!((bins[0].eta_centre - 10_f64.powf(0.875)).abs() < 1e-12);
@@ -231,14 +254,25 @@ mod tests {
 
     #[test]
     fn variances_add_over_sets_of_other_seeds_and_single_slips_do_not_count() {
-        let alternating: Vec<f64> = (0..40).map(|number| if number % 2 == 0 { -0.7 } else { -1.1 }).collect();
+        let alternating: Vec<f64> = (0..40)
+            .map(|number| if number % 2 == 0 { -0.7 } else { -1.1 })
+            .collect();
         let alternating = alternating.as_slice();
         let one = bin(&[(0, alternating)]);
-        let four = bin(&[(0, alternating), (1, alternating), (2, alternating), (3, alternating)]);
+        let four = bin(&[
+            (0, alternating),
+            (1, alternating),
+            (2, alternating),
+            (3, alternating),
+        ]);
         assert!((one.effective_slips.unwrap() - 40.0).abs() < 1e-9);
         assert!((four.effective_slips.unwrap() - 160.0).abs() < 1e-9);
         // Half as wide, and a little less with more degrees of freedom.
-        assert!((0.45..0.5).contains(&(width(&four) / width(&one))), "{}", width(&four) / width(&one));
+        assert!(
+            (0.45..0.5).contains(&(width(&four) / width(&one))),
+            "{}",
+            width(&four) / width(&one)
+        );
         // One slip says nothing about the spread.
         let with_single = bin(&[(0, alternating), (1, &[-0.9])]);
         assert_eq!((with_single.sets, with_single.slips), (1, 40));
@@ -250,11 +284,19 @@ mod tests {
         let phases: Vec<f64> = (0..40).map(|_| -0.9 + 0.1 * draws.normal()).collect();
         let one = bin(&[(0, &phases)]);
         let six = bin(&[(0, phases.as_slice()); 6]);
-        assert!((width(&six) / width(&one) - 1.0).abs() < 1e-9, "{}", width(&six) / width(&one));
+        assert!(
+            (width(&six) / width(&one) - 1.0).abs() < 1e-9,
+            "{}",
+            width(&six) / width(&one)
+        );
         assert!((six.effective_slips.unwrap() / one.effective_slips.unwrap() - 1.0).abs() < 1e-9);
         // So do means of sets.
-        let of_sets = |bin: &BackboneBin| bin.set_phase_mean_high.unwrap() - bin.set_phase_mean_low.unwrap();
-        assert!((of_sets(&six) / of_sets(&one) - 1.0).abs() < 1e-9 && (of_sets(&one) / width(&one) - 1.0).abs() < 1e-9);
+        let of_sets =
+            |bin: &BackboneBin| bin.set_phase_mean_high.unwrap() - bin.set_phase_mean_low.unwrap();
+        assert!(
+            (of_sets(&six) / of_sets(&one) - 1.0).abs() < 1e-9
+                && (of_sets(&one) / width(&one) - 1.0).abs() < 1e-9
+        );
     }
 
     #[test]
@@ -270,19 +312,25 @@ mod tests {
                 let limits = PhaseLimits::at(jobs.parameters.eta());
                 for (seed, of_seed) in (0..).zip(shared.chunks(15)) {
                     for shared in of_seed {
-                        let phase = 0.3 * (0.8_f64.sqrt() * shared + 0.2_f64.sqrt() * draws.normal()) - 0.9;
+                        let phase =
+                            0.3 * (0.8_f64.sqrt() * shared + 0.2_f64.sqrt() * draws.normal()) - 0.9;
                         set.push(seed, &slip(None, Some(phase)), &limits);
                     }
                 }
                 backbone.push(&set.finish(jobs));
             }
             let bin = backbone.finish()[0];
-            let holds = |low: Option<f64>, high: Option<f64>| low.unwrap() <= -0.9 && -0.9 <= high.unwrap();
-            [holds(bin.phase_mean_low, bin.phase_mean_high), holds(bin.set_phase_mean_low, bin.set_phase_mean_high)]
+            let holds =
+                |low: Option<f64>, high: Option<f64>| low.unwrap() <= -0.9 && -0.9 <= high.unwrap();
+            [
+                holds(bin.phase_mean_low, bin.phase_mean_high),
+                holds(bin.set_phase_mean_low, bin.set_phase_mean_high),
+            ]
         };
         let all: Vec<[bool; 2]> = (0..REPETITIONS).map(holds).collect();
         for of in [0, 1] {
-            let found = 100.0 * all.iter().filter(|held| held[of]).count() as f64 / REPETITIONS as f64;
+            let found =
+                100.0 * all.iter().filter(|held| held[of]).count() as f64 / REPETITIONS as f64;
             // Standard error 0.9. Sets that count as independent would hold it in half of the repetitions.
             assert!((93.0..98.5).contains(&found), "{of}: {found}");
         }

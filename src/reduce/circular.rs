@@ -37,7 +37,8 @@ impl Estimate<2> {
             reason = "between 1 and the number of angles"
         )]
         let effective = self.effective()? as u64;
-        self.resultant_length().map(|length| rayleigh_probability(effective, length))
+        self.resultant_length()
+            .map(|length| rayleigh_probability(effective, length))
     }
 }
 
@@ -45,7 +46,11 @@ impl Estimate<2> {
 pub fn wrap(angle: f64, top: f64) -> f64 {
     let wrapped = angle - TAU * ((angle - top) / TAU).ceil();
     // Rounding may end just outside.
-    if wrapped <= top - TAU { wrapped + TAU } else { wrapped.min(top) }
+    if wrapped <= top - TAU {
+        wrapped + TAU
+    } else {
+        wrapped.min(top)
+    }
 }
 
 /// Up to this number of angles the saddle point is needed; above it Wilkie's approximation is accurate to 5 % down to
@@ -76,7 +81,11 @@ fn saddle_point(n: f64, length: f64) -> f64 {
     let (mut low, mut high) = (LOWEST, 40.0);
     while high - low > 1e-9 {
         let middle = 0.5 * (low + high);
-        if VonMises::at(libm::exp(middle)).length < length { low = middle } else { high = middle }
+        if VonMises::at(libm::exp(middle)).length < length {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     let whole = saddle_tail(n, LOWEST);
     (saddle_tail(n, low) / whole).min(1.0)
@@ -90,7 +99,11 @@ fn saddle_tail(n: f64, from: f64) -> f64 {
     const STEP: f64 = 0.03;
     let density = |step: u32| {
         let concentration = libm::exp(from + f64::from(step) * STEP);
-        let VonMises { length, slope, log_normal } = VonMises::at(concentration);
+        let VonMises {
+            length,
+            slope,
+            log_normal,
+        } = VonMises::at(concentration);
         concentration * libm::exp(n * log_normal) * (length * slope * concentration).sqrt()
     };
     simpson(STEPS, STEP, density)
@@ -116,7 +129,11 @@ impl VonMises {
             let series = 1.0 + u * (0.125 + u * (9.0 / 128.0 + u * 225.0 / 3072.0));
             // κ - κA, without cancellation.
             let rest = 0.5 + u * (0.125 + u * (0.125 + u * 25.0 / 128.0));
-            return Self { length, slope, log_normal: rest - 0.5 * libm::log(TAU * concentration) + libm::log(series) };
+            return Self {
+                length,
+                slope,
+                log_normal: rest - 0.5 * libm::log(TAU * concentration) + libm::log(series),
+            };
         }
         let quarter = 0.25 * concentration * concentration;
         let (mut term, mut zeroth, mut first) = (1.0, 0.0, 0.0);
@@ -130,8 +147,16 @@ impl VonMises {
         first *= 0.5 * concentration;
         let length = first / zeroth;
         // A/κ -> 1/2 without dividing 0 by 0.
-        let ratio = if concentration > 0.0 { length / concentration } else { 0.5 };
-        Self { length, slope: 1.0 - ratio - length * length, log_normal: libm::log(zeroth) - concentration * length }
+        let ratio = if concentration > 0.0 {
+            length / concentration
+        } else {
+            0.5
+        };
+        Self {
+            length,
+            slope: 1.0 - ratio - length * length,
+            log_normal: libm::log(zeroth) - concentration * length,
+        }
     }
 }
 
@@ -167,7 +192,10 @@ mod tests {
             for step in -1000..1000 {
                 let angle = f64::from(step) * 0.1 * PI;
                 let wrapped = wrap(angle, top);
-                assert!(wrapped > top - TAU && wrapped <= top, "{angle} -> {wrapped}");
+                assert!(
+                    wrapped > top - TAU && wrapped <= top,
+                    "{angle} -> {wrapped}"
+                );
                 assert!((libm::sin(angle) - libm::sin(wrapped)).abs() < 1e-12);
             }
         }
@@ -213,8 +241,13 @@ mod tests {
     #[test]
     fn rayleigh_probability_never_rises_with_the_resultant() {
         for count in [2, 3, 5, 12, 49, 50, 51, 1000] {
-            let values: Vec<f64> = (0..=100).map(|step| rayleigh_probability(count, f64::from(step) / 100.0)).collect();
-            assert!(values.windows(2).all(|pair| pair[1] <= pair[0]), "n = {count}");
+            let values: Vec<f64> = (0..=100)
+                .map(|step| rayleigh_probability(count, f64::from(step) / 100.0))
+                .collect();
+            assert!(
+                values.windows(2).all(|pair| pair[1] <= pair[0]),
+                "n = {count}"
+            );
             assert!(values[0] > 0.99 && values[0] <= 1.0);
         }
     }
@@ -243,7 +276,8 @@ mod tests {
             sets.iter().filter(|set| probability(set) < 0.05).count() as f64 / sets.len() as f64
         };
         let corrected = share(&|set| set.rayleigh().unwrap());
-        let plain = share(&|set| rayleigh_probability(set.count(), set.resultant_length().unwrap()));
+        let plain =
+            share(&|set| rayleigh_probability(set.count(), set.resultant_length().unwrap()));
         assert!((0.02..0.08).contains(&corrected), "{corrected}");
         assert!(plain > 0.5, "{plain}");
     }

@@ -15,7 +15,10 @@ const LONG: f64 = 0.5;
 const OF_SQUARES: f64 = 0.25;
 
 const fn about(mean: f64, half: f64) -> Interval {
-    Interval { low: mean - half, high: mean + half }
+    Interval {
+        low: mean - half,
+        high: mean + half,
+    }
 }
 
 impl Estimate<1> {
@@ -38,8 +41,15 @@ impl Estimate<1> {
         let deviation = squares.map(|square| (square * n / (n - 1.0)).sqrt());
         let ends = || {
             let (deviation, square) = (deviation?, squares?);
-            let half = if square > 0.0 { 0.5 * self.half(OF_SQUARES)? / square } else { 0.0 };
-            Some(Interval { low: deviation * libm::exp(-half), high: deviation * libm::exp(half) })
+            let half = if square > 0.0 {
+                0.5 * self.half(OF_SQUARES)? / square
+            } else {
+                0.0
+            };
+            Some(Interval {
+                low: deviation * libm::exp(-half),
+                high: deviation * libm::exp(half),
+            })
         };
         (deviation, ends())
     }
@@ -58,8 +68,16 @@ impl Estimate<2> {
     fn polar(&self) -> Option<(f64, f64, f64)> {
         let [x, y] = self.mean()?;
         let length = libm::hypot(x, y);
-        let along = if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] };
-        Some((length, self.variance(&along), self.variance(&[-along[1], along[0]])))
+        let along = if length > 0.0 {
+            [x / length, y / length]
+        } else {
+            [1.0, 0.0]
+        };
+        Some((
+            length,
+            self.variance(&along),
+            self.variance(&[-along[1], along[0]]),
+        ))
     }
 
     /// Of the resultant length R of unit vectors; `None` for fewer than two.
@@ -73,16 +91,26 @@ impl Estimate<2> {
         let ((length, along, across), t) = (self.polar()?, student(self.freedom(1.0)?));
         if length > LONG {
             let rest = (1.0 - length).max(0.0);
-            let half = if rest > 0.0 { t * along.sqrt() / rest } else { 0.0 };
+            let half = if rest > 0.0 {
+                t * along.sqrt() / rest
+            } else {
+                0.0
+            };
             let end = |half: f64| (1.0 - rest * libm::exp(half)).max(0.0);
-            return Some(Interval { low: end(half), high: end(-half) });
+            return Some(Interval {
+                low: end(half),
+                high: end(-half),
+            });
         }
         let unbiased = length * length - along - across;
         let middle = unbiased + 2.0 * t * t * along;
         let constant = unbiased * unbiased - 2.0 * t * t * (along * along + across * across);
         let root = (middle * middle - constant).max(0.0).sqrt();
         let end = |square: f64| square.clamp(0.0, 1.0).sqrt();
-        Some(Interval { low: end(middle - root), high: end(middle + root) })
+        Some(Interval {
+            low: end(middle - root),
+            high: end(middle + root),
+        })
     }
 
     /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if
@@ -92,7 +120,11 @@ impl Estimate<2> {
     pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
         let (direction, (length, _, across)) = (self.direction(top)?, self.polar()?);
         let sine = student(self.freedom(1.0)?) * across.sqrt();
-        let half = if sine < length { libm::asin(sine / length) } else { PI };
+        let half = if sine < length {
+            libm::asin(sine / length)
+        } else {
+            PI
+        };
         Some(about(direction, half))
     }
 }
@@ -100,7 +132,9 @@ impl Estimate<2> {
 /// The mean of independent values, and its interval.
 #[cfg(test)]
 pub(crate) fn mean_of(values: &[f64]) -> (Option<f64>, Option<Interval>) {
-    let mean = super::sequence::Sequences::independent(values.iter().map(|&value| [value]).collect()).estimate();
+    let mean =
+        super::sequence::Sequences::independent(values.iter().map(|&value| [value]).collect())
+            .estimate();
     (mean.mean().map(|[mean]| mean), mean.interval())
 }
 
@@ -115,11 +149,14 @@ pub(super) fn student(freedom: f64) -> f64 {
         return NORMAL;
     }
     let nu = freedom.max(1.0);
-    let density = libm::exp(libm::lgamma(0.5 * (nu + 1.0)) - libm::lgamma(0.5 * nu)) / (nu * PI).sqrt();
+    let density =
+        libm::exp(libm::lgamma(0.5 * (nu + 1.0)) - libm::lgamma(0.5 * nu)) / (nu * PI).sqrt();
     let mut t = NORMAL + 2.372_27 / nu;
     for _ in 0..STEPS {
         let slope = 2.0 * density * libm::pow(1.0 + t * t / nu, -0.5 * (nu + 1.0));
-        t += (CONFIDENCE - 2.0 * density * nu.sqrt() * cosine_integral(libm::atan(t / nu.sqrt()), nu)) / slope;
+        t += (CONFIDENCE
+            - 2.0 * density * nu.sqrt() * cosine_integral(libm::atan(t / nu.sqrt()), nu))
+            / slope;
     }
     t
 }
@@ -134,7 +171,14 @@ fn cosine_integral(angle: f64, nu: f64) -> f64 {
 
 /// Integral by Simpson's rule of a function that has these values at an even number of steps of this width.
 pub(super) fn simpson(steps: u32, width: f64, value: impl Fn(u32) -> f64) -> f64 {
-    let weighted = |step| value(step) * if step == 0 || step == steps { 1.0 } else { f64::from(2 + 2 * (step % 2)) };
+    let weighted = |step| {
+        value(step)
+            * if step == 0 || step == steps {
+                1.0
+            } else {
+                f64::from(2 + 2 * (step % 2))
+            }
+    };
     width / 3.0 * (0..=steps).map(weighted).sum::<f64>()
 }
 
@@ -189,9 +233,22 @@ pub(super) mod tests {
 
     #[test]
     fn students_t_is_that_of_the_tables() {
-        let table = [(1.0, 12.706_205), (2.0, 4.302_653), (3.0, 3.182_446), (10.0, 2.228_139), (120.0, 1.979_930)];
-        for (freedom, expected) in table.into_iter().chain([(1e5, 1.959_988), (1e7, 1.959_964)]) {
-            assert!((student(freedom) - expected).abs() < 2e-6, "{freedom}: {} for {expected}", student(freedom));
+        let table = [
+            (1.0, 12.706_205),
+            (2.0, 4.302_653),
+            (3.0, 3.182_446),
+            (10.0, 2.228_139),
+            (120.0, 1.979_930),
+        ];
+        for (freedom, expected) in table
+            .into_iter()
+            .chain([(1e5, 1.959_988), (1e7, 1.959_964)])
+        {
+            assert!(
+                (student(freedom) - expected).abs() < 2e-6,
+                "{freedom}: {} for {expected}",
+                student(freedom)
+            );
         }
         assert!(student(1.5) < student(1.0) && student(1.5) > student(2.0));
     }
@@ -208,14 +265,32 @@ pub(super) mod tests {
         let mut held = [0.0; 3];
         for repetition in 0..REPETITIONS {
             let mut draws = Draws::new(repetition);
-            let sample: Vec<Vec<f64>> =
-                (0..jobs).map(|_| angles(&mut draws, length).iter().map(|angle| angle + MEAN).collect()).collect();
-            let vectors = Sequences::of(sample.iter().map(|job| job.iter().map(|&angle| unit(angle)))).estimate();
-            let reals = Sequences::of(sample.iter().map(|job| job.iter().map(|&angle| [angle]))).estimate();
+            let sample: Vec<Vec<f64>> = (0..jobs)
+                .map(|_| {
+                    angles(&mut draws, length)
+                        .iter()
+                        .map(|angle| angle + MEAN)
+                        .collect()
+                })
+                .collect();
+            let vectors = Sequences::of(
+                sample
+                    .iter()
+                    .map(|job| job.iter().map(|&angle| unit(angle))),
+            )
+            .estimate();
+            let reals =
+                Sequences::of(sample.iter().map(|job| job.iter().map(|&angle| [angle]))).estimate();
             let holds = |interval: Interval, truth| interval.low <= truth && truth <= interval.high;
-            held[0] += f64::from(u8::from(holds(vectors.length_interval().unwrap(), resultant)));
+            held[0] += f64::from(u8::from(holds(
+                vectors.length_interval().unwrap(),
+                resultant,
+            )));
             // No direction is near the seam a turn away.
-            held[1] += f64::from(u8::from(holds(vectors.direction_interval(MEAN + PI).unwrap(), MEAN)));
+            held[1] += f64::from(u8::from(holds(
+                vectors.direction_interval(MEAN + PI).unwrap(),
+                MEAN,
+            )));
             held[2] += f64::from(u8::from(holds(reals.interval().unwrap(), MEAN)));
         }
         held.map(|held| 100.0 * held / REPETITIONS as f64)
@@ -226,13 +301,23 @@ pub(super) mod tests {
     #[test]
     fn intervals_of_independent_angles_cover() {
         // Resultant lengths of von Mises distributions: I1/I0.
-        for (concentration, resultant) in [(0.3, 0.148_337), (1.0, 0.446_390), (3.0, 0.809_985), (30.0, 0.983_190)] {
+        for (concentration, resultant) in [
+            (0.3, 0.148_337),
+            (1.0, 0.446_390),
+            (3.0, 0.809_985),
+            (30.0, 0.983_190),
+        ] {
             for size in SIZES {
                 let found = coverage(size, resultant, |draws, length| {
-                    (0..length).map(|_| draws.von_mises(concentration)).collect()
+                    (0..length)
+                        .map(|_| draws.von_mises(concentration))
+                        .collect()
                 });
                 // 1000 repetitions give coverage to 0.7 (standard error).
-                assert!(found.iter().all(|held| (92.0..98.0).contains(held)), "{concentration}, {size:?}: {found:?}");
+                assert!(
+                    found.iter().all(|held| (92.0..98.0).contains(held)),
+                    "{concentration}, {size:?}: {found:?}"
+                );
             }
         }
     }
@@ -245,7 +330,11 @@ pub(super) mod tests {
             // %.
             for size in SIZES.into_iter().skip(if memory > 0.6 { 2 } else { 0 }) {
                 let found = coverage(size, resultant, |draws, length| {
-                    draws.autoregressive(memory, length).iter().map(|x| deviation * x).collect()
+                    draws
+                        .autoregressive(memory, length)
+                        .iter()
+                        .map(|x| deviation * x)
+                        .collect()
                 });
                 assert!(
                     found.iter().all(|held| (92.0..98.0).contains(held)),
@@ -258,8 +347,9 @@ pub(super) mod tests {
     #[test]
     fn the_interval_of_the_resultant_length_begins_at_zero_for_uniform_angles() {
         for size in SIZES {
-            let [length, ..] =
-                coverage(size, 0.0, |draws, length| (0..length).map(|_| TAU * draws.uniform()).collect());
+            let [length, ..] = coverage(size, 0.0, |draws, length| {
+                (0..length).map(|_| TAU * draws.uniform()).collect()
+            });
             assert!((92.0..98.0).contains(&length), "{size:?}: {length}");
         }
     }

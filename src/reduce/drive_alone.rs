@@ -38,8 +38,9 @@ impl Controls {
         sweep: &Sweep,
         sets: impl Iterator<Item = &'a Parameters>,
     ) -> Result<Self, ResultsError> {
-        let mut controls: HashMap<String, BTreeMap<u64, Vec<Onset>>> =
-            sets.filter_map(|set| Some((sweep.control_of(set)?, BTreeMap::new()))).collect();
+        let mut controls: HashMap<String, BTreeMap<u64, Vec<Onset>>> = sets
+            .filter_map(|set| Some((sweep.control_of(set)?, BTreeMap::new())))
+            .collect();
         if controls.is_empty() {
             return Ok(Self::default());
         }
@@ -55,10 +56,15 @@ impl Controls {
 
     /// What the drive alone explains of a set with these parameters.
     pub(super) fn explain(&self, sweep: &Sweep, parameters: &Parameters) -> Explained {
-        let control = sweep.control_of(parameters).and_then(|control| self.0.get(&control));
+        let control = sweep
+            .control_of(parameters)
+            .and_then(|control| self.0.get(&control));
         let passage = |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Passage::of(parameters, slips));
         let passages = control.map(|control| control.iter().map(passage).collect());
-        Explained { is_control: sweep.is_control(parameters), passages }
+        Explained {
+            is_control: sweep.is_control(parameters),
+            passages,
+        }
     }
 }
 
@@ -73,15 +79,30 @@ impl Explained {
     /// Adds to a set what is explained of its jobs with these seeds, which are in order.
     pub(super) fn add_to(&self, row: &mut SetRow, seeds: &[u64]) {
         row.is_control = self.is_control;
-        let Some(passages) = &self.passages else { return };
-        let passages: Vec<&Passage> =
-            passages.iter().filter(|(seed, _)| seeds.binary_search(seed).is_ok()).map(|(_, passage)| passage).collect();
-        let phases = Sequences::of(passages.iter().map(|job| job.phases.iter().copied())).estimate();
-        let intervals = Sequences::of(passages.iter().map(|job| job.periods.iter().copied())).estimate();
+        let Some(passages) = &self.passages else {
+            return;
+        };
+        let passages: Vec<&Passage> = passages
+            .iter()
+            .filter(|(seed, _)| seeds.binary_search(seed).is_ok())
+            .map(|(_, passage)| passage)
+            .collect();
+        let phases =
+            Sequences::of(passages.iter().map(|job| job.phases.iter().copied())).estimate();
+        let intervals =
+            Sequences::of(passages.iter().map(|job| job.periods.iter().copied())).estimate();
         let seen = (row.resultant_length, row.length_interval);
-        (row.resultant_drive, row.resultant_excess, row.resultant_excess_interval) = beyond(seen, &phases);
+        (
+            row.resultant_drive,
+            row.resultant_excess,
+            row.resultant_excess_interval,
+        ) = beyond(seen, &phases);
         let seen = (row.locking_index, row.locking_interval);
-        (row.locking_index_drive, row.locking_index_excess, row.locking_excess_interval) = beyond(seen, &intervals);
+        (
+            row.locking_index_drive,
+            row.locking_index_excess,
+            row.locking_excess_interval,
+        ) = beyond(seen, &intervals);
     }
 }
 
@@ -90,7 +111,9 @@ fn beyond(
     (seen, interval): (Option<f64>, Option<Interval>),
     drive: &Estimate<2>,
 ) -> (Option<f64>, Option<f64>, Option<Interval>) {
-    let Some(alone) = drive.resultant_length() else { return (None, None, None) };
+    let Some(alone) = drive.resultant_length() else {
+        return (None, None, None);
+    };
     let excess = seen.map(|seen| seen - alone);
     let ends = || {
         let (seen, own, of_drive) = (seen?, interval?, drive.length_interval()?);
@@ -118,10 +141,16 @@ impl Passage {
             (drive.first_passage(time), drive)
         };
         let (mut phases, mut periods) = (Vec::new(), Vec::new());
-        let mut last = slips.first().and_then(|slip| Some(passage(slip.onset - slip.interval?).0));
+        let mut last = slips
+            .first()
+            .and_then(|slip| Some(passage(slip.onset - slip.interval?).0));
         for slip in slips {
             let (time, cycle) = passage(slip.onset);
-            phases.push(unit(phase(time - cycle.cycle_start, cycle.period, cycle.eta())));
+            phases.push(unit(phase(
+                time - cycle.cycle_start,
+                cycle.period,
+                cycle.eta(),
+            )));
             periods.extend(last.map(|last| unit(TAU * ((time - last) / cycle.period).fract())));
             last = Some(time);
         }
@@ -149,14 +178,22 @@ mod tests {
         let parameters = sweep.jobs().next().unwrap().parameters;
         let slips = |onsets: &Vec<f64>| {
             let lasts = std::iter::once(None).chain(onsets.iter().map(Some));
-            let slip =
-                |(onset, last): (&f64, Option<&f64>)| Onset { onset: *onset, interval: last.map(|last| onset - last) };
+            let slip = |(onset, last): (&f64, Option<&f64>)| Onset {
+                onset: *onset,
+                interval: last.map(|last| onset - last),
+            };
             onsets.iter().zip(lasts).map(slip).collect::<Vec<_>>()
         };
         let control = (0..).zip(onsets.iter().map(slips)).collect();
-        let controls = Controls(HashMap::from([(sweep.control_of(&parameters).unwrap(), control)]));
+        let controls = Controls(HashMap::from([(
+            sweep.control_of(&parameters).unwrap(),
+            control,
+        )]));
         let explained = controls.explain(&sweep, &parameters);
-        let mut row = SetRow { parameters: Selected::new(parameters), ..row };
+        let mut row = SetRow {
+            parameters: Selected::new(parameters),
+            ..row
+        };
         explained.add_to(&mut row, seeds);
         row
     }
@@ -164,48 +201,99 @@ mod tests {
     #[test]
     fn random_loads_give_the_resultant_of_the_closed_form() {
         let mut draws = Draws::new(7);
-        let onsets = vec![(0..20_000).map(|number| f64::from(number) + draws.uniform()).collect::<Vec<_>>()];
+        let onsets = vec![
+            (0..20_000)
+                .map(|number| f64::from(number) + draws.uniform())
+                .collect::<Vec<_>>(),
+        ];
         for eta in [0.5, 1.2, 5.0] {
             let amplitude = eta * 1e-4 / (TAU * FREQUENCY);
             let [real, imaginary] = random_load_mean(eta);
-            let found = explained(amplitude, &onsets, &[0], SetRow::default()).resultant_drive.unwrap();
+            let found = explained(amplitude, &onsets, &[0], SetRow::default())
+                .resultant_drive
+                .unwrap();
             // A standard error is 0.005 at most.
-            assert!((found - real.hypot(imaginary)).abs() < 0.02, "{eta}: {found}");
+            assert!(
+                (found - real.hypot(imaginary)).abs() < 0.02,
+                "{eta}: {found}"
+            );
         }
     }
 
     #[test]
     fn onsets_of_common_seeds_whole_periods_apart_have_passages_at_one_phase_whatever_the_others() {
-        let apart = |step: f64| (1..40).map(|number| 0.01 + step * f64::from(number)).collect::<Vec<f64>>();
+        let apart = |step: f64| {
+            (1..40)
+                .map(|number| 0.01 + step * f64::from(number))
+                .collect::<Vec<f64>>()
+        };
         let (whole, free) = (apart(3.0 / FREQUENCY), apart(0.1234));
-        let of = |seeds: &[u64]| explained(1e-6, &[whole.clone(), free.clone()], seeds, SetRow::default());
+        let of = |seeds: &[u64]| {
+            explained(
+                1e-6,
+                &[whole.clone(), free.clone()],
+                seeds,
+                SetRow::default(),
+            )
+        };
         let row = of(&[0, 5]);
         for length in [row.resultant_drive, row.locking_index_drive] {
             assert!((length.unwrap() - 1.0).abs() < 1e-9, "{length:?}");
         }
         assert!(of(&[0, 1]).resultant_drive.unwrap() < 0.99);
         let none = of(&[5]);
-        assert_eq!((none.resultant_drive, none.locking_index_excess), (None, None));
+        assert_eq!(
+            (none.resultant_drive, none.locking_index_excess),
+            (None, None)
+        );
     }
 
     #[test]
     fn the_interval_of_an_excess_takes_in_both_errors() {
         let mut draws = Draws::new(3);
-        let mut job = || (0..30).map(|number| 0.11 * f64::from(number) + 0.05 * draws.uniform()).collect::<Vec<_>>();
+        let mut job = || {
+            (0..30)
+                .map(|number| 0.11 * f64::from(number) + 0.05 * draws.uniform())
+                .collect::<Vec<_>>()
+        };
         let onsets: Vec<Vec<f64>> = (0..9).map(|_| job()).collect();
         let of = |half: f64| {
-            let interval = Some(Interval { low: 0.9 - half, high: 0.9 + half });
-            let seen = SetRow { resultant_length: Some(0.9), length_interval: interval, ..SetRow::default() };
+            let interval = Some(Interval {
+                low: 0.9 - half,
+                high: 0.9 + half,
+            });
+            let seen = SetRow {
+                resultant_length: Some(0.9),
+                length_interval: interval,
+                ..SetRow::default()
+            };
             explained(1e-6, &onsets, &[0, 1, 2, 3, 4, 5, 6, 7, 8], seen)
         };
         let row = of(0.05);
-        let (excess, wide, narrow) = (row.resultant_excess.unwrap(), row.resultant_excess_interval, of(0.0));
+        let (excess, wide, narrow) = (
+            row.resultant_excess.unwrap(),
+            row.resultant_excess_interval,
+            of(0.0),
+        );
         assert!((excess - (0.9 - row.resultant_drive.unwrap())).abs() < 1e-15);
-        let halves =
-            |interval: Option<Interval>| interval.map(|Interval { low, high }| [excess - low, high - excess]).unwrap();
-        for (wide, alone) in halves(wide).into_iter().zip(halves(narrow.resultant_excess_interval)) {
-            assert!(alone > 0.0 && (wide - alone.hypot(0.05)).abs() < 1e-12, "{wide} {alone}");
+        let halves = |interval: Option<Interval>| {
+            interval
+                .map(|Interval { low, high }| [excess - low, high - excess])
+                .unwrap()
+        };
+        for (wide, alone) in halves(wide)
+            .into_iter()
+            .zip(halves(narrow.resultant_excess_interval))
+        {
+            assert!(
+                alone > 0.0 && (wide - alone.hypot(0.05)).abs() < 1e-12,
+                "{wide} {alone}"
+            );
         }
-        assert_eq!((row.locking_index_excess, row.locking_excess_interval), (None, None), "none is seen");
+        assert_eq!(
+            (row.locking_index_excess, row.locking_excess_interval),
+            (None, None),
+            "none is seen"
+        );
     }
 }

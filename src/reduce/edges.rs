@@ -89,9 +89,17 @@ pub struct Sample {
 
 impl Sample {
     /// From the jobs of each group, and the value of all jobs but those of a group; `None` if one of these has none.
-    pub fn new(counts: &[u64; GROUPS], threshold: f64, less: impl Fn(Option<usize>) -> Option<f64>) -> Option<Self> {
+    pub fn new(
+        counts: &[u64; GROUPS],
+        threshold: f64,
+        less: impl Fn(Option<usize>) -> Option<f64>,
+    ) -> Option<Self> {
         let (jobs, value) = (counts.iter().sum::<u64>() as f64, less(None)?);
-        let mut sample = Self { excess: value - threshold, influences: [0.0; GROUPS], concentration: 0.0 };
+        let mut sample = Self {
+            excess: value - threshold,
+            influences: [0.0; GROUPS],
+            concentration: 0.0,
+        };
         for (group, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
             let share = count as f64 / jobs;
             sample.influences[group] = (1.0 - share) * (value - less(Some(group))?);
@@ -102,8 +110,13 @@ impl Sample {
 
     /// Below the threshold, above it, or equal if that is not clear.
     pub(crate) fn side(&self) -> f64 {
-        let half = (quantile(self.concentration) * product(&self.influences, &self.influences)).sqrt();
-        if self.excess.abs() > half { self.excess.signum() } else { 0.0 }
+        let half =
+            (quantile(self.concentration) * product(&self.influences, &self.influences)).sqrt();
+        if self.excess.abs() > half {
+            self.excess.signum()
+        } else {
+            0.0
+        }
     }
 }
 
@@ -114,7 +127,10 @@ fn quantile(concentration: f64) -> f64 {
 }
 
 fn product(left: &[f64; GROUPS], right: &[f64; GROUPS]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
+    left.iter()
+        .zip(right)
+        .map(|(left, right)| left * right)
+        .sum()
 }
 
 /// What the rounds know of a set.
@@ -165,11 +181,18 @@ pub struct Edge<'a> {
 impl<'a> Edge<'a> {
     /// Between two sets of a line that are clear, those in between being unclear. `width` is wanted; `window` are the rows
     /// for a line at a place.
-    fn between(all: &[Placed<'a>], [first, last]: [usize; 2], width: f64, window: impl Fn(f64) -> u64) -> Option<Self> {
+    fn between(
+        all: &[Placed<'a>],
+        [first, last]: [usize; 2],
+        width: f64,
+        window: impl Fn(f64) -> u64,
+    ) -> Option<Self> {
         let bracket = [all[first], all[last]];
         let excess = |set: &Placed<'_>| bracket[1].side * set.sample.excess;
         let rise = |pair: &&[Placed<'_>]| excess(&pair[1]) - excess(&pair[0]);
-        let crossings = all[first..=last].windows(2).filter(|pair| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0);
+        let crossings = all[first..=last]
+            .windows(2)
+            .filter(|pair| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0);
         let pair = crossings.max_by(|left, right| rise(left).total_cmp(&rise(right)))?;
         let ends = [pair[0].row, pair[1].row].map(|row| row as f64);
         if pair.iter().all(|set| set.side != 0.0) {
@@ -187,34 +210,60 @@ impl<'a> Edge<'a> {
                 is_bracketed: true,
             });
         }
-        let near = |set: &&Placed<'_>, place: f64| (set.row as f64 - place).abs() <= window(place) as f64;
+        let near =
+            |set: &&Placed<'_>, place: f64| (set.row as f64 - place).abs() <= window(place) as f64;
         let mut place = fit(pair, ends[0])?.crossing;
         for _ in 0..MOVES {
-            let sets: Vec<Placed<'_>> = all.iter().filter(|set| near(set, place)).copied().collect();
-            let Some(line) = fit(&sets, place).filter(|line| line.slope * bracket[1].side > 0.0) else { break };
-            place = line.crossing.clamp(bracket[0].row as f64, bracket[1].row as f64);
+            let sets: Vec<Placed<'_>> =
+                all.iter().filter(|set| near(set, place)).copied().collect();
+            let Some(line) = fit(&sets, place).filter(|line| line.slope * bracket[1].side > 0.0)
+            else {
+                break;
+            };
+            place = line
+                .crossing
+                .clamp(bracket[0].row as f64, bracket[1].row as f64);
         }
-        let above = all.partition_point(|set| set.row as f64 <= place).clamp(1, all.len() - 1);
+        let above = all
+            .partition_point(|set| set.row as f64 <= place)
+            .clamp(1, all.len() - 1);
         let (low, high) = (all[above - 1].row, all[above].row);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two rows")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between two rows"
+        )]
         let nearest = place.round() as u64;
         let window = window(place);
         let inner = window.saturating_sub(1).max(1);
         let wanted_row = (high - low > window).then(|| nearest.clamp(low + inner, high - inner));
-        let sets: Vec<Placed<'_>> =
-            all.iter().filter(|set| near(set, place) || set.row == low || set.row == high).copied().collect();
+        let sets: Vec<Placed<'_>> = all
+            .iter()
+            .filter(|set| near(set, place) || set.row == low || set.row == high)
+            .copied()
+            .collect();
         let line = fit(&sets, place)?;
         let (place, interval, error) = match line.interval {
             Some([low, high]) => (line.crossing, [low, high], (high - low) / width),
             None => (place, bracket.map(|set| set.row as f64), f64::INFINITY),
         };
-        Some(Self { sets, bracket, place, interval, error, wanted_row, is_bracketed: false })
+        Some(Self {
+            sets,
+            bracket,
+            place,
+            interval,
+            error,
+            wanted_row,
+            is_bracketed: false,
+        })
     }
 
     /// Fewest and most seeds of its sets.
     pub fn seeds(&self) -> [u64; 2] {
         let seeds = self.sets.iter().map(|set| set.set.seeds);
-        seeds.fold([u64::MAX, 0], |[fewest, most], seeds| [fewest.min(seeds), most.max(seeds)])
+        seeds.fold([u64::MAX, 0], |[fewest, most], seeds| {
+            [fewest.min(seeds), most.max(seeds)]
+        })
     }
 
     /// Whether its interval is as narrow as is wanted.
@@ -234,17 +283,28 @@ struct Fit {
 
 /// By least squares, sets weighted by their seeds; `None` for less than two rows.
 fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
-    let points = || sets.iter().map(|set| (set.row as f64 - origin, set.set.seeds as f64, set.sample));
+    let points = || {
+        sets.iter()
+            .map(|set| (set.row as f64 - origin, set.set.seeds as f64, set.sample))
+    };
     let total: f64 = points().map(|(_, weight, _)| weight).sum();
     let mean = points().map(|(x, weight, _)| weight * x).sum::<f64>() / total;
-    let moment: f64 = points().map(|(x, weight, _)| weight * (x - mean) * (x - mean)).sum();
+    let moment: f64 = points()
+        .map(|(x, weight, _)| weight * (x - mean) * (x - mean))
+        .sum();
     let (mut begin, mut slope) = ((0.0, [0.0; GROUPS]), (0.0, [0.0; GROUPS]));
     let mut concentration: f64 = 0.0;
     for (x, weight, sample) in points() {
         let of_slope = weight * (x - mean) / moment;
-        for (sum, factor) in [(&mut begin, weight / total - mean * of_slope), (&mut slope, of_slope)] {
+        for (sum, factor) in [
+            (&mut begin, weight / total - mean * of_slope),
+            (&mut slope, of_slope),
+        ] {
             sum.0 += factor * sample.excess;
-            sum.1.iter_mut().zip(sample.influences).for_each(|(sum, influence)| *sum += factor * influence);
+            sum.1
+                .iter_mut()
+                .zip(sample.influences)
+                .for_each(|(sum, influence)| *sum += factor * influence);
         }
         concentration = concentration.max(sample.concentration);
     }
@@ -255,39 +315,82 @@ fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
     let c = slope.0 * slope.0 - factor * product(&slope.1, &slope.1);
     let root = (b * b - a * c).max(0.0).sqrt();
     let interval = (c > 0.0).then(|| [origin - (b + root) / c, origin + (root - b) / c]);
-    (moment > 0.0).then(|| Fit { slope: slope.0, crossing: origin - begin.0 / slope.0, interval })
+    (moment > 0.0).then(|| Fit {
+        slope: slope.0,
+        crossing: origin - begin.0 / slope.0,
+        interval,
+    })
 }
 
 /// The rows of sets, in the order of the grid, for each statistic.
-pub fn lines<'a>(sweep: &Sweep, refinement: &Refinement, sets: &'a BTreeMap<u64, SetOfEdges>) -> Vec<Line<'a>> {
+pub fn lines<'a>(
+    sweep: &Sweep,
+    refinement: &Refinement,
+    sets: &'a BTreeMap<u64, SetOfEdges>,
+) -> Vec<Line<'a>> {
     let mut rows_of: BTreeMap<Vec<u64>, Vec<(u64, &SetOfEdges)>> = BTreeMap::new();
     for (&number, set) in sets {
         let mut rows = sweep.rows(number);
         let row = std::mem::take(&mut rows[refinement.axis]);
         rows_of.entry(rows).or_default().push((row, set));
     }
-    let to = if refinement.is_log { libm::log1p(refinement.to) } else { refinement.to };
+    let to = if refinement.is_log {
+        libm::log1p(refinement.to)
+    } else {
+        refinement.to
+    };
     let (first, step) = scale(sweep, refinement).unwrap_or((f64::NAN, f64::NAN));
     let width = to / step;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 3")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to 3"
+    )]
     let window = |place: f64| {
-        let value = if refinement.is_log { 1.0 } else { (first + step * place).abs() };
+        let value = if refinement.is_log {
+            1.0
+        } else {
+            (first + step * place).abs()
+        };
         (LARGEST_SHARE * value / step).clamp(1.0, WINDOW) as u64
     };
     let line = |rows: &Vec<u64>, sets: &Vec<(u64, &'a SetOfEdges)>, statistic: usize| {
         // Without a value, a set says nothing.
         let sample = |&(row, set): &(u64, &'a SetOfEdges)| {
             let sample = set.samples.get(statistic)?.as_ref()?;
-            Some(Placed { row, side: sample.side(), sample, set })
+            Some(Placed {
+                row,
+                side: sample.side(),
+                sample,
+                set,
+            })
         };
         let known: Vec<Placed<'_>> = sets.iter().filter_map(sample).collect();
-        let clear: Vec<usize> = (0..known.len()).filter(|&index| known[index].side != 0.0).collect();
-        let opposite = clear.windows(2).filter(|pair| known[pair[0]].side != known[pair[1]].side);
-        let edges = opposite.filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window)).collect();
-        Line { rows: rows.clone(), statistic: refinement.by[statistic], sets: sets.clone(), edges }
+        let clear: Vec<usize> = (0..known.len())
+            .filter(|&index| known[index].side != 0.0)
+            .collect();
+        let opposite = clear
+            .windows(2)
+            .filter(|pair| known[pair[0]].side != known[pair[1]].side);
+        let edges = opposite
+            .filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window))
+            .collect();
+        Line {
+            rows: rows.clone(),
+            statistic: refinement.by[statistic],
+            sets: sets.clone(),
+            edges,
+        }
     };
     let statistics = 0..refinement.by.len();
-    rows_of.iter().flat_map(|(rows, sets)| statistics.clone().map(move |number| line(rows, sets, number))).collect()
+    rows_of
+        .iter()
+        .flat_map(|(rows, sets)| {
+            statistics
+                .clone()
+                .map(move |number| line(rows, sets, number))
+        })
+        .collect()
 }
 
 /// The value at the first row of the refined axis, and the step of rows; of their logarithms on a logarithmic axis.
@@ -295,32 +398,68 @@ fn scale(sweep: &Sweep, refinement: &Refinement) -> Option<(f64, f64)> {
     let last = sweep.row_counts()[refinement.axis] - 1;
     let [first, end] = [0, last].map(|row| {
         let (_, value) = sweep.value_at(refinement.axis, row)?;
-        Some(if refinement.is_log { libm::log(value) } else { value })
+        Some(if refinement.is_log {
+            libm::log(value)
+        } else {
+            value
+        })
     });
     Some((first?, (end? - first?) / last as f64))
 }
 
 /// The table of edges of a directory.
-pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Result<Vec<EdgeRow>, ResultsError> {
+pub(super) fn edge_rows(
+    results: &Results<'_>,
+    refinement: &Refinement,
+) -> Result<Vec<EdgeRow>, ResultsError> {
     let (sweep, sets) = (results.sweep(), sets_of_edges(results, refinement)?);
-    let Some((first, step)) = scale(sweep, refinement) else { return Ok(Vec::new()) };
+    let Some((first, step)) = scale(sweep, refinement) else {
+        return Ok(Vec::new());
+    };
     let is_over = results.rounds_so_far().is_none_or(|rounds| rounds.is_over);
-    let value = |place: f64| if refinement.is_log { libm::exp(first + step * place) } else { first + step * place };
+    let value = |place: f64| {
+        if refinement.is_log {
+            libm::exp(first + step * place)
+        } else {
+            first + step * place
+        }
+    };
     let mut found = Vec::new();
-    for Line { statistic: Statistic { key, .. }, sets, edges, .. } in lines(sweep, refinement, &sets) {
-        let row = |bracket: [(u64, &SetOfEdges); 2], used: Vec<&SetOfEdges>, edge: Option<&Edge<'_>>| {
+    for Line {
+        statistic: Statistic { key, .. },
+        sets,
+        edges,
+        ..
+    } in lines(sweep, refinement, &sets)
+    {
+        let row = |bracket: [(u64, &SetOfEdges); 2],
+                   used: Vec<&SetOfEdges>,
+                   edge: Option<&Edge<'_>>| {
             let ends = bracket.map(|(row, _)| sweep.value_at(refinement.axis, row));
-            let [Some((axis, bracket_low)), Some((_, bracket_high))] = ends else { return None };
-            let SetOfEdges { set_id, parameters, .. } = bracket[0].1.clone();
+            let [Some((axis, bracket_low)), Some((_, bracket_high))] = ends else {
+                return None;
+            };
+            let SetOfEdges {
+                set_id, parameters, ..
+            } = bracket[0].1.clone();
             Some(EdgeRow {
                 set_id,
                 parameters: Selected::new(parameters),
                 axis: axis.to_owned(),
-                statistic: refinement.periods.map_or_else(|| key.to_owned(), |periods| format!("{key} = {periods}")),
+                statistic: refinement
+                    .periods
+                    .map_or_else(|| key.to_owned(), |periods| format!("{key} = {periods}")),
                 threshold: refinement.threshold,
                 edge: edge.map(|edge| value(edge.place)),
-                edge_interval: edge
-                    .map(|Edge { interval: [low, high], .. }| Interval { low: value(*low), high: value(*high) }),
+                edge_interval: edge.map(
+                    |Edge {
+                         interval: [low, high],
+                         ..
+                     }| Interval {
+                        low: value(*low),
+                        high: value(*high),
+                    },
+                ),
                 rises: edge.map(|edge| edge.bracket[1].side > 0.0),
                 jobs: used.into_iter().map(|set| set.seeds).sum(),
                 bracket_low,
@@ -328,7 +467,11 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
                 ended: match edge {
                     None => Ended::NoCrossing,
                     Some(edge) if edge.is_done() => Ended::Width,
-                    Some(edge) if edge.wanted_row.is_none() && edge.seeds()[0] >= sweep.seed_count() => Ended::Seeds,
+                    Some(edge)
+                        if edge.wanted_row.is_none() && edge.seeds()[0] >= sweep.seed_count() =>
+                    {
+                        Ended::Seeds
+                    }
                     Some(_) if is_over => Ended::Jobs,
                     Some(_) => Ended::Open,
                 },
@@ -336,10 +479,18 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
         };
         for edge in &edges {
             let used = edge.sets.iter().map(|set| set.set).collect();
-            found.extend(row(edge.bracket.map(|set| (set.row, set.set)), used, Some(edge)));
+            found.extend(row(
+                edge.bracket.map(|set| (set.row, set.set)),
+                used,
+                Some(edge),
+            ));
         }
         if let (true, Some(&first), Some(&last)) = (edges.is_empty(), sets.first(), sets.last()) {
-            found.extend(row([first, last], sets.iter().map(|(_, set)| *set).collect(), None));
+            found.extend(row(
+                [first, last],
+                sets.iter().map(|(_, set)| *set).collect(),
+                None,
+            ));
         }
     }
     Ok(found)
@@ -351,14 +502,19 @@ pub fn sets_of_edges(
     refinement: &Refinement,
 ) -> Result<BTreeMap<u64, SetOfEdges>, ResultsError> {
     let mut sets = BTreeMap::new();
-    each_chosen(results, |number, set, explained| drop(sets.insert(number, of_set(&set, explained, refinement))))?;
+    each_chosen(results, |number, set, explained| {
+        drop(sets.insert(number, of_set(&set, explained, refinement)))
+    })?;
     Ok(sets)
 }
 
 fn of_set(set: &Gathered, explained: &Explained, refinement: &Refinement) -> SetOfEdges {
     let group = |seed: u64| usize::try_from(seed % GROUPS as u64).unwrap_or_default();
     let mut counts = [0; GROUPS];
-    set.jobs.averages.keys().for_each(|&seed| counts[group(seed)] += 1);
+    set.jobs
+        .averages
+        .keys()
+        .for_each(|&seed| counts[group(seed)] += 1);
     let without = |left_out: Option<usize>| {
         let part = set.only(|seed| Some(group(seed)) != left_out);
         if let Some(periods) = refinement.periods {
@@ -371,11 +527,20 @@ fn of_set(set: &Gathered, explained: &Explained, refinement: &Refinement) -> Set
     let each: Vec<Vec<Option<f64>>> = counts
         .iter()
         .enumerate()
-        .map(|(group, count)| if *count > 0 { without(Some(group)) } else { Vec::new() })
+        .map(|(group, count)| {
+            if *count > 0 {
+                without(Some(group))
+            } else {
+                Vec::new()
+            }
+        })
         .collect();
     let sample = |statistic: usize| {
         Sample::new(&counts, refinement.threshold, |group| {
-            group.map_or(&all, |group| &each[group]).get(statistic).copied()?
+            group
+                .map_or(&all, |group| &each[group])
+                .get(statistic)
+                .copied()?
         })
     };
     SetOfEdges {

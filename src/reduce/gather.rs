@@ -54,7 +54,9 @@ type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 /// The sets that the rounds of a directory have chosen, by their numbers, controls left out: of the chosen jobs alone.
 pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, ResultsError> {
     let mut rows = BTreeMap::new();
-    each_chosen(results, |number, set, explained| drop(rows.insert(number, set.finish_with(explained).0.row)))?;
+    each_chosen(results, |number, set, explained| {
+        drop(rows.insert(number, set.finish_with(explained).0.row))
+    })?;
     Ok(rows)
 }
 
@@ -64,9 +66,16 @@ pub(super) fn each_chosen(
     mut gathered: impl FnMut(u64, Gathered, &Explained),
 ) -> Result<(), ResultsError> {
     let (sweep, chosen) = (results.sweep(), results.chosen());
-    let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
+    let is_chosen = |parameters: &Parameters| {
+        sweep
+            .find(parameters)
+            .is_some_and(|point| chosen.has(point))
+    };
     Gathering::of_jobs(results, &is_chosen)?.each_set(MAX_SLIPS, u64::MAX, |set, explained| {
-        if let Some(number) = sweep.set_with(&set.jobs.parameters).filter(|&number| number < sweep.point_count()) {
+        if let Some(number) = sweep
+            .set_with(&set.jobs.parameters)
+            .filter(|&number| number < sweep.point_count())
+        {
             gathered(number, set, explained);
         }
         Ok(())
@@ -84,7 +93,10 @@ pub(super) struct Gathering<'a> {
 
 impl<'a> Gathering<'a> {
     /// The sets of the wanted jobs, in the order of their parameters.
-    pub(super) fn of_jobs(results: &'a Results<'a>, is_wanted: Wanted<'a>) -> Result<Self, ResultsError> {
+    pub(super) fn of_jobs(
+        results: &'a Results<'a>,
+        is_wanted: Wanted<'a>,
+    ) -> Result<Self, ResultsError> {
         let (layout, sweep) = (results.layout(), results.sweep());
         // Listed once: what other runs commit meanwhile is left out as a whole.
         let jobs = layout.dataset(JOBS)?;
@@ -92,13 +104,26 @@ impl<'a> Gathering<'a> {
         let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
         each_job(&jobs, is_wanted, |job, parameters| {
             let seed = parameters.seed;
-            let new = |set_id: &String| SetJobs { set_id: set_id.clone(), parameters, ..SetJobs::default() };
-            sets.entry(job.set_id).or_insert_with_key(new).push(seed, &job.facts);
+            let new = |set_id: &String| SetJobs {
+                set_id: set_id.clone(),
+                parameters,
+                ..SetJobs::default()
+            };
+            sets.entry(job.set_id)
+                .or_insert_with_key(new)
+                .push(seed, &job.facts);
         })?;
         let mut sets: Vec<SetJobs> = sets.into_values().collect();
         sets.sort_by(by_parameters);
-        let controls = Controls::read(slips.clone(), sweep, sets.iter().map(|set| &set.parameters))?;
-        Ok(Self { sets, slips, is_wanted, sweep, controls })
+        let controls =
+            Controls::read(slips.clone(), sweep, sets.iter().map(|set| &set.parameters))?;
+        Ok(Self {
+            sets,
+            slips,
+            is_wanted,
+            sweep,
+            controls,
+        })
     }
 
     /// Hands on set after set before anything is computed, each with every `spacing`-th slip of the table as a point and its
@@ -120,8 +145,11 @@ impl<'a> Gathering<'a> {
 
     /// Reads all slips and keeps those of the wanted jobs of these sets.
     fn slips_of(&self, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Gathered>, ResultsError> {
-        let index: HashMap<String, usize> =
-            sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
+        let index: HashMap<String, usize> = sets
+            .iter()
+            .enumerate()
+            .map(|(index, set)| (set.set_id.clone(), index))
+            .collect();
         let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
         let (mut place, mut last, mut found) = (0, None, None);
         for batch in self.slips.clone().rows::<(JobOfSlip, Slip)>() {
@@ -129,14 +157,23 @@ impl<'a> Gathering<'a> {
                 let here = place;
                 place += 1;
                 if last.as_ref() != Some(&job) {
-                    let of_job = |set: &Gathered| Parameters { seed: job.seed, ..set.jobs.parameters.clone() };
-                    found = index.get(&job.set_id).copied().filter(|&index| (self.is_wanted)(&of_job(&sets[index])));
+                    let of_job = |set: &Gathered| Parameters {
+                        seed: job.seed,
+                        ..set.jobs.parameters.clone()
+                    };
+                    found = index
+                        .get(&job.set_id)
+                        .copied()
+                        .filter(|&index| (self.is_wanted)(&of_job(&sets[index])));
                     last = Some(job);
                 }
-                let (Some(index), Some(job)) = (found, &last) else { continue };
+                let (Some(index), Some(job)) = (found, &last) else {
+                    continue;
+                };
                 let set = &mut sets[index];
                 if here % spacing == 0 {
-                    set.points.push((here, Point::of(&set.jobs.parameters, &slip)));
+                    set.points
+                        .push((here, Point::of(&set.jobs.parameters, &slip)));
                 }
                 set.push(job.seed, &slip);
             }
@@ -151,20 +188,26 @@ pub(super) fn each_job(
     mut job: impl FnMut(JobOfSet, Parameters),
 ) -> Result<(), ResultsError> {
     for batch in files.clone().rows::<(JobOfSet, Selected<All>)>() {
-        let wanted = batch?.into_iter().filter(|(_, of_job)| is_wanted(&of_job.parameters));
+        let wanted = batch?
+            .into_iter()
+            .filter(|(_, of_job)| is_wanted(&of_job.parameters));
         wanted.for_each(|(facts, Selected { parameters, .. })| job(facts, parameters));
     }
     Ok(())
 }
 
 fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
-    let others = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed);
+    let others = Symbol::ALL
+        .into_iter()
+        .filter(|&symbol| symbol != Symbol::Seed);
     others
-        .map(|symbol| match (left.parameters.get(symbol), right.parameters.get(symbol)) {
-            (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
-            (Value::Count(left), Value::Count(right)) => left.cmp(&right),
-            (left, right) => left.to_string().cmp(&right.to_string()),
-        })
+        .map(
+            |symbol| match (left.parameters.get(symbol), right.parameters.get(symbol)) {
+                (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
+                (Value::Count(left), Value::Count(right)) => left.cmp(&right),
+                (left, right) => left.to_string().cmp(&right.to_string()),
+            },
+        )
         .find(|order| order.is_ne())
         .unwrap_or_else(|| left.set_id.cmp(&right.set_id))
 }
@@ -199,13 +242,26 @@ pub(super) struct Gathered {
 impl Gathered {
     pub(super) fn new(jobs: SetJobs) -> Self {
         let limits = PhaseLimits::at(jobs.parameters.eta());
-        Self { jobs, limits, slips: SetSlips::default(), points: Vec::new() }
+        Self {
+            jobs,
+            limits,
+            slips: SetSlips::default(),
+            points: Vec::new(),
+        }
     }
 
     pub(super) fn push(&mut self, seed: u64, slip: &Slip) {
-        let Parameters { ramp_time, drive_velocity, .. } = self.jobs.parameters;
+        let Parameters {
+            ramp_time,
+            drive_velocity,
+            ..
+        } = self.jobs.parameters;
         if ramp_time > 0.0 {
-            self.slips.push(seed, slip, &PhaseLimits::at(slip.modulation.eta(drive_velocity)));
+            self.slips.push(
+                seed,
+                slip,
+                &PhaseLimits::at(slip.modulation.eta(drive_velocity)),
+            );
         } else {
             self.slips.push(seed, slip, &self.limits);
         }

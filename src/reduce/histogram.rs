@@ -25,7 +25,11 @@ tables! {
 
 /// The histogram of a set: bins of a width of mean τ/60, with an edge at 0; empty bins are left out.
 pub(super) fn histogram(set: &SetRow, sorted: &[f64]) -> Vec<HistogramBin> {
-    let Some(width) = set.tau_mean.map(|mean| mean / BINS_PER_MEAN).filter(|&width| width > 0.0) else {
+    let Some(width) = set
+        .tau_mean
+        .map(|mean| mean / BINS_PER_MEAN)
+        .filter(|&width| width > 0.0)
+    else {
         return Vec::new();
     };
     let bin_of = |interval: f64| (interval / width).floor();
@@ -55,14 +59,24 @@ mod tests {
     fn a_histogram_counts_every_interval_once_and_its_density_integrates_to_one() {
         let mut set = SetSlips::default();
         for step in 0..500_u32 {
-            set.push(0, &slip(Some(0.1 + 0.001 * f64::from(step % 37)), None), &PhaseLimits::at(0.0));
+            set.push(
+                0,
+                &slip(Some(0.1 + 0.001 * f64::from(step % 37)), None),
+                &PhaseLimits::at(0.0),
+            );
         }
         let set = set.finish(jobs(0.0, 1.0));
         let bins = histogram(&set.row, &set.intervals);
         assert_eq!(bins.iter().map(|bin| bin.count).sum::<u64>(), 500);
-        let integral: f64 = bins.iter().map(|bin| bin.density * (bin.high - bin.low)).sum();
+        let integral: f64 = bins
+            .iter()
+            .map(|bin| bin.density * (bin.high - bin.low))
+            .sum();
         assert!((integral - 1.0).abs() < 1e-12);
-        assert!(bins.windows(2).all(|pair| pair[0].high <= pair[1].low * (1.0 + 1e-12)));
+        assert!(
+            bins.windows(2)
+                .all(|pair| pair[0].high <= pair[1].low * (1.0 + 1e-12))
+        );
         assert!(histogram(&set.row, &[]).is_empty());
     }
 }

@@ -57,8 +57,13 @@ struct PhaseLimits {
 
 impl PhaseLimits {
     fn at(eta: f64) -> Self {
-        let seam = minimum_phase(eta).zip(load_maximum_phase(eta)).map(|(low, high)| 0.5 * (low + high - TAU));
-        Self { eta, top: seam.map_or(PI, |seam| seam + TAU) }
+        let seam = minimum_phase(eta)
+            .zip(load_maximum_phase(eta))
+            .map(|(low, high)| 0.5 * (low + high - TAU));
+        Self {
+            eta,
+            top: seam.map_or(PI, |seam| seam + TAU),
+        }
     }
 
     /// φ + η cos φ for η < 1, where the load only grows: how far the load is between one maximum of the modulation and the

@@ -35,31 +35,56 @@ impl Pool {
         let jobs = layout.dataset(JOBS)?;
         let slips = committed_files(layout, SLIPS, &jobs)?;
         let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
-        each_job(&jobs, &|parameters| !sweep.is_control(parameters), |JobOfSet { set_id, facts }, parameters| {
-            let seed = parameters.seed;
-            let (_, set) = sets.entry(set_id).or_insert_with(|| (parameters, BTreeMap::new()));
-            set.insert(seed, PooledJob { seed, facts, slips: Vec::new() });
-        })?;
+        each_job(
+            &jobs,
+            &|parameters| !sweep.is_control(parameters),
+            |JobOfSet { set_id, facts }, parameters| {
+                let seed = parameters.seed;
+                let (_, set) = sets
+                    .entry(set_id)
+                    .or_insert_with(|| (parameters, BTreeMap::new()));
+                set.insert(
+                    seed,
+                    PooledJob {
+                        seed,
+                        facts,
+                        slips: Vec::new(),
+                    },
+                );
+            },
+        )?;
         for batch in slips.clone().rows::<(JobOfSlip, Slip)>() {
             for (job, slip) in batch? {
                 if let Some((_, set)) = sets.get_mut(&job.set_id) {
-                    set.get_mut(&job.seed).expect("slips of a job").slips.push(slip);
+                    set.get_mut(&job.seed)
+                        .expect("slips of a job")
+                        .slips
+                        .push(slip);
                 }
             }
         }
         let controls = Controls::read(slips, sweep, sets.values().map(|(set, _)| set))?;
-        let mut sets: Vec<_> = sets.into_values().map(|(set, jobs)| (set, jobs.into_values().collect())).collect();
+        let mut sets: Vec<_> = sets
+            .into_values()
+            .map(|(set, jobs)| (set, jobs.into_values().collect()))
+            .collect();
         sets.sort_by(|(left, _): &(Parameters, Vec<_>), (right, _)| {
             let key = |set: &Parameters| (set.modulation_amplitude, set.eta());
             key(left).partial_cmp(&key(right)).expect("numbers")
         });
-        let explained = sets.iter().map(|(set, _)| controls.explain(sweep, set)).collect();
+        let explained = sets
+            .iter()
+            .map(|(set, _)| controls.explain(sweep, set))
+            .collect();
         Ok(Self { sets, explained })
     }
 
     fn finish<'a>(&self, set: usize, jobs: impl IntoIterator<Item = &'a PooledJob>) -> FinishedSet {
         let parameters = self.sets[set].0.clone();
-        let mut gathered = Gathered::new(SetJobs { parameters, ..SetJobs::default() });
+        let mut gathered = Gathered::new(SetJobs {
+            parameters,
+            ..SetJobs::default()
+        });
         for PooledJob { seed, facts, slips } in jobs {
             gathered.jobs.push(*seed, facts);
             for slip in slips {
@@ -70,7 +95,11 @@ impl Pool {
     }
 
     /// The row of a set of these of its jobs.
-    pub(crate) fn row<'a>(&self, set: usize, jobs: impl IntoIterator<Item = &'a PooledJob>) -> SetRow {
+    pub(crate) fn row<'a>(
+        &self,
+        set: usize,
+        jobs: impl IntoIterator<Item = &'a PooledJob>,
+    ) -> SetRow {
         self.finish(set, jobs).row
     }
 

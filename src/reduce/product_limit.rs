@@ -32,13 +32,27 @@ pub(super) struct ProductLimit {
 impl ProductLimit {
     /// Of these intervals, and whether they have ended.
     pub(super) fn new(intervals: impl Iterator<Item = (f64, bool)>) -> Self {
-        let step = |(place, (length, has_ended))| Step { place, length, has_ended, share: 1.0, hazard: 1.0 };
+        let step = |(place, (length, has_ended))| Step {
+            place,
+            length,
+            has_ended,
+            share: 1.0,
+            hazard: 1.0,
+        };
         let mut steps: Vec<Step> = intervals.enumerate().map(step).collect();
-        steps.sort_by(|one, other| one.length.total_cmp(&other.length).then(other.has_ended.cmp(&one.has_ended)));
+        steps.sort_by(|one, other| {
+            one.length
+                .total_cmp(&other.length)
+                .then(other.has_ended.cmp(&one.has_ended))
+        });
         let (count, mut rest) = (steps.len(), 1.0);
         for (rank, step) in steps.iter_mut().enumerate() {
             (step.share, step.hazard) = (rest, 1.0 / (count - rank) as f64);
-            rest *= if step.has_ended { 1.0 - step.hazard } else { 1.0 };
+            rest *= if step.has_ended {
+                1.0 - step.hazard
+            } else {
+                1.0
+            };
         }
         Self { steps, rest }
     }
@@ -51,12 +65,16 @@ impl ProductLimit {
     pub(super) fn least_mean(&self) -> f64 {
         let ended = self.steps.iter().filter(|step| step.has_ended);
         let longest = self.steps.last().map_or(0.0, |step| step.length);
-        ended.map(|step| step.share * step.hazard * step.length).sum::<f64>() + self.rest * longest
+        ended
+            .map(|step| step.share * step.hazard * step.length)
+            .sum::<f64>()
+            + self.rest * longest
     }
 
     /// The least interval that a share does not exceed; `None` if it is longer than all that was seen.
     pub(super) fn quantile(&self, share: f64) -> Option<f64> {
-        let is_there = |step: &&Step| step.has_ended && 1.0 - step.share * (1.0 - step.hazard) >= share;
+        let is_there =
+            |step: &&Step| step.has_ended && 1.0 - step.share * (1.0 - step.hazard) >= share;
         self.steps.iter().find(is_there).map(|step| step.length)
     }
 
@@ -66,16 +84,28 @@ impl ProductLimit {
         for component in 0..D {
             // The mean value of longer intervals times their share, from the longest on.
             let mut longer = 0.0;
-            let gains = self.steps.iter().rev().filter(|step| step.has_ended).map(|step| {
-                let (value, left) = (values[step.place][component], step.share * (1.0 - step.hazard));
-                let later = if left > 0.0 { longer / left } else { value };
-                longer += step.share * step.hazard * value;
-                (value - later) * step.share * step.hazard * self.steps.len() as f64
-            });
+            let gains = self
+                .steps
+                .iter()
+                .rev()
+                .filter(|step| step.has_ended)
+                .map(|step| {
+                    let (value, left) = (
+                        values[step.place][component],
+                        step.share * (1.0 - step.hazard),
+                    );
+                    let later = if left > 0.0 { longer / left } else { value };
+                    longer += step.share * step.hazard * value;
+                    (value - later) * step.share * step.hazard * self.steps.len() as f64
+                });
             let mut gains: Vec<f64> = gains.collect();
             let mut passed = longer;
             for step in &self.steps {
-                let gain = if step.has_ended { gains.pop().unwrap_or_default() } else { 0.0 };
+                let gain = if step.has_ended {
+                    gains.pop().unwrap_or_default()
+                } else {
+                    0.0
+                };
                 passed -= gain * step.hazard;
                 values[step.place][component] = passed + gain;
             }
@@ -88,7 +118,11 @@ impl ProductLimit {
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share.clamp(0.0, 1.0) * last as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the last index")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and the last index"
+    )]
     let below = place as usize;
     let above = (below + 1).min(last);
     Some(sorted[below] + (place - below as f64) * (sorted[above] - sorted[below]))
@@ -105,29 +139,43 @@ mod tests {
         let limit = ProductLimit::new(lengths.into_iter().map(|length| (length, true)));
         let values = lengths.map(|length| [length, length * length]).to_vec();
         for (pseudo, value) in limit.pseudo_values(values.clone()).iter().zip(&values) {
-            assert!((pseudo[0] - value[0]).abs() < 1e-12 && (pseudo[1] - value[1]).abs() < 1e-12, "{pseudo:?}");
+            assert!(
+                (pseudo[0] - value[0]).abs() < 1e-12 && (pseudo[1] - value[1]).abs() < 1e-12,
+                "{pseudo:?}"
+            );
         }
         assert!(limit.has_mean() && (limit.least_mean() - 3.0).abs() < 1e-12);
-        assert_eq!([0.1, 0.5, 1.0].map(|share| limit.quantile(share)), [Some(1.0), Some(2.0), Some(7.0)]);
+        assert_eq!(
+            [0.1, 0.5, 1.0].map(|share| limit.quantile(share)),
+            [Some(1.0), Some(2.0), Some(7.0)]
+        );
     }
 
     #[test]
     fn a_running_interval_hands_its_weight_to_longer_ones() {
         // By hand: 1 has 1/4, then 3/4 of the rest are shared by 3 and 5, as of two that are at risk.
-        let limit = ProductLimit::new([(1.0, true), (2.0, false), (3.0, true), (5.0, true)].into_iter());
+        let limit =
+            ProductLimit::new([(1.0, true), (2.0, false), (3.0, true), (5.0, true)].into_iter());
         let mean = 0.25 + 0.375 * (3.0 + 5.0);
         let pseudo = limit.pseudo_values(vec![[1.0], [f64::NAN], [3.0], [5.0]]);
         assert!((limit.least_mean() - mean).abs() < 1e-12);
-        assert!((pseudo.iter().map(|[value]| value).sum::<f64>() / 4.0 - mean).abs() < 1e-12, "{pseudo:?}");
+        assert!(
+            (pseudo.iter().map(|[value]| value).sum::<f64>() / 4.0 - mean).abs() < 1e-12,
+            "{pseudo:?}"
+        );
         // The longest still ran.
         let open = ProductLimit::new([(1.0, true), (3.0, true), (4.0, false)].into_iter());
         assert!(!open.has_mean() && (open.least_mean() - 8.0 / 3.0).abs() < 1e-12);
-        assert_eq!([0.5, 0.7].map(|share| open.quantile(share)), [Some(3.0), None]);
+        assert_eq!(
+            [0.5, 0.7].map(|share| open.quantile(share)),
+            [Some(3.0), None]
+        );
     }
 
     /// Means of renewal processes that are seen for a time, relative to the true one: product limit, and whole intervals.
     #[test]
-    fn where_a_job_ends_biases_the_product_limit_by_less_than_a_tenth_of_what_it_biases_whole_intervals() {
+    fn where_a_job_ends_biases_the_product_limit_by_less_than_a_tenth_of_what_it_biases_whole_intervals()
+     {
         const REPETITIONS: u64 = 400;
         let (mut limit_mean, mut whole_mean) = (0.0, 0.0);
         for repetition in 0..REPETITIONS {
@@ -145,10 +193,17 @@ mod tests {
                 }
             }
             limit_mean += ProductLimit::new(seen.iter().copied()).least_mean() / REPETITIONS as f64;
-            let whole: Vec<f64> = seen.iter().filter(|(_, has_ended)| *has_ended).map(|(length, _)| *length).collect();
+            let whole: Vec<f64> = seen
+                .iter()
+                .filter(|(_, has_ended)| *has_ended)
+                .map(|(length, _)| *length)
+                .collect();
             whole_mean += whole.iter().sum::<f64>() / whole.len() as f64 / REPETITIONS as f64;
         }
-        assert!(whole_mean < 0.99 && (limit_mean - 1.0).abs() < 0.1 * (1.0 - whole_mean), "{limit_mean} {whole_mean}");
+        assert!(
+            whole_mean < 0.99 && (limit_mean - 1.0).abs() < 0.1 * (1.0 - whole_mean),
+            "{limit_mean} {whole_mean}"
+        );
     }
 
     #[test]

@@ -45,7 +45,10 @@ impl<'a> Deref for Renewed<'a> {
 
 /// Reduces the tables unless the reduced data are of the tables as they are, or there are no tables any more.
 pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
-    let renewed = Renewed { results: results.clone(), _elsewhere: None };
+    let renewed = Renewed {
+        results: results.clone(),
+        _elsewhere: None,
+    };
     let layout = results.layout();
     let is_there = layout.storage.exists(&layout.reduced_file(SetRow::NAME))?;
     if is_there && !layout.storage.exists(&layout.table(JOBS))? {
@@ -56,7 +59,15 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
         let footer = footer(layout.storage, &layout.reduced_file(table)).ok();
         footer.is_some_and(|footer| footer.get(SOURCE) == Some(&source))
     };
-    if [SetRow::NAME, HistogramBin::NAME, BackboneBin::NAME, Point::NAME].iter().all(is_of_it) {
+    if [
+        SetRow::NAME,
+        HistogramBin::NAME,
+        BackboneBin::NAME,
+        Point::NAME,
+    ]
+    .iter()
+    .all(is_of_it)
+    {
         return Ok(renewed);
     }
     match reduce(results) {
@@ -65,20 +76,30 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
             let elsewhere = tempfile::tempdir()?;
             let results = results.reduced_to(elsewhere.path());
             reduce(&results)?;
-            Ok(Renewed { results, _elsewhere: Some(elsewhere) })
+            Ok(Renewed {
+                results,
+                _elsewhere: Some(elsewhere),
+            })
         }
-        Err(error) if is_there => {
-            Err(error.context("the reduced data are not of the tables as they are, and must be made again"))
-        }
+        Err(error) if is_there => Err(error
+            .context("the reduced data are not of the tables as they are, and must be made again")),
         Err(error) => Err(error),
     }
 }
 
 /// Whether something failed as nothing may be written.
 fn is_read_only(error: &anyhow::Error) -> bool {
-    let of_storage = error.downcast_ref().map(StorageError::kind).map(ErrorKind::Disk);
+    let of_storage = error
+        .downcast_ref()
+        .map(StorageError::kind)
+        .map(ErrorKind::Disk);
     let kind = of_storage.or_else(|| Some(error.downcast_ref::<ResultsError>()?.kind));
-    matches!(kind, Some(ErrorKind::Disk(io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem)))
+    matches!(
+        kind,
+        Some(ErrorKind::Disk(
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
+        ))
+    )
 }
 
 /// An error of a table, with what to do.
@@ -92,13 +113,19 @@ pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
 /// The rows of a reduced table, such as [`Point`](super::Point).
 pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
     let batches = Dataset::new(layout.storage, vec![layout.reduced_file(R::NAME)]).rows();
-    Ok(batches.collect::<Result<Vec<Vec<R>>, _>>()?.into_iter().flatten().collect())
+    Ok(batches
+        .collect::<Result<Vec<Vec<R>>, _>>()?
+        .into_iter()
+        .flatten()
+        .collect())
 }
 
 /// The sets with at least one interval or a regime, controls left out, in order, if there are at most `max` of them; else none.
 pub fn read_sets(layout: &Layout<'_>, max: usize) -> Result<Vec<SetRow>, ResultsError> {
     let mut sets = Vec::new();
-    for batch in Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)]).rows::<SetRow>() {
+    for batch in
+        Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)]).rows::<SetRow>()
+    {
         let rows = batch?.into_iter().filter(|row| !row.is_control);
         sets.extend(rows.filter(|row| row.intervals > 0 || row.regime.is_some()));
         if sets.len() > max {

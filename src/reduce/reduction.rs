@@ -23,7 +23,10 @@ use std::path::PathBuf;
 pub const WRITER: &str = "reduce";
 
 #[derive(Debug, thiserror::Error)]
-#[error("{}: holds no jobs; is this a results directory, and has its sweep been run?", shown(tables))]
+#[error(
+    "{}: holds no jobs; is this a results directory, and has its sweep been run?",
+    shown(tables)
+)]
 pub struct NoJobs {
     /// Folder of the jobs table.
     tables: PathBuf,
@@ -72,9 +75,14 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let gathering = Gathering::of_jobs(results, &|_| true)?;
     let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
-        bail!(NoJobs { tables: layout.table(JOBS) });
+        bail!(NoJobs {
+            tables: layout.table(JOBS)
+        });
     }
-    let total = all_jobs.iter().map(|set| set.slips).fold(0, u64::saturating_add);
+    let total = all_jobs
+        .iter()
+        .map(|set| set.slips)
+        .fold(0, u64::saturating_add);
     let mut summary = ReductionSummary {
         jobs: all_jobs.iter().map(|set| set.finished).sum(),
         failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
@@ -98,11 +106,21 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
             return Ok(());
         }
         summary.sets += 1;
-        histogram(row, &set.intervals).iter().try_for_each(|bin| histogram_writer.push(bin))?;
+        histogram(row, &set.intervals)
+            .iter()
+            .try_for_each(|bin| histogram_writer.push(bin))?;
         pooled.push(&set);
         summary.slips += row.slips;
         summary.phased_sets += u64::from(row.has_phase);
-        kept.extend(points.into_iter().map(|(place, point)| (place, Point { has_phase: row.has_phase, ..point })));
+        kept.extend(points.into_iter().map(|(place, point)| {
+            (
+                place,
+                Point {
+                    has_phase: row.has_phase,
+                    ..point
+                },
+            )
+        }));
         Ok(())
     })?;
     kept.sort_by_key(|(place, _)| *place);
@@ -116,7 +134,9 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     }
     if let Some(refinement) = results.sweep().refinement() {
         let mut edge_writer = TableWriter::new(stage(EdgeRow::NAME)?, footer)?;
-        edge_rows(results, refinement)?.iter().try_for_each(|edge| edge_writer.push(edge))?;
+        edge_rows(results, refinement)?
+            .iter()
+            .try_for_each(|edge| edge_writer.push(edge))?;
         edge_writer.finish()?;
     }
     set_writer.finish()?;
@@ -134,7 +154,9 @@ mod tests {
     use crate::model::selected::Selected;
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
-    use crate::results::tables::{DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
+    use crate::results::tables::{
+        DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel,
+    };
     use crate::results::workers::tests::open;
     use crate::solver::Summary;
     use crate::sweep::Sweep;
@@ -153,7 +175,10 @@ mod tests {
             ..Parameters::default()
         };
         // Names not in the order of the parameters.
-        let names = Names { job_id: format!("{set:016x}{seed:016x}"), set_id: format!("{:032x}", 100 - set) };
+        let names = Names {
+            job_id: format!("{set:016x}{seed:016x}"),
+            set_id: format!("{:032x}", 100 - set),
+        };
         let parameters = parameters.validated().unwrap();
         let loading = Loading::of(&parameters);
         (names, Selected::new(parameters), loading)
@@ -164,8 +189,13 @@ mod tests {
             number: u64::from(number),
             onset: f64::from(number) * 12.0 * PERIOD,
             interval: (number > 0).then_some(12.0 * PERIOD + 1e-5 * f64::from(number % 3)),
-            phase: parameters.modulation_period.map(|_| -0.9 - 0.01 * f64::from(number % 7)),
-            modulation: Modulation { period: parameters.modulation_period, amplitude: parameters.modulation_amplitude },
+            phase: parameters
+                .modulation_period
+                .map(|_| -0.9 - 0.01 * f64::from(number % 7)),
+            modulation: Modulation {
+                period: parameters.modulation_period,
+                amplitude: parameters.modulation_amplitude,
+            },
             periods: (number > 0).then_some(12),
             peak_force: 480.0,
             drop: 100.0 + f64::from(number) + 0.1 * parameters.seed as f64,
@@ -176,7 +206,10 @@ mod tests {
             precursors: 2,
             ..Slip::default()
         };
-        let summary = Summary { satisfied: true, ..Summary::default() };
+        let summary = Summary {
+            satisfied: true,
+            ..Summary::default()
+        };
         Measurements {
             slips: (0..slips).map(slip).collect(),
             averages: Some(Averages {
@@ -212,12 +245,20 @@ mod tests {
             let name = format!("part-000-{part:06}.parquet");
             let path = layout.table("slips").join(&name);
             let file = Disk.create(&path).unwrap();
-            let mut slip_writer = TableWriter::<SlipRow<'_>>::new(file, &Footer::default()).unwrap();
-            let labels: Vec<Label<DriveAndSeed>> =
-                (0..3).map(|set| label(set, seed, [0.0, 1e-6, 2e-6][set as usize])).collect();
-            let measured: Vec<Measurements> = labels.iter().map(|label| job_result(label, slips)).collect();
+            let mut slip_writer =
+                TableWriter::<SlipRow<'_>>::new(file, &Footer::default()).unwrap();
+            let labels: Vec<Label<DriveAndSeed>> = (0..3)
+                .map(|set| label(set, seed, [0.0, 1e-6, 2e-6][set as usize]))
+                .collect();
+            let measured: Vec<Measurements> = labels
+                .iter()
+                .map(|label| job_result(label, slips))
+                .collect();
             for (job, result) in labels.iter().zip(&measured) {
-                result.slips.iter().for_each(|slip| slip_writer.push(&(job, slip)).unwrap());
+                result
+                    .slips
+                    .iter()
+                    .for_each(|slip| slip_writer.push(&(job, slip)).unwrap());
             }
             slip_writer.finish().unwrap();
             if part < 2 {
@@ -225,10 +266,14 @@ mod tests {
                 let file = Disk.create(&path).unwrap();
                 let mut job_writer = TableWriter::<JobRow>::new(file, &Footer::default()).unwrap();
                 for (job, result) in labels.iter().zip(&measured) {
-                    job_writer.push(&(relabel(job), JobRecord::new(Ok(result)))).unwrap();
+                    job_writer
+                        .push(&(relabel(job), JobRecord::new(Ok(result))))
+                        .unwrap();
                 }
                 let failed = label(2, 77, 2e-6);
-                job_writer.push(&(relabel(&failed), JobRecord::new(Err("out of budget")))).unwrap();
+                job_writer
+                    .push(&(relabel(&failed), JobRecord::new(Err("out of budget"))))
+                    .unwrap();
                 job_writer.finish().unwrap();
             }
         }
@@ -236,7 +281,9 @@ mod tests {
     }
 
     fn reduced_bytes(layout: &Layout<'_>) -> Vec<Vec<u8>> {
-        ["sets", "histograms", "backbone", "points"].map(|name| fs::read(layout.reduced_file(name)).unwrap()).to_vec()
+        ["sets", "histograms", "backbone", "points"]
+            .map(|name| fs::read(layout.reduced_file(name)).unwrap())
+            .to_vec()
     }
 
     #[test]
@@ -244,11 +291,26 @@ mod tests {
         let (_root, results) = directory(20);
         let summary = reduce(&results).unwrap();
         assert_eq!((summary.jobs, summary.failed_jobs, summary.sets), (6, 2, 3));
-        assert_eq!((summary.slips, summary.points, summary.phased_sets), (120, 120, 2));
-        assert_eq!(summary.backbone.iter().map(|bin| bin.slips).sum::<u64>(), 80);
+        assert_eq!(
+            (summary.slips, summary.points, summary.phased_sets),
+            (120, 120, 2)
+        );
+        assert_eq!(
+            summary.backbone.iter().map(|bin| bin.slips).sum::<u64>(),
+            80
+        );
         let sets: Vec<SetRow> = read_reduced(results.layout()).unwrap();
-        let counts = |set: &SetRow| (set.parameters.modulation_amplitude, set.intervals, set.failed_jobs);
-        assert_eq!(sets.iter().map(counts).collect::<Vec<_>>(), [(0.0, 38, 0), (1e-6, 38, 0), (2e-6, 38, 2)]);
+        let counts = |set: &SetRow| {
+            (
+                set.parameters.modulation_amplitude,
+                set.intervals,
+                set.failed_jobs,
+            )
+        };
+        assert_eq!(
+            sets.iter().map(counts).collect::<Vec<_>>(),
+            [(0.0, 38, 0), (1e-6, 38, 0), (2e-6, 38, 2)]
+        );
         assert!((sets[1].mean_friction.unwrap() - 430.0).abs() < 1e-9);
         assert!((sets[1].periods_mean.unwrap() - 12.0).abs() < 0.01);
     }

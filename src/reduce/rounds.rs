@@ -39,13 +39,24 @@ pub(super) struct SetWriter<'a> {
 }
 
 impl<'a> SetWriter<'a> {
-    pub(super) fn new(results: &'a Results<'a>, file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
+    pub(super) fn new(
+        results: &'a Results<'a>,
+        file: StoredFile,
+        footer: &Footer,
+    ) -> Result<Self, ResultsError> {
         let sweep = results.sweep();
-        let left_out = if sweep.rounds().is_some() { Vec::new() } else { RoundOfSet::columns() };
+        let left_out = if sweep.rounds().is_some() {
+            Vec::new()
+        } else {
+            RoundOfSet::columns()
+        };
         let left_out: Vec<_> = left_out.into_iter().map(|column| column.name).collect();
         let mut of_sets: HashMap<u64, RoundOfSet> = HashMap::new();
         for (round, extension) in (1..).zip(results.rounds()) {
-            let points = extension.round.iter().flat_map(|round| round.points.iter().cloned().flatten());
+            let points = extension
+                .round
+                .iter()
+                .flat_map(|round| round.points.iter().cloned().flatten());
             for set in points.map(|point| sweep.set_of(point)) {
                 let of_set = of_sets.entry(set).or_default();
                 of_set.first_round.get_or_insert(round);
@@ -53,15 +64,25 @@ impl<'a> SetWriter<'a> {
                 *of_set.seeds.get_or_insert(0) += 1;
             }
         }
-        Ok(Self { writer: TableWriter::without(&left_out, file, footer)?, sweep, of_sets })
+        Ok(Self {
+            writer: TableWriter::without(&left_out, file, footer)?,
+            sweep,
+            of_sets,
+        })
     }
 
     pub(super) fn push(&mut self, row: &SetRow) -> Result<(), ResultsError> {
         let mut of_set = RoundOfSet::default();
         if let Some(rounds) = self.sweep.rounds() {
             let number = self.sweep.set_with(&row.parameters.parameters);
-            of_set = number.and_then(|set| self.of_sets.get(&set)).cloned().unwrap_or_default();
-            let error = rounds.precision.as_ref().and_then(|precision| row.error_over_target(precision));
+            of_set = number
+                .and_then(|set| self.of_sets.get(&set))
+                .cloned()
+                .unwrap_or_default();
+            let error = rounds
+                .precision
+                .as_ref()
+                .and_then(|precision| row.error_over_target(precision));
             of_set.target_met = error.map(|error| error <= 1.0);
         }
         self.writer.push(&(row.clone(), of_set))

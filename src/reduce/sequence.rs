@@ -34,7 +34,9 @@ impl<const D: usize> Sequences<D> {
     }
 
     /// From the values of each job.
-    pub(super) fn of<Job: IntoIterator<Item = [f64; D]>>(jobs: impl IntoIterator<Item = Job>) -> Self {
+    pub(super) fn of<Job: IntoIterator<Item = [f64; D]>>(
+        jobs: impl IntoIterator<Item = Job>,
+    ) -> Self {
         let (mut values, mut starts) = (Vec::new(), Vec::new());
         for job in jobs {
             starts.push(values.len());
@@ -45,12 +47,23 @@ impl<const D: usize> Sequences<D> {
 
     /// Jobs of one value each: independent values.
     pub(super) fn independent(values: Vec<[f64; D]>) -> Self {
-        Self { starts: (0..values.len()).collect(), values }
+        Self {
+            starts: (0..values.len()).collect(),
+            values,
+        }
     }
 
     pub(super) fn jobs(&self) -> impl Iterator<Item = &[[f64; D]]> {
-        let ends = self.starts.iter().skip(1).copied().chain([self.values.len()]);
-        self.starts.iter().zip(ends).map(|(&start, end)| &self.values[start..end])
+        let ends = self
+            .starts
+            .iter()
+            .skip(1)
+            .copied()
+            .chain([self.values.len()]);
+        self.starts
+            .iter()
+            .zip(ends)
+            .map(|(&start, end)| &self.values[start..end])
     }
 
     /// Their mean and its covariance.
@@ -71,7 +84,14 @@ impl<const D: usize> Sequences<D> {
         }
         let zeroth = self.products(0);
         if count < 2 || zeroth.trace() == 0.0 {
-            return (self, Estimate { count: count as u64, total, ..Estimate::default() });
+            return (
+                self,
+                Estimate {
+                    count: count as u64,
+                    total,
+                    ..Estimate::default()
+                },
+            );
         }
         let (mut correlated, mut weight, mut time) = (zeroth, 1.0, 0.5);
         for lag in 1.. {
@@ -98,14 +118,27 @@ impl<const D: usize> Sequences<D> {
         let jobs = self.jobs().filter(|job| !job.is_empty()).count();
         let (covariances, freedom) = if jobs >= MANY_JOBS {
             let sums = Self::of(self.jobs().map(|job| [sum(job)])).products(0);
-            ([sums.times(jobs as f64 / (jobs as f64 - 1.0)); 2], jobs as f64 - 1.0)
+            (
+                [sums.times(jobs as f64 / (jobs as f64 - 1.0)); 2],
+                jobs as f64 - 1.0,
+            )
         } else {
             // Exact in two limits: n - 1 for independent values, and the number of jobs - 1 if the slips of a job are
             // equal.
             ([independent, correlated], n / weight - 1.0)
         };
         let inflation = (correlated.trace() / independent.trace()).max(1.0);
-        (self, Estimate { count: count as u64, total, covariances, inflation, jobs, freedom })
+        (
+            self,
+            Estimate {
+                count: count as u64,
+                total,
+                covariances,
+                inflation,
+                jobs,
+                freedom,
+            },
+        )
     }
 
     /// Sum of the symmetrised products of values a lag apart within jobs.
@@ -142,7 +175,9 @@ fn sum<const D: usize>(values: &[[f64; D]]) -> [f64; D] {
 }
 
 pub(super) fn add<const D: usize>(sum: &mut [f64; D], value: &[f64; D]) {
-    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value);
+    sum.iter_mut()
+        .zip(value)
+        .for_each(|(sum, value)| *sum += value);
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,7 +196,9 @@ impl<const D: usize> Matrix<D> {
 
     fn add(&mut self, other: &Self, factor: f64) {
         for (line, others) in self.0.iter_mut().zip(&other.0) {
-            line.iter_mut().zip(others).for_each(|(cell, other)| *cell += factor * other);
+            line.iter_mut()
+                .zip(others)
+                .for_each(|(cell, other)| *cell += factor * other);
         }
     }
 
@@ -170,8 +207,17 @@ impl<const D: usize> Matrix<D> {
     }
 
     fn along(&self, direction: &[f64; D]) -> f64 {
-        let product = |line: &[f64; D]| line.iter().zip(direction).map(|(cell, part)| cell * part).sum::<f64>();
-        self.0.iter().zip(direction).map(|(line, part)| part * product(line)).sum()
+        let product = |line: &[f64; D]| {
+            line.iter()
+                .zip(direction)
+                .map(|(cell, part)| cell * part)
+                .sum::<f64>()
+        };
+        self.0
+            .iter()
+            .zip(direction)
+            .map(|(line, part)| part * product(line))
+            .sum()
     }
 }
 
@@ -194,7 +240,14 @@ pub(super) struct Estimate<const D: usize> {
 impl<const D: usize> Default for Estimate<D> {
     fn default() -> Self {
         let covariances = [Matrix::default(); 2];
-        Self { count: 0, total: [0.0; D], covariances, inflation: 1.0, jobs: 0, freedom: f64::INFINITY }
+        Self {
+            count: 0,
+            total: [0.0; D],
+            covariances,
+            inflation: 1.0,
+            jobs: 0,
+            freedom: f64::INFINITY,
+        }
     }
 }
 
@@ -202,7 +255,12 @@ impl<const D: usize> Estimate<D> {
     /// The mean of `count` values with this total, if these are sums of deviations of such values from known means.
     /// `excess` is the variance of the sums over that of independent deviations.
     pub(super) fn of_sums(self, (count, total): (u64, [f64; D]), excess: f64) -> Self {
-        Self { count, total, inflation: (excess * self.inflation).max(1.0), ..self }
+        Self {
+            count,
+            total,
+            inflation: (excess * self.inflation).max(1.0),
+            ..self
+        }
     }
 
     pub(super) const fn count(&self) -> u64 {
@@ -216,7 +274,9 @@ impl<const D: usize> Estimate<D> {
 
     /// Variance of the mean along a unit vector.
     pub(super) fn variance(&self, direction: &[f64; D]) -> f64 {
-        let [one, other] = self.covariances.map(|covariance| covariance.along(direction));
+        let [one, other] = self
+            .covariances
+            .map(|covariance| covariance.along(direction));
         one.max(other) / (self.count as f64 * self.count as f64)
     }
 
@@ -228,7 +288,11 @@ impl<const D: usize> Estimate<D> {
     /// Degrees of freedom of the variance, of which those of slips in a few jobs count for `share`; `None` for fewer than
     /// two values.
     pub(super) fn freedom(&self, share: f64) -> Option<f64> {
-        let freedom = if self.jobs >= MANY_JOBS { self.freedom } else { share * self.freedom };
+        let freedom = if self.jobs >= MANY_JOBS {
+            self.freedom
+        } else {
+            share * self.freedom
+        };
         (self.count > 1 || self.jobs > 0).then_some(freedom)
     }
 }
@@ -243,8 +307,12 @@ mod tests {
         const REPETITIONS: u64 = 200;
         let of = |repetition| {
             let mut draws = Draws::new(repetition);
-            let values =
-                Sequences::of((0..jobs).map(|_| draws.autoregressive(memory, length).into_iter().map(|x| [x])));
+            let values = Sequences::of((0..jobs).map(|_| {
+                draws
+                    .autoregressive(memory, length)
+                    .into_iter()
+                    .map(|x| [x])
+            }));
             values.estimate().inflation
         };
         (0..REPETITIONS).map(of).sum::<f64>() / REPETITIONS as f64
@@ -253,15 +321,25 @@ mod tests {
     #[test]
     fn the_effective_number_is_that_of_an_autoregressive_sequence() {
         // Exactly: 1 + 2 Σ (1 - k/L) ρ^k for jobs of L values.
-        for (memory, jobs, length) in [(0.5, 16, 240), (0.8, 16, 240), (0.8, 100, 15), (0.5, 10, 20)] {
+        for (memory, jobs, length) in [
+            (0.5, 16, 240),
+            (0.8, 16, 240),
+            (0.8, 100, 15),
+            (0.5, 10, 20),
+        ] {
             let exact = 1.0
                 + 2.0
                     * (1..length)
-                        .map(|lag| (1.0 - lag as f64 / length as f64) * libm::pow(memory, lag as f64))
+                        .map(|lag| {
+                            (1.0 - lag as f64 / length as f64) * libm::pow(memory, lag as f64)
+                        })
                         .sum::<f64>();
             let found = average_inflation(memory, jobs, length);
             // The window leaves out a tail of some percent.
-            assert!((found / exact - 1.0).abs() < 0.12, "{memory}, {jobs} x {length}: {found} for {exact}");
+            assert!(
+                (found / exact - 1.0).abs() < 0.12,
+                "{memory}, {jobs} x {length}: {found} for {exact}"
+            );
         }
     }
 
@@ -270,11 +348,17 @@ mod tests {
         // What is above 1 is noise cut off below.
         assert!(average_inflation(0.0, 16, 240) < 1.05);
         assert!(average_inflation(0.0, 2, 15) < 1.25);
-        assert_eq!(Sequences::of([[1.0, -1.0, 1.0, -1.0, 1.0, -1.0].map(|x| [x])]).estimate().effective(), Some(6.0));
+        assert_eq!(
+            Sequences::of([[1.0, -1.0, 1.0, -1.0, 1.0, -1.0].map(|x| [x])])
+                .estimate()
+                .effective(),
+            Some(6.0)
+        );
     }
 
     #[test]
-    fn intervals_of_anticorrelated_values_cover_where_jobs_are_many_and_cover_more_where_they_are_few() {
+    fn intervals_of_anticorrelated_values_cover_where_jobs_are_many_and_cover_more_where_they_are_few()
+     {
         // Phases of such slips vary about one value: the intervals between them are their differences.
         let covered = |jobs: usize, length: usize| {
             const REPETITIONS: u64 = 2000;
@@ -282,12 +366,22 @@ mod tests {
                 let mut draws = Draws::new(repetition);
                 let mut of_job = || {
                     let phases: Vec<f64> = (0..=length).map(|_| draws.normal()).collect();
-                    phases.windows(2).map(|pair| [pair[1] - pair[0]]).collect::<Vec<_>>()
+                    phases
+                        .windows(2)
+                        .map(|pair| [pair[1] - pair[0]])
+                        .collect::<Vec<_>>()
                 };
-                let interval = Sequences::of((0..jobs).map(|_| of_job())).estimate().interval().unwrap();
+                let interval = Sequences::of((0..jobs).map(|_| of_job()))
+                    .estimate()
+                    .interval()
+                    .unwrap();
                 interval.low <= 0.0 && 0.0 <= interval.high
             };
-            100.0 * (0..REPETITIONS).filter(|&repetition| holds(repetition)).count() as f64 / REPETITIONS as f64
+            100.0
+                * (0..REPETITIONS)
+                    .filter(|&repetition| holds(repetition))
+                    .count() as f64
+                / REPETITIONS as f64
         };
         for (jobs, length) in [(MANY_JOBS, 4), (24, 4), (24, 20), (60, 4), (200, 10)] {
             let found = covered(jobs, length);
@@ -302,7 +396,11 @@ mod tests {
         let levels: Vec<f64> = (0..50).map(|_| draws.normal()).collect();
         let still = Sequences::of(levels.iter().map(|&level| [[level]; 10])).estimate();
         let once = Sequences::independent(levels.iter().map(|&level| [level]).collect()).estimate();
-        assert!((still.effective().unwrap() - 50.0).abs() < 2.0, "{:?}", still.effective());
+        assert!(
+            (still.effective().unwrap() - 50.0).abs() < 2.0,
+            "{:?}",
+            still.effective()
+        );
         assert!((still.variance(&[1.0]) / once.variance(&[1.0]) - 1.0).abs() < 0.05);
         assert!((still.freedom(1.0).unwrap() - 49.0).abs() < 1e-9);
     }
@@ -310,7 +408,13 @@ mod tests {
     #[test]
     fn no_pair_crosses_from_one_job_to_the_next() {
         // Each job alternates, and the next begins where it ended: across jobs equal values would follow each other.
-        let jobs = Sequences::of((0..40).map(|job| if job % 2 == 0 { [[1.0], [-1.0]] } else { [[-1.0], [1.0]] }));
+        let jobs = Sequences::of((0..40).map(|job| {
+            if job % 2 == 0 {
+                [[1.0], [-1.0]]
+            } else {
+                [[-1.0], [1.0]]
+            }
+        }));
         assert_eq!(jobs.products(1).trace(), -40.0);
         assert_eq!(jobs.products(2).trace(), 0.0);
     }
@@ -318,9 +422,15 @@ mod tests {
     #[test]
     fn one_value_and_equal_values_have_no_variance() {
         let one = Sequences::of([[[0.3]]]).estimate();
-        assert_eq!((one.mean(), one.effective(), one.freedom(1.0)), (Some([0.3]), Some(1.0), None));
+        assert_eq!(
+            (one.mean(), one.effective(), one.freedom(1.0)),
+            (Some([0.3]), Some(1.0), None)
+        );
         let equal = Sequences::of([[[0.5]; 3]]).estimate();
-        assert_eq!((equal.variance(&[1.0]), equal.effective()), (0.0, Some(3.0)));
+        assert_eq!(
+            (equal.variance(&[1.0]), equal.effective()),
+            (0.0, Some(3.0))
+        );
         assert_eq!(Sequences::<2>::default().estimate().mean(), None);
     }
 }

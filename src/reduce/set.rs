@@ -56,12 +56,24 @@ impl SetJobs {
         self.finished += 1;
         self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
         self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
-        if let (Some(time), Some(friction), Some(attached_fraction), Some(slip_share)) =
-            (job.averaged_time, job.mean_friction, job.attached_fraction, job.slip_share)
-        {
-            self.averages.insert(seed, Averages { time, friction, attached_fraction, slip_share });
+        if let (Some(time), Some(friction), Some(attached_fraction), Some(slip_share)) = (
+            job.averaged_time,
+            job.mean_friction,
+            job.attached_fraction,
+            job.slip_share,
+        ) {
+            self.averages.insert(
+                seed,
+                Averages {
+                    time,
+                    friction,
+                    attached_fraction,
+                    slip_share,
+                },
+            );
         }
-        self.running.extend(job.running_interval.map(|interval| (seed, interval)));
+        self.running
+            .extend(job.running_interval.map(|interval| (seed, interval)));
         self.regime = match (self.regime, job.regime) {
             (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
             (regime, other) => other.or(regime),
@@ -74,7 +86,10 @@ impl SetJobs {
         let time = sum(&|job| job.time);
         let average = sum(&|job| job.time * of(job)) / time;
         let weight = self.averages.len() as f64 / time;
-        let pseudo = self.averages.values().map(|job| [average + (of(job) - average) * job.time * weight]);
+        let pseudo = self
+            .averages
+            .values()
+            .map(|job| [average + (of(job) - average) * job.time * weight]);
         Sequences::independent(pseudo.collect()).estimate()
     }
 }
@@ -97,7 +112,11 @@ impl SlipStats {
         let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
         Self {
             interval: or_missing(slip.interval),
-            periods: or_missing(slip.interval.zip(slip.modulation.period).map(|(interval, period)| interval / period)),
+            periods: or_missing(
+                slip.interval
+                    .zip(slip.modulation.period)
+                    .map(|(interval, period)| interval / period),
+            ),
             phase: or_missing(slip.phase),
             load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
             drop: slip.drop,
@@ -107,7 +126,13 @@ impl SlipStats {
     /// Of a slip that would have come after its job ended: what its interval is at least.
     fn to_come(interval: f64, period: Option<f64>) -> Self {
         let periods = period.map_or(f64::NAN, |period| interval / period);
-        Self { interval, periods, phase: f64::NAN, load_phase: f64::NAN, drop: f64::NAN }
+        Self {
+            interval,
+            periods,
+            phase: f64::NAN,
+            load_phase: f64::NAN,
+            drop: f64::NAN,
+        }
     }
 
     const fn is_to_come(&self) -> bool {
@@ -147,7 +172,10 @@ impl SetSlips {
             f64::from(u8::from(slip.onset_cut)),
             slip.precursors as f64,
         ];
-        let values = always.map(Some).into_iter().chain([slip.front_speed, slip.slow_front_speed]);
+        let values = always
+            .map(Some)
+            .into_iter()
+            .chain([slip.front_speed, slip.slow_front_speed]);
         for ((count, sum), value) in job.sums.iter_mut().zip(values) {
             *count += u64::from(value.is_some());
             *sum += value.unwrap_or_default();
@@ -161,15 +189,23 @@ impl SetSlips {
 
     /// The share of the intervals that are nearest to this number of periods.
     pub(super) fn share_of_periods(&self, periods: f64) -> Option<f64> {
-        let all = self.jobs.values().flat_map(|job| &job.slips).filter_map(|slip| non_nan(slip.periods));
-        let nearest: Vec<f64> = all.map(|found| f64::from(u8::from(found.round() == periods))).collect();
+        let all = self
+            .jobs
+            .values()
+            .flat_map(|job| &job.slips)
+            .filter_map(|slip| non_nan(slip.periods));
+        let nearest: Vec<f64> = all
+            .map(|found| f64::from(u8::from(found.round() == periods)))
+            .collect();
         (!nearest.is_empty()).then(|| nearest.iter().sum::<f64>() / nearest.len() as f64)
     }
 
     fn means(&self) -> [Option<f64>; SUMS] {
         std::array::from_fn(|index| {
             let all = self.jobs.values().map(|job| job.sums[index]);
-            let (count, sum) = all.fold((0, 0.0), |(count, sum), of_job| (count + of_job.0, sum + of_job.1));
+            let (count, sum) = all.fold((0, 0.0), |(count, sum), of_job| {
+                (count + of_job.0, sum + of_job.1)
+            });
             (count > 0).then(|| sum / count as f64)
         })
     }
@@ -181,7 +217,8 @@ impl SetSlips {
             let to_come = SlipStats::to_come(interval, jobs.parameters.modulation_period);
             self.jobs.entry(seed).or_default().slips.push(to_come);
         }
-        let by_job: Vec<&[SlipStats]> = self.jobs.values().map(|job| job.slips.as_slice()).collect();
+        let by_job: Vec<&[SlipStats]> =
+            self.jobs.values().map(|job| job.slips.as_slice()).collect();
         let eta = jobs.parameters.eta();
         let limits = PhaseLimits::at(eta);
         let tau = Intervals::new(&by_job, |slip| slip.interval);
@@ -190,9 +227,13 @@ impl SetSlips {
         let drops = estimate(&by_job, |slip| non_nan(slip.drop).map(|drop| [drop]));
         // The whole turns go first: they would cost the sine its digits.
         let locking = over_period.estimate(|slip| unit(TAU * slip.periods.fract()));
-        let of_angle =
-            |angle: fn(&SlipStats) -> f64| sequences(&by_job, |slip| non_nan(angle(slip)).map(unit)).centred();
-        let (of_phases, (_, loads)) = (of_angle(|slip| slip.phase), of_angle(|slip| slip.load_phase));
+        let of_angle = |angle: fn(&SlipStats) -> f64| {
+            sequences(&by_job, |slip| non_nan(angle(slip)).map(unit)).centred()
+        };
+        let (of_phases, (_, loads)) = (
+            of_angle(|slip| slip.phase),
+            of_angle(|slip| slip.load_phase),
+        );
         let phases = of_phases.1;
 
         let phase_interval = phases.direction_interval(limits.top);
@@ -206,14 +247,19 @@ impl SetSlips {
             move |value: f64| [(value - mean) * (value - mean)]
         };
         let (tau_square, drop_square) = (square(&intervals), square(&drops));
-        let (tau_deviation, tau_deviation_interval) = tau.estimate(|slip| tau_square(slip.interval)).deviation();
+        let (tau_deviation, tau_deviation_interval) =
+            tau.estimate(|slip| tau_square(slip.interval)).deviation();
         let (drop_deviation, drop_deviation_interval) =
             estimate(&by_job, |slip| non_nan(slip.drop).map(&drop_square)).deviation();
         let friction = jobs.over_time(|job| job.friction);
         let attached_fraction = jobs.over_time(|job| job.attached_fraction);
         let slip_share = jobs.over_time(|job| job.slip_share);
         let mean = |[mean]: [f64; 1]| mean;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a ratio of positive numbers")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a ratio of positive numbers"
+        )]
         let whole = |periods: f64| periods.round() as u64;
         let row = SetRow {
             set_id: jobs.set_id,
@@ -273,17 +319,28 @@ impl SetSlips {
         };
         let intervals = tau.sorted;
         let seeds = self.jobs.into_keys().collect();
-        FinishedSet { row, intervals, seeds, phases: of_phases }
+        FinishedSet {
+            row,
+            intervals,
+            seeds,
+            phases: of_phases,
+        }
     }
 }
 
 /// A quantity that some of the slips have.
-fn sequences<const D: usize>(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats) -> Option<[f64; D]>) -> Sequences<D> {
+fn sequences<const D: usize>(
+    jobs: &[&[SlipStats]],
+    quantity: impl Fn(&SlipStats) -> Option<[f64; D]>,
+) -> Sequences<D> {
     Sequences::of(jobs.iter().map(|job| job.iter().filter_map(&quantity)))
 }
 
 /// Its mean.
-fn estimate<const D: usize>(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats) -> Option<[f64; D]>) -> Estimate<D> {
+fn estimate<const D: usize>(
+    jobs: &[&[SlipStats]],
+    quantity: impl Fn(&SlipStats) -> Option<[f64; D]>,
+) -> Estimate<D> {
     sequences(jobs, quantity).estimate()
 }
 
@@ -308,9 +365,17 @@ impl<'a> Intervals<'a> {
         let ended = of_jobs.iter().filter(|slip| !slip.is_to_come());
         let mut sorted: Vec<f64> = ended.map(|slip| length(slip)).collect();
         sorted.sort_by(f64::total_cmp);
-        let all = of_jobs.iter().map(|slip| (length(slip), !slip.is_to_come()));
+        let all = of_jobs
+            .iter()
+            .map(|slip| (length(slip), !slip.is_to_come()));
         let limit = (sorted.len() < of_jobs.len()).then(|| ProductLimit::new(all));
-        Self { length, of_jobs, starts, sorted, limit }
+        Self {
+            length,
+            of_jobs,
+            starts,
+            sorted,
+            limit,
+        }
     }
 
     /// The mean of a value over them; none if the longest still ran.
@@ -333,15 +398,22 @@ impl<'a> Intervals<'a> {
 
     fn median_interval(&self) -> Option<Interval> {
         let median = self.quantile(0.5)?;
-        let shares =
-            self.estimate(|slip| [f64::from(u8::from((self.length)(slip) <= median))]).shares_about_median()?;
+        let shares = self
+            .estimate(|slip| [f64::from(u8::from((self.length)(slip) <= median))])
+            .shares_about_median()?;
         let [low, high] = shares.map(|share| self.quantile(share));
-        Some(Interval { low: low?, high: high? })
+        Some(Interval {
+            low: low?,
+            high: high?,
+        })
     }
 
     /// What the mean is at least, where it is not known.
     fn bound(&self) -> Option<f64> {
-        self.limit.as_ref().filter(|limit| !limit.has_mean()).map(ProductLimit::least_mean)
+        self.limit
+            .as_ref()
+            .filter(|limit| !limit.has_mean())
+            .map(ProductLimit::least_mean)
     }
 }
 
@@ -365,20 +437,40 @@ pub(super) mod tests {
     use crate::observe::Modulation;
 
     pub(in crate::reduce) fn jobs(amplitude: f64, period: f64) -> SetJobs {
-        let parameters =
-            Parameters { modulation_amplitude: amplitude, modulation_period: Some(period), ..Parameters::default() }
-                .validated()
-                .unwrap();
-        SetJobs { set_id: format!("{amplitude:e} {period}"), parameters, finished: 1, ..SetJobs::default() }
+        let parameters = Parameters {
+            modulation_amplitude: amplitude,
+            modulation_period: Some(period),
+            ..Parameters::default()
+        }
+        .validated()
+        .unwrap();
+        SetJobs {
+            set_id: format!("{amplitude:e} {period}"),
+            parameters,
+            finished: 1,
+            ..SetJobs::default()
+        }
     }
 
     pub(in crate::reduce) fn slip(interval: Option<f64>, phase: Option<f64>) -> Slip {
-        let modulation = Modulation { period: None, amplitude: 1e-6 };
-        Slip { number: 1, interval, modulation, phase, ..crate::results::tables::tests::slip(1) }
+        let modulation = Modulation {
+            period: None,
+            amplitude: 1e-6,
+        };
+        Slip {
+            number: 1,
+            interval,
+            modulation,
+            phase,
+            ..crate::results::tables::tests::slip(1)
+        }
     }
 
     fn modulated(period: f64) -> Modulation {
-        Modulation { period: Some(period), amplitude: 1e-6 }
+        Modulation {
+            period: Some(period),
+            amplitude: 1e-6,
+        }
     }
 
     fn reduced(jobs: SetJobs, slips: impl IntoIterator<Item = Slip>) -> SetRow {
@@ -395,17 +487,32 @@ pub(super) mod tests {
     #[test]
     fn intervals_of_whole_periods_lock_whatever_their_number() {
         let period = 1.0 / 29.0;
-        let slip = |n: f64, period| Slip { modulation: modulated(period), ..slip(Some(n * period), Some(-1.2)) };
-        let row = reduced(jobs(1e-6, period), [3.0, 4.0, 4.0, 5.0, 400.0].map(|n| slip(n, period)));
+        let slip = |n: f64, period| Slip {
+            modulation: modulated(period),
+            ..slip(Some(n * period), Some(-1.2))
+        };
+        let row = reduced(
+            jobs(1e-6, period),
+            [3.0, 4.0, 4.0, 5.0, 400.0].map(|n| slip(n, period)),
+        );
         assert!(row.locking_index.unwrap() > 1.0 - 1e-9);
         assert!((row.periods_mean.unwrap() - 83.2).abs() < 1e-9);
         assert_eq!(row.periods, Some(4));
         assert!((row.phase_mean.unwrap() + 1.2).abs() < 1e-12);
-        let halves = reduced(jobs(1e-6, period), [3.0, 3.5, 4.0, 4.5].map(|n| slip(n, period)));
+        let halves = reduced(
+            jobs(1e-6, period),
+            [3.0, 3.5, 4.0, 4.5].map(|n| slip(n, period)),
+        );
         assert!(halves.locking_index.unwrap() < 1e-9);
         // On a ramp, of the periods at the onsets.
-        let ramped = reduced(jobs(1e-6, period), [0.03, 0.0313, 0.0371].map(|period| slip(4.0, period)));
-        assert!(ramped.locking_index.unwrap() > 1.0 - 1e-9 && (ramped.periods_mean.unwrap() - 4.0).abs() < 1e-12);
+        let ramped = reduced(
+            jobs(1e-6, period),
+            [0.03, 0.0313, 0.0371].map(|period| slip(4.0, period)),
+        );
+        assert!(
+            ramped.locking_index.unwrap() > 1.0 - 1e-9
+                && (ramped.periods_mean.unwrap() - 4.0).abs() < 1e-12
+        );
     }
 
     #[test]
@@ -420,7 +527,11 @@ pub(super) mod tests {
             let (mut low, mut high) = (-2.0 * TAU, 2.0 * TAU);
             for _ in 0..80 {
                 let middle = 0.5 * (low + high);
-                if middle + eta * libm::cos(middle) < load { low = middle } else { high = middle }
+                if middle + eta * libm::cos(middle) < load {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
             slip(None, Some(low))
         });
@@ -432,25 +543,57 @@ pub(super) mod tests {
 
     #[test]
     fn a_set_has_a_phase_if_its_slips_exclude_a_direction() {
-        let at = |phases: &[f64]| reduced(jobs(1e-6, 0.01), phases.iter().map(|&phase| slip(None, Some(phase))));
+        let at = |phases: &[f64]| {
+            reduced(
+                jobs(1e-6, 0.01),
+                phases.iter().map(|&phase| slip(None, Some(phase))),
+            )
+        };
         assert!(at(&[-0.9; 12]).has_phase && at(&[-0.7, -0.9, -1.1]).has_phase);
         assert!(!at(&[-0.9]).has_phase, "one slip has no interval");
         assert!(!at(&[-0.7, 1.1]).has_phase, "two slips far apart");
         // Evenly over the turn; and with a faint preference that 3,000 slips show.
         let turn = |count: u32, at_zero: u32| -> Vec<f64> {
-            (0..count).map(|slip| if slip % at_zero == 0 { 0.0 } else { f64::from(slip % 3) * TAU / 3.0 }).collect()
+            (0..count)
+                .map(|slip| {
+                    if slip % at_zero == 0 {
+                        0.0
+                    } else {
+                        f64::from(slip % 3) * TAU / 3.0
+                    }
+                })
+                .collect()
         };
         let (even, faint) = (at(&turn(3000, 3)), at(&turn(3000, 5)));
-        assert!(!even.has_phase && even.phase_interval.is_some(), "{:?}", even.phase_interval);
-        assert!(faint.has_phase && faint.resultant_length < Some(0.4), "{:?}", faint.resultant_length);
+        assert!(
+            !even.has_phase && even.phase_interval.is_some(),
+            "{:?}",
+            even.phase_interval
+        );
+        assert!(
+            faint.has_phase && faint.resultant_length < Some(0.4),
+            "{:?}",
+            faint.resultant_length
+        );
         assert!(!at(&turn(15, 5)).has_phase, "the same of 15");
-        let still = reduced(jobs(0.0, 1.0), [slip(Some(0.1), None), slip(Some(0.2), None)]);
-        assert_eq!((still.phase_mean, still.locking_index, still.periods), (None, None, None));
+        let still = reduced(
+            jobs(0.0, 1.0),
+            [slip(Some(0.1), None), slip(Some(0.2), None)],
+        );
+        assert_eq!(
+            (still.phase_mean, still.locking_index, still.periods),
+            (None, None, None)
+        );
         assert!((still.tau_mean.unwrap() - 0.15).abs() < 1e-15);
         assert!(!still.has_phase);
     }
 
-    fn facts(outcome: JobOutcome, time: f64, friction: f64, running_interval: Option<f64>) -> JobFacts {
+    fn facts(
+        outcome: JobOutcome,
+        time: f64,
+        friction: f64,
+        running_interval: Option<f64>,
+    ) -> JobFacts {
         JobFacts {
             outcome,
             slips: Some(1),
@@ -466,7 +609,10 @@ pub(super) mod tests {
     #[test]
     fn friction_counts_jobs_by_their_time_and_has_the_interval_of_the_textbook() {
         let of = |jobs: &[(f64, f64)]| {
-            let mut set = SetJobs { parameters: jobs_without_modulation(), ..SetJobs::default() };
+            let mut set = SetJobs {
+                parameters: jobs_without_modulation(),
+                ..SetJobs::default()
+            };
             for (seed, &(time, friction)) in (0..).zip(jobs) {
                 set.push(seed, &facts(JobOutcome::Done, time, friction, None));
             }
@@ -475,7 +621,10 @@ pub(super) mod tests {
         let equal = of(&[(2.0, 430.0), (2.0, 434.0)]);
         assert!((equal.mean_friction.unwrap() - 432.0).abs() < 1e-9);
         let Interval { low, high } = equal.mean_friction_interval.unwrap();
-        assert!((low - (432.0 - 2.0 * 12.706_205)).abs() < 1e-4 && (high - (432.0 + 2.0 * 12.706_205)).abs() < 1e-4);
+        assert!(
+            (low - (432.0 - 2.0 * 12.706_205)).abs() < 1e-4
+                && (high - (432.0 + 2.0 * 12.706_205)).abs() < 1e-4
+        );
         // Of three quarters of the time at 430.
         let unequal = of(&[(3.0, 430.0), (1.0, 434.0)]);
         assert!((unequal.mean_friction.unwrap() - 431.0).abs() < 1e-9);
@@ -488,16 +637,25 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn intervals_that_still_ran_count_as_longer_than_what_was_seen_and_leave_a_bound_if_they_are_the_longest() {
+    fn intervals_that_still_ran_count_as_longer_than_what_was_seen_and_leave_a_bound_if_they_are_the_longest()
+     {
         let of = |running: &[(u64, f64)]| {
-            let mut set = SetJobs { parameters: jobs_without_modulation(), ..SetJobs::default() };
+            let mut set = SetJobs {
+                parameters: jobs_without_modulation(),
+                ..SetJobs::default()
+            };
             for &(seed, interval) in running {
-                set.push(seed, &facts(JobOutcome::TimeLimit, 1.0, 430.0, Some(interval)));
+                set.push(
+                    seed,
+                    &facts(JobOutcome::TimeLimit, 1.0, 430.0, Some(interval)),
+                );
             }
             let slips = [0.1, 0.3, 0.5].map(|interval| slip(Some(interval), None));
             reduced(set, slips)
         };
-        let close = |value: Option<f64>, expected: f64| assert!((value.unwrap() - expected).abs() < 1e-12, "{value:?}");
+        let close = |value: Option<f64>, expected: f64| {
+            assert!((value.unwrap() - expected).abs() < 1e-12, "{value:?}")
+        };
         let whole = of(&[]);
         close(whole.tau_mean, 0.3);
         assert_eq!((whole.tau_bound, whole.slips), (None, 3));
@@ -511,7 +669,14 @@ pub(super) mod tests {
             close(row.drop_mean, whole.drop_mean.unwrap());
         }
         let given_up = of(&[(0, 2.0)]);
-        assert_eq!((given_up.tau_mean, given_up.tau_interval, given_up.tau_deviation), (None, None, None));
+        assert_eq!(
+            (
+                given_up.tau_mean,
+                given_up.tau_interval,
+                given_up.tau_deviation
+            ),
+            (None, None, None)
+        );
         close(given_up.tau_bound, (0.1 + 0.3 + 0.5 + 2.0) / 4.0);
         assert_eq!((given_up.tau_50, given_up.tau_95), (Some(0.3), None));
     }

@@ -34,8 +34,11 @@ impl Swept {
 
     /// Whether its values are spaced logarithmically.
     pub fn is_logarithmic(&self) -> bool {
-        let [least, .., largest] = self.distinct[..] else { return false };
-        let is_even = has_even_steps(&self.distinct) && (self.distinct.len() > 2 || largest < WIDE * least);
+        let [least, .., largest] = self.distinct[..] else {
+            return false;
+        };
+        let is_even =
+            has_even_steps(&self.distinct) && (self.distinct.len() > 2 || largest < WIDE * least);
         !self.values.is_worded() && least > 0.0 && !is_even
     }
 
@@ -51,8 +54,16 @@ impl Swept {
 
     /// The place of the value of each set among all.
     pub fn places(&self) -> Vec<Option<usize>> {
-        let place = |number: f64| self.distinct.iter().position(|&value| is_same(value, number));
-        self.values.numbers.iter().map(|number| place((*number)?)).collect()
+        let place = |number: f64| {
+            self.distinct
+                .iter()
+                .position(|&value| is_same(value, number))
+        };
+        self.values
+            .numbers
+            .iter()
+            .map(|number| place((*number)?))
+            .collect()
     }
 }
 
@@ -70,13 +81,21 @@ pub fn differing<'a>(rows: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<S
 /// no period, or the second of two parameters that an axis moves together.
 pub fn swept(rows: &[SetRow]) -> Vec<Swept> {
     let column = |symbol: Symbol| {
-        let names: &[&str] = if symbol == Symbol::T { &[FREQUENCY, "eta", "T"] } else { &[symbol.key()] };
+        let names: &[&str] = if symbol == Symbol::T {
+            &[FREQUENCY, "eta", "T"]
+        } else {
+            &[symbol.key()]
+        };
         let columns = names.iter().filter_map(|name| Swept::of(rows, name).ok());
         columns.min_by_key(|swept| (swept.distinct.len(), !has_even_steps(&swept.distinct)))
     };
-    let mut all: Vec<Swept> = differing(&rows.iter()).into_iter().filter_map(column).collect();
+    let mut all: Vec<Swept> = differing(&rows.iter())
+        .into_iter()
+        .filter_map(column)
+        .collect();
     // To be without a period is a value, too.
-    let count = |swept: &Swept| swept.distinct.len() + usize::from(swept.values.numbers.contains(&None));
+    let count =
+        |swept: &Swept| swept.distinct.len() + usize::from(swept.values.numbers.contains(&None));
     all.sort_by_key(|swept| std::cmp::Reverse(count(swept)));
     let mut kept: Vec<Swept> = Vec::new();
     for swept in all {
@@ -121,28 +140,45 @@ mod tests {
             ..Parameters::default()
         };
         let frequency = period.map(|period| 1.0 / period);
-        SetRow { frequency, eta: parameters.eta(), parameters: Selected::new(parameters), ..SetRow::default() }
+        SetRow {
+            frequency,
+            eta: parameters.eta(),
+            parameters: Selected::new(parameters),
+            ..SetRow::default()
+        }
     }
 
     fn names(rows: &[SetRow]) -> Vec<String> {
-        swept(rows).iter().map(|swept| swept.name().to_owned()).collect()
+        swept(rows)
+            .iter()
+            .map(|swept| swept.name().to_owned())
+            .collect()
     }
 
     #[test]
     fn the_period_is_there_as_what_was_swept_and_the_most_values_come_first() {
         let mut rows = vec![row(1e-4, 0.0, None)];
         rows.extend([29.0, 58.0, 116.0].map(|frequency| row(1e-4, 1e-6, Some(1.0 / frequency))));
-        assert_eq!(names(&rows), ["frequency"], "the frequency fixes the amplitude");
+        assert_eq!(
+            names(&rows),
+            ["frequency"],
+            "the frequency fixes the amplitude"
+        );
         rows.extend((1..6).map(|step| row(1e-4, 1e-7 * f64::from(step), Some(1.0 / 58.0))));
         assert_eq!(names(&rows), ["Delta", "frequency"]);
         let etas = [0.2, 1.0, 5.0, 25.0];
-        let period = |eta: f64, velocity: f64| Some(std::f64::consts::TAU * 1e-6 / (eta * velocity));
+        let period =
+            |eta: f64, velocity: f64| Some(std::f64::consts::TAU * 1e-6 / (eta * velocity));
         let at = |velocity: f64| etas.map(|eta| row(velocity, 1e-6, period(eta, velocity)));
         let rows: Vec<SetRow> = [1e-5, 3e-5, 1e-4].into_iter().flat_map(at).collect();
         let found = swept(&rows);
         assert_eq!(names(&rows), ["eta", "V0"]);
-        assert!(found[0].is_logarithmic() && found[0].distinct.len() == 4 && found[1].is_logarithmic());
-        let even: Vec<SetRow> = (1..9).map(|step| row(1e-4, 1e-6, Some(0.01 * f64::from(step)))).collect();
+        assert!(
+            found[0].is_logarithmic() && found[0].distinct.len() == 4 && found[1].is_logarithmic()
+        );
+        let even: Vec<SetRow> = (1..9)
+            .map(|step| row(1e-4, 1e-6, Some(0.01 * f64::from(step))))
+            .collect();
         assert_eq!(names(&even), ["T"]);
         assert!(!swept(&even)[0].is_logarithmic());
     }
@@ -150,11 +186,14 @@ mod tests {
     #[test]
     fn a_sample_has_all_its_parameters_and_one_axis_of_two_the_first() {
         let velocities = [3e-5, 1e-5, 9e-5, 2e-5, 7e-5];
-        let sample: Vec<SetRow> =
-            (1..).zip(velocities).map(|(step, velocity)| row(velocity, 1e-7 * f64::from(step), Some(0.02))).collect();
+        let sample: Vec<SetRow> = (1..)
+            .zip(velocities)
+            .map(|(step, velocity)| row(velocity, 1e-7 * f64::from(step), Some(0.02)))
+            .collect();
         assert_eq!(names(&sample), ["V0", "Delta"]);
-        let together: Vec<SetRow> =
-            (1..6).map(|step| row(1e-5 * f64::from(step), 1e-7 * f64::from(step), Some(0.02))).collect();
+        let together: Vec<SetRow> = (1..6)
+            .map(|step| row(1e-5 * f64::from(step), 1e-7 * f64::from(step), Some(0.02)))
+            .collect();
         assert_eq!(names(&together), ["V0"]);
         assert!(swept(&together[..1]).is_empty());
     }

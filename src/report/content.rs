@@ -25,8 +25,16 @@ const MAX_PARTS: usize = 4_000;
 /// Runs that are listed: the last ones.
 const MAX_RUNS: usize = 50;
 /// Names of figures that are shown, in order.
-const STANDING: [&str; 8] =
-    ["overview", "locking-map", "staircase", "regime-map", "edges", "phi-eta", "tau-T", "tau-histograms"];
+const STANDING: [&str; 8] = [
+    "overview",
+    "locking-map",
+    "staircase",
+    "regime-map",
+    "edges",
+    "phi-eta",
+    "tau-T",
+    "tau-histograms",
+];
 /// η of the curves of the back-bone: from 1, in steps of 1/30 of a decade, over five decades.
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
@@ -41,9 +49,15 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
     let census = Census::read(layout).map_err(&damaged)?;
     let sets_every = census.spacing();
     let sets = Sets::read(layout, sweep, sets_every).map_err(&damaged)?;
-    let slips = Slips::read(results, &sets.places, census.slips.div_ceil(sets_every)).map_err(&damaged)?;
-    let written = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64());
-    let parameters = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed).map(Symbol::key);
+    let slips =
+        Slips::read(results, &sets.places, census.slips.div_ceil(sets_every)).map_err(&damaged)?;
+    let written = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0.0, |time| time.as_secs_f64());
+    let parameters = Symbol::ALL
+        .into_iter()
+        .filter(|&symbol| symbol != Symbol::Seed)
+        .map(Symbol::key);
     Ok(json!({
         "program": PROGRAM,
         "model_version": MODEL_VERSION,
@@ -76,9 +90,18 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
 /// The statistics that a sweep in rounds decides by.
 fn asked(sweep: &Sweep) -> Vec<&'static str> {
     let rounds = sweep.rounds();
-    let precision = rounds.and_then(|rounds| rounds.precision.as_ref()).map(|precision| &precision.statistics);
-    let refinement = rounds.and_then(|rounds| rounds.refinement.as_ref()).map(|refinement| &refinement.by);
-    precision.or(refinement).into_iter().flatten().map(|statistic| statistic.key).collect()
+    let precision = rounds
+        .and_then(|rounds| rounds.precision.as_ref())
+        .map(|precision| &precision.statistics);
+    let refinement = rounds
+        .and_then(|rounds| rounds.refinement.as_ref())
+        .map(|refinement| &refinement.by);
+    precision
+        .or(refinement)
+        .into_iter()
+        .flatten()
+        .map(|statistic| statistic.key)
+        .collect()
 }
 
 /// The standing figures as SVG, by name: those that are small.
@@ -89,7 +112,10 @@ fn figures(layout: &Layout<'_>) -> Result<Vec<(String, String)>, StorageError> {
         let file = layout.figures().join(format!("{name}.svg"));
         if layout.storage.exists(&file)? {
             let text = String::from_utf8(layout.storage.read(&file)?).unwrap_or_default();
-            figures.extend(Some((name.to_owned(), text)).filter(|(_, text)| (1..LARGEST).contains(&text.len())));
+            figures.extend(
+                Some((name.to_owned(), text))
+                    .filter(|(_, text)| (1..LARGEST).contains(&text.len())),
+            );
         }
     }
     Ok(figures)
@@ -99,7 +125,13 @@ fn figures(layout: &Layout<'_>) -> Result<Vec<(String, String)>, StorageError> {
 fn curves() -> Vec<[Option<f64>; 3]> {
     (0..=CURVE_STEPS)
         .map(|step| libm::exp10(f64::from(step) / CURVE_STEPS_PER_DECADE))
-        .map(|eta| [Some(eta), minimum_phase(eta), Some(minimum_phase_asymptote(eta))])
+        .map(|eta| {
+            [
+                Some(eta),
+                minimum_phase(eta),
+                Some(minimum_phase_asymptote(eta)),
+            ]
+        })
         .collect()
 }
 

@@ -35,8 +35,17 @@ pub(super) fn html(content: &Json) -> Result<String> {
         digest(&script),
         digest(STYLE)
     );
-    let parts = [("policy", policy.as_str()), ("style", STYLE), ("script", &script), ("data", &data)];
-    Ok(parts.into_iter().fold(PAGE.to_owned(), |page, (name, text)| page.replacen(&format!("{{{{{name}}}}}"), text, 1)))
+    let parts = [
+        ("policy", policy.as_str()),
+        ("style", STYLE),
+        ("script", &script),
+        ("data", &data),
+    ];
+    Ok(parts
+        .into_iter()
+        .fold(PAGE.to_owned(), |page, (name, text)| {
+            page.replacen(&format!("{{{{{name}}}}}"), text, 1)
+        }))
 }
 
 /// The content, compressed, in characters that mean nothing in HTML.
@@ -58,13 +67,21 @@ mod tests {
     #[test]
     fn no_text_of_the_content_is_html() {
         let data = data(&"</script><script>alert(1)</script>\u{2028}<!--".into()).unwrap();
-        assert!(data.chars().all(|c| c.is_ascii_alphanumeric() || "+/=".contains(c)), "{data}");
+        assert!(
+            data.chars()
+                .all(|c| c.is_ascii_alphanumeric() || "+/=".contains(c)),
+            "{data}"
+        );
     }
 
     #[test]
     fn the_files_of_the_page_fit_into_it() {
         for name in ["policy", "style", "script", "data"] {
-            assert_eq!(PAGE.matches(&format!("{{{{{name}}}}}")).count(), 1, "{name}");
+            assert_eq!(
+                PAGE.matches(&format!("{{{{{name}}}}}")).count(),
+                1,
+                "{name}"
+            );
         }
         let inserted = [STYLE].into_iter().chain(SCRIPTS);
         for text in inserted {

@@ -51,7 +51,12 @@ impl Slips {
         total: u64,
     ) -> Result<Self, ResultsError> {
         let layout = results.layout();
-        let symbol = |name: &str| COLUMNS.iter().find(|(known, _)| *known == name).map(|known| known.1);
+        let symbol = |name: &str| {
+            COLUMNS
+                .iter()
+                .find(|(known, _)| *known == name)
+                .map(|known| known.1)
+        };
         let mut slips = Self {
             every: total.div_ceil(MAX_SLIPS).max(1),
             columns: Columns::of::<Slip>(|name| symbol(name).is_some()),
@@ -60,9 +65,13 @@ impl Slips {
         };
         let mut number = 0_u64;
         let mut last: Option<JobOfSlip> = None;
-        for batch in committed_files(layout, SLIPS, &layout.dataset(JOBS)?)?.rows::<(JobOfSlip, Slip)>() {
+        for batch in
+            committed_files(layout, SLIPS, &layout.dataset(JOBS)?)?.rows::<(JobOfSlip, Slip)>()
+        {
             for (job, slip) in batch? {
-                let Some(&place) = places.get(&job.set_id) else { continue };
+                let Some(&place) = places.get(&job.set_id) else {
+                    continue;
+                };
                 number += 1;
                 if !(number - 1).is_multiple_of(slips.every) {
                     continue;
@@ -75,10 +84,21 @@ impl Slips {
                 slips.columns.push(&slip);
             }
         }
-        slips.columns.label(|Column { name, unit, meaning, .. }| {
-            let what = capitalised(meaning.split([',', ';']).next().unwrap_or_default());
-            Label { symbol: symbol(name).unwrap_or_default().to_owned(), what, unit }
-        });
+        slips.columns.label(
+            |Column {
+                 name,
+                 unit,
+                 meaning,
+                 ..
+             }| {
+                let what = capitalised(meaning.split([',', ';']).next().unwrap_or_default());
+                Label {
+                    symbol: symbol(name).unwrap_or_default().to_owned(),
+                    what,
+                    unit,
+                }
+            },
+        );
         Ok(slips)
     }
 }
@@ -91,6 +111,10 @@ mod tests {
     #[test]
     fn the_columns_that_are_shown_are_there() {
         let described = Slip::columns();
-        assert!(COLUMNS.iter().all(|(name, _)| described.iter().any(|column| column.name == *name)));
+        assert!(
+            COLUMNS
+                .iter()
+                .all(|(name, _)| described.iter().any(|column| column.name == *name))
+        );
     }
 }

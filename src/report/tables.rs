@@ -30,20 +30,48 @@ pub(super) struct Columns {
 impl Columns {
     /// The columns of a row type with these names.
     pub(super) fn of<R: Row>(is_shown: impl Fn(&str) -> bool) -> Self {
-        let all: Vec<(Column, bool)> =
-            R::columns().into_iter().map(|column| (column.clone(), is_shown(&column.name))).collect();
-        let described: Vec<Json> = all.iter().filter(|column| column.1).map(|(Column { name, unit, meaning, kind, .. }, _)| {
-            json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind.word() })
-        }).collect();
+        let all: Vec<(Column, bool)> = R::columns()
+            .into_iter()
+            .map(|column| (column.clone(), is_shown(&column.name)))
+            .collect();
+        let described: Vec<Json> = all
+            .iter()
+            .filter(|column| column.1)
+            .map(
+                |(
+                    Column {
+                        name,
+                        unit,
+                        meaning,
+                        kind,
+                        ..
+                    },
+                    _,
+                )| {
+                    json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind.word() })
+                },
+            )
+            .collect();
         let values = described.iter().map(|_| Vec::new()).collect();
-        Self { described, values, all }
+        Self {
+            described,
+            values,
+            all,
+        }
     }
 
     /// Gives each column its label in the unit in which its values are read best, and the factor to that.
     pub(super) fn label(&mut self, label: impl Fn(&Column) -> Label) {
-        let labels = self.all.iter().filter(|column| column.1).map(|column| label(&column.0));
+        let labels = self
+            .all
+            .iter()
+            .filter(|column| column.1)
+            .map(|column| label(&column.0));
         for ((column, values), label) in self.described.iter_mut().zip(&self.values).zip(labels) {
-            let largest = values.iter().filter_map(Json::as_f64).fold(0.0, |most, value| value.abs().max(most));
+            let largest = values
+                .iter()
+                .filter_map(Json::as_f64)
+                .fold(0.0, |most, value| value.abs().max(most));
             let (factor, unit) = label.scale(largest);
             column["label"] = label.axis(unit).into();
             column["symbol"] = label.symbol.into();
@@ -96,12 +124,18 @@ columns! {
 impl Census {
     pub(super) fn read(layout: &Layout<'_>) -> Result<Self, ResultsError> {
         let regimes = Regime::ALL.map(|regime| (regime.word(), 0)).into();
-        let mut census = Self { regimes, ..Self::default() };
+        let mut census = Self {
+            regimes,
+            ..Self::default()
+        };
         for batch in sets_file(layout).rows::<Counted>() {
             for set in batch?.into_iter().filter(|set| !set.is_control) {
                 census.sets += 1;
                 census.slips += set.slips;
-                *census.regimes.entry(set.regime.map_or("", Regime::word)).or_default() += 1;
+                *census
+                    .regimes
+                    .entry(set.regime.map_or("", Regime::word))
+                    .or_default() += 1;
             }
         }
         Ok(census)
@@ -136,7 +170,11 @@ pub(super) struct Sets {
 
 impl Sets {
     /// Every k-th of the sets in the reduced data.
-    pub(super) fn read(layout: &Layout<'_>, sweep: &Sweep, spacing: u64) -> Result<Self, ResultsError> {
+    pub(super) fn read(
+        layout: &Layout<'_>,
+        sweep: &Sweep,
+        spacing: u64,
+    ) -> Result<Self, ResultsError> {
         let mut sets = Self {
             columns: Columns::of::<SetRow>(|_| true),
             commands: Vec::new(),
@@ -148,18 +186,31 @@ impl Sets {
         let (mut number, mut shown) = (0_u64.., Vec::new());
         for batch in sets_file(layout).rows::<SetRow>() {
             let rows = batch?.into_iter().filter(|row| !row.is_control);
-            for (row, _) in rows.zip(&mut number).filter(|(_, number)| number.is_multiple_of(spacing)) {
+            for (row, _) in rows
+                .zip(&mut number)
+                .filter(|(_, number)| number.is_multiple_of(spacing))
+            {
                 sets.push(sweep, &row);
                 shown.push(row);
             }
         }
         sets.columns.label(|column| label(&column.name));
-        sets.swept = swept(&shown).iter().map(|swept| (swept.name().to_owned(), swept.is_logarithmic())).collect();
-        let bins = Dataset::new(layout.storage, vec![layout.reduced_file(HistogramBin::NAME)]);
+        sets.swept = swept(&shown)
+            .iter()
+            .map(|swept| (swept.name().to_owned(), swept.is_logarithmic()))
+            .collect();
+        let bins = Dataset::new(
+            layout.storage,
+            vec![layout.reduced_file(HistogramBin::NAME)],
+        );
         for batch in bins.rows::<HistogramBin>() {
             for bin in batch? {
                 if let Some(&place) = sets.places.get(&bin.set_id) {
-                    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of a bin")]
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "a number of a bin"
+                    )]
                     let number = (bin.low / (bin.high - bin.low)).round() as u64;
                     sets.histograms[place].extend([number, bin.count]);
                 }
@@ -181,9 +232,18 @@ impl Sets {
 /// The `simulate` command of a job up to its seed and from there on. The end is the same for all jobs of a sweep.
 fn command(sweep: &Sweep, parameters: &Parameters) -> [String; 2] {
     // The seed stands last among the parameters, and in the command if it is not the default.
-    let seeded = Parameters { seed: 1, ..parameters.clone() };
-    let command = sweep.command(&Job { point: 0, parameters: seeded, cost: 0.0 });
-    let (begin, end) = command.rsplit_once("--set seed=1").unwrap_or((&command, ""));
+    let seeded = Parameters {
+        seed: 1,
+        ..parameters.clone()
+    };
+    let command = sweep.command(&Job {
+        point: 0,
+        parameters: seeded,
+        cost: 0.0,
+    });
+    let (begin, end) = command
+        .rsplit_once("--set seed=1")
+        .unwrap_or((&command, ""));
     [begin.trim_end().to_owned(), end.trim_start().to_owned()]
 }
 
@@ -210,20 +270,27 @@ mod tests {
 
     #[test]
     fn the_two_ends_of_a_command_and_a_seed_are_that_of_the_job() {
-        let text = "name = \"a\"\n[axes]\nV0 = [1e-5, 2e-5]\nseed = { count = 3 }\n[record]\nslips = 7\n";
+        let text =
+            "name = \"a\"\n[axes]\nV0 = [1e-5, 2e-5]\nseed = { count = 3 }\n[record]\nslips = 7\n";
         let sweep = Sweep::parse(text, Path::new("a.toml")).unwrap();
         for job in sweep.jobs() {
             let [begin, end] = command(&sweep, &job.parameters);
             let put_together = format!("{begin} --set seed={} {end}", job.parameters.seed);
             // The default seed need not be said.
-            assert_eq!(put_together.replace(" --set seed=0", ""), sweep.command(&job));
+            assert_eq!(
+                put_together.replace(" --set seed=0", ""),
+                sweep.command(&job)
+            );
         }
     }
 
     #[test]
     fn no_more_sets_are_shown_than_a_page_bears() {
         for sets in [0, 1, MAX_SETS, MAX_SETS + 1, 1_000_003] {
-            let census = Census { sets, ..Census::default() };
+            let census = Census {
+                sets,
+                ..Census::default()
+            };
             assert!(sets.div_ceil(census.spacing()) <= MAX_SETS, "{sets}");
         }
     }

@@ -30,13 +30,21 @@ pub enum Standing<'a> {
 impl<'a> Claims<'a> {
     pub fn list(member: &'a Member<'a>) -> Result<Self, StorageError> {
         member.layout().ensure_folder(&member.layout().claims())?;
-        let mut claims = Self { member, generations: HashMap::new(), own: HashSet::new() };
+        let mut claims = Self {
+            member,
+            generations: HashMap::new(),
+            own: HashSet::new(),
+        };
         claims.refresh()?;
         Ok(claims)
     }
 
     pub fn refresh(&mut self) -> Result<(), StorageError> {
-        let names = self.member.layout().storage.list(&self.member.layout().claims())?;
+        let names = self
+            .member
+            .layout()
+            .storage
+            .list(&self.member.layout().claims())?;
         for name in &names {
             if let Some((what, generation)) = name.to_str().and_then(|name| name.rsplit_once('.'))
                 && let Ok(generation) = generation.parse::<u64>()
@@ -54,11 +62,17 @@ impl<'a> Claims<'a> {
     }
 
     /// How a claim stands among workers that live.
-    pub fn standing<'l>(&self, what: &str, living: &'l BTreeMap<String, Living>) -> Result<Standing<'l>, StorageError> {
+    pub fn standing<'l>(
+        &self,
+        what: &str,
+        living: &'l BTreeMap<String, Living>,
+    ) -> Result<Standing<'l>, StorageError> {
         if self.own.contains(what) {
             return Ok(Standing::Own);
         }
-        let Some(generation) = self.last(what) else { return Ok(Standing::Free(0)) };
+        let Some(generation) = self.last(what) else {
+            return Ok(Standing::Free(0));
+        };
         let owner = self.owner(what, generation)?;
         if owner == self.member.name() {
             return Ok(Standing::Own);
@@ -84,7 +98,10 @@ impl<'a> Claims<'a> {
     /// The worker that has made a claim; empty if it is gone.
     fn owner(&self, what: &str, generation: u64) -> Result<String, StorageError> {
         let layout = self.member.layout();
-        match layout.storage.read(&layout.claims().join(format!("{what}.{generation}"))) {
+        match layout
+            .storage
+            .read(&layout.claims().join(format!("{what}.{generation}")))
+        {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
             name => Ok(String::from_utf8_lossy(&name?).into_owned()),
         }

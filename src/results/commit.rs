@@ -12,7 +12,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// How long to wait for another process that does the same, such as a reduction.
-const MAX_WAIT: Duration = if cfg!(test) { Duration::from_secs(5) } else { Duration::from_mins(10) };
+const MAX_WAIT: Duration = if cfg!(test) {
+    Duration::from_secs(5)
+} else {
+    Duration::from_mins(10)
+};
 
 /// Files that are being prepared for their places. Dropped before [`Commit::publish`], it removes what it can.
 pub struct Commit<'a> {
@@ -33,7 +37,12 @@ impl<'a> Commit<'a> {
     /// Begins in a staging folder that must be there.
     pub(super) fn within(storage: &'a dyn Storage, staging: &Path) -> Self {
         let token = format!("{:016x}", own_number());
-        Self { storage, staging: staging.to_owned(), token, staged: Vec::new() }
+        Self {
+            storage,
+            staging: staging.to_owned(),
+            token,
+            staged: Vec::new(),
+        }
     }
 
     /// Creates the next file, which is to be written, and synced, before it goes to its target.
@@ -57,7 +66,8 @@ impl<'a> Commit<'a> {
     pub fn publish(mut self) -> Result<(), StorageError> {
         for (staged, target) in &self.staged {
             self.storage.rename(staged, target)?;
-            self.storage.sync_folder(target.parent().unwrap_or(Path::new(".")))?;
+            self.storage
+                .sync_folder(target.parent().unwrap_or(Path::new(".")))?;
         }
         self.staged.clear();
         Ok(())
@@ -69,7 +79,8 @@ impl<'a> Commit<'a> {
             if !self.storage.link_new(staged, target)? {
                 return Ok(false);
             }
-            self.storage.sync_folder(target.parent().unwrap_or(Path::new(".")))?;
+            self.storage
+                .sync_folder(target.parent().unwrap_or(Path::new(".")))?;
         }
         Ok(true)
     }
@@ -99,7 +110,10 @@ pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, Storage
     let file = layout.locks().join(writer);
     let lock = layout.storage.wait_for_lock(&file, MAX_WAIT)?;
     if matches!(lock, Lock::Taken) {
-        let held = io::Error::new(io::ErrorKind::WouldBlock, "another process holds it; try again when it has ended");
+        let held = io::Error::new(
+            io::ErrorKind::WouldBlock,
+            "another process holds it; try again when it has ended",
+        );
         return Err(StorageError::at("lock", &file)(held));
     }
     if matches!(lock, Lock::Ours(_)) {
@@ -128,7 +142,9 @@ pub(crate) mod tests {
     }
 
     pub fn own_number() -> u64 {
-        let known = KNOWN_NUMBER.get().map(|last| BuildHasherDefault::<DefaultHasher>::default().hash_one(last));
+        let known = KNOWN_NUMBER
+            .get()
+            .map(|last| BuildHasherDefault::<DefaultHasher>::default().hash_one(last));
         KNOWN_NUMBER.set(known);
         known.unwrap_or_else(|| RandomState::new().hash_one(std::process::id()))
     }
@@ -136,7 +152,10 @@ pub(crate) mod tests {
     #[test]
     fn published_files_are_whole_and_staging_is_empty() {
         let root = tempfile::tempdir().unwrap();
-        let (staging, target) = (root.path().join("run/staging/x"), root.path().join("target"));
+        let (staging, target) = (
+            root.path().join("run/staging/x"),
+            root.path().join("target"),
+        );
         fs::write(&target, "old").unwrap();
         let mut commit = Commit::begin(&Layout::new(&Disk, root.path()), &staging).unwrap();
         commit.stage_bytes(&target, b"new").unwrap();
@@ -160,8 +179,15 @@ pub(crate) mod tests {
     #[test]
     fn a_file_that_cannot_take_its_place_holds_back_those_after_it() {
         let root = tempfile::tempdir().unwrap();
-        let (missing, last) = (root.path().join("no folder/first"), root.path().join("last"));
-        let mut commit = Commit::begin(&Layout::new(&Disk, root.path()), &root.path().join("staging")).unwrap();
+        let (missing, last) = (
+            root.path().join("no folder/first"),
+            root.path().join("last"),
+        );
+        let mut commit = Commit::begin(
+            &Layout::new(&Disk, root.path()),
+            &root.path().join("staging"),
+        )
+        .unwrap();
         commit.stage_bytes(&missing, b"1").unwrap();
         commit.stage_bytes(&last, b"2").unwrap();
         let error = commit.publish().unwrap_err();

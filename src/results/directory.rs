@@ -25,8 +25,7 @@ pub struct Results<'a> {
 }
 
 /// What is wrong with a name in the folder of a table that no part has.
-const STRANGER: &str =
-    "is no part of this directory's sweeps, and readers of the folder would take it for one; move it elsewhere";
+const STRANGER: &str = "is no part of this directory's sweeps, and readers of the folder would take it for one; move it elsewhere";
 
 impl<'a> Results<'a> {
     /// Opens the directory of a sweep for a worker: begins it, resumes it, or extends it.
@@ -58,16 +57,25 @@ impl<'a> Results<'a> {
         body: impl FnOnce(&Member<'a>, &Self) -> Result<T, E>,
     ) -> Result<T, E> {
         Self::look(layout, sweep)?.done_parts()?;
-        layout.storage.ensure_folder(layout.root()).map_err(ResultsError::from)?;
+        layout
+            .storage
+            .ensure_folder(layout.root())
+            .map_err(ResultsError::from)?;
         workers::join(layout, sweep, threads, |member| {
             let opened = Self::open(member, sweep);
-            let ended = opened.clone().map_err(E::from).and_then(|results| body(member, &results));
+            let ended = opened
+                .clone()
+                .map_err(E::from)
+                .and_then(|results| body(member, &results));
             if ended.is_ok() {
                 return ended;
             }
             // That the directory was moved, or that others have taken over, says more than what was not found in it.
             let moved = opened.ok().and_then(|results| results.check_place().err());
-            match moved.filter(|moved| moved.kind == ErrorKind::Refused).or_else(|| member.burial()) {
+            match moved
+                .filter(|moved| moved.kind == ErrorKind::Refused)
+                .or_else(|| member.burial())
+            {
                 Some(reason) => Err(reason.into()),
                 None => ended,
             }
@@ -77,25 +85,40 @@ impl<'a> Results<'a> {
     /// The directory of a sweep as a run would find it; nothing is written.
     pub fn preview(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         let found = Self::look(layout, sweep)?;
-        if found.is_of(sweep) { Ok(found) } else { Ok(found.extended(sweep, &found.done_parts()?)) }
+        if found.is_of(sweep) {
+            Ok(found)
+        } else {
+            Ok(found.extended(sweep, &found.done_parts()?))
+        }
     }
 
     /// Reads a directory as it is, of whatever versions: what it holds is there, and can be read.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
         let results = Self::new(layout, extension_file::read(layout)?)?;
-        if results.records.is_empty() { Err(layout.no_results()) } else { Ok(results) }
+        if results.records.is_empty() {
+            Err(layout.no_results())
+        } else {
+            Ok(results)
+        }
     }
 
     /// Reads a directory whose plan is that of this program: it can be told what is missing.
     pub fn read_plan(layout: &Layout<'a>) -> Result<Self, ResultsError> {
         let results = Self::read(layout)?;
-        results.refuse(&results.version_differences(), "use the program that wrote it; `stickslip show` reads it")?;
+        results.refuse(
+            &results.version_differences(),
+            "use the program that wrote it; `stickslip show` reads it",
+        )?;
         Ok(results)
     }
 
     pub(super) fn new(layout: &Layout<'a>, records: Vec<Record>) -> Result<Self, ResultsError> {
         let extensions = extension_file::extensions(layout, &records)?;
-        Ok(Self { layout: layout.clone(), records, extensions })
+        Ok(Self {
+            layout: layout.clone(),
+            records,
+            extensions,
+        })
     }
 
     /// Looks into a directory that a sweep is to be run in; one without extensions is fresh.
@@ -105,7 +128,8 @@ impl<'a> Results<'a> {
         let found = Self::new(layout, extension_file::read(layout)?)?;
         if found.records.is_empty() {
             if layout.root().is_symlink() && !layout.root().exists() {
-                let problem = "is a link that leads nowhere; remove it, or choose another with --out";
+                let problem =
+                    "is a link that leads nowhere; remove it, or choose another with --out";
                 return Err(ResultsError::refused(layout.root(), problem));
             }
             if is_fresh {
@@ -131,13 +155,17 @@ impl<'a> Results<'a> {
 
     /// Whether this sweep was the one asked for last.
     pub(super) fn is_of(&self, sweep: &Sweep) -> bool {
-        self.extensions.last().is_some_and(|last| last.sweep.text() == sweep.text())
+        self.extensions
+            .last()
+            .is_some_and(|last| last.sweep.text() == sweep.text())
     }
 
     /// In what versions differ from those of this program. There is one extension at least.
     pub(super) fn version_differences(&self) -> Vec<String> {
         let all = self.records.iter().zip(&self.extensions);
-        all.map(|(record, extension)| record.difference(&extension.sweep)).max_by_key(Vec::len).unwrap_or_default()
+        all.map(|(record, extension)| record.difference(&extension.sweep))
+            .max_by_key(Vec::len)
+            .unwrap_or_default()
     }
 
     /// Refuses a directory that differs in something, with the way out.
@@ -146,7 +174,8 @@ impl<'a> Results<'a> {
             return Ok(());
         }
         let differences = differences.join("\n  ");
-        let problem = format!("holds other results, nothing was changed:\n  {differences}\n{way_out}");
+        let problem =
+            format!("holds other results, nothing was changed:\n  {differences}\n{way_out}");
         Err(ResultsError::refused(self.layout.root(), problem))
     }
 
@@ -170,7 +199,8 @@ impl<'a> Results<'a> {
             last.kept.clone_from(&kept);
         }
         let extension = Extension::in_round(sweep, &all.extensions, round);
-        all.records.push(Record::new(&extension, &self.records, kept));
+        all.records
+            .push(Record::new(&extension, &self.records, kept));
         all.extensions.push(extension);
         all
     }
@@ -216,19 +246,37 @@ impl<'a> Results<'a> {
 
     /// Looks up which parts are done.
     pub fn done_parts(&self) -> Result<DoneParts, ResultsError> {
-        let tables: Vec<&str> = if self.extensions.is_empty() { Vec::new() } else { self.tables().collect() };
+        let tables: Vec<&str> = if self.extensions.is_empty() {
+            Vec::new()
+        } else {
+            self.tables().collect()
+        };
         // The jobs first: whoever has its jobs there has had the rest there before.
-        let parts = tables.into_iter().rev().map(|table| self.parts_of(table)).collect::<Result<Vec<_>, _>>()?;
-        Ok(DoneParts(parts.into_iter().reduce(|done, parts| &done & &parts).unwrap_or_default()))
+        let parts = tables
+            .into_iter()
+            .rev()
+            .map(|table| self.parts_of(table))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(DoneParts(
+            parts
+                .into_iter()
+                .reduce(|done, parts| &done & &parts)
+                .unwrap_or_default(),
+        ))
     }
 
     /// Parts and jobs that are asked for and not there; `None` in a directory of another version, which had other parts.
     pub fn missing(&self) -> Result<Option<(u64, u64)>, ResultsError> {
         let done = self.done_parts()?;
-        let outlines = self.version_differences().is_empty().then(|| self.plan().outlines());
+        let outlines = self
+            .version_differences()
+            .is_empty()
+            .then(|| self.plan().outlines());
         Ok(outlines.map(|parts| {
             let missing = parts.filter(|part| !done.has(part));
-            missing.fold((0, 0), |(parts, jobs), part| (parts + 1, jobs + part.job_count as u64))
+            missing.fold((0, 0), |(parts, jobs), part| {
+                (parts + 1, jobs + part.job_count as u64)
+            })
         }))
     }
 
@@ -237,7 +285,10 @@ impl<'a> Results<'a> {
         let planned: HashSet<PartName> = parts.iter().map(PartName::from).collect();
         for table in self.tables() {
             if let Some(stranger) = self.parts_of(table)?.difference(&planned).min() {
-                return Err(ResultsError::refused(&self.layout.table(table).join(stranger.file()), STRANGER));
+                return Err(ResultsError::refused(
+                    &self.layout.table(table).join(stranger.file()),
+                    STRANGER,
+                ));
             }
         }
         Ok(())
@@ -247,10 +298,15 @@ impl<'a> Results<'a> {
     fn remove_unfinished(&self, done: &DoneParts) -> Result<(), StorageError> {
         let (layout, storage) = (&self.layout, self.layout.storage);
         for table in TABLES {
-            for (folder, is_spill) in [(layout.table(table), false), (layout.spill().join(table), true)] {
+            for (folder, is_spill) in [
+                (layout.table(table), false),
+                (layout.spill().join(table), true),
+            ] {
                 let mut parts: Vec<_> = layout.parts_in(&folder)?.into_iter().collect();
                 // Whoever begins the same sweep at once may be at the parts of the next extension.
-                parts.retain(|part| part.extension < self.extensions.len() && (is_spill || !done.0.contains(part)));
+                parts.retain(|part| {
+                    part.extension < self.extensions.len() && (is_spill || !done.0.contains(part))
+                });
                 for part in &parts {
                     storage.remove(&folder.join(part.file()))?;
                 }
@@ -271,7 +327,10 @@ impl<'a> Results<'a> {
 
     /// The same with reduced data in another folder, which is there.
     pub fn reduced_to(&self, elsewhere: &Path) -> Self {
-        Self { layout: self.layout.reduced_to(elsewhere), ..self.clone() }
+        Self {
+            layout: self.layout.reduced_to(elsewhere),
+            ..self.clone()
+        }
     }
 
     /// Where it and everything in it lie.
@@ -314,7 +373,9 @@ impl<'a> Results<'a> {
 
     /// The id of a job of a part.
     pub fn job_id(&self, part: &Part, position: usize) -> String {
-        self.extensions[part.extension].sweep.job_id(&part.jobs[position].parameters)
+        self.extensions[part.extension]
+            .sweep
+            .job_id(&part.jobs[position].parameters)
     }
 
     /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a
@@ -326,7 +387,10 @@ impl<'a> Results<'a> {
         }
         let layout = &self.layout;
         let tables = TABLES.map(|table| layout.table(table));
-        for folder in [layout.root().to_owned(), layout.run(), layout.tables()].into_iter().chain(tables) {
+        for folder in [layout.root().to_owned(), layout.run(), layout.tables()]
+            .into_iter()
+            .chain(tables)
+        {
             match self.layout.storage.sync_folder(&folder) {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 synced => synced?,
@@ -343,6 +407,9 @@ pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
     match storage.list(layout.root()) {
         // A file at this place is somebody else's.
         Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(false),
-        names => Ok(names?.iter().all(|name| name == RUN) && storage.list(&layout.run())?.iter().all(ours)),
+        names => {
+            Ok(names?.iter().all(|name| name == RUN)
+                && storage.list(&layout.run())?.iter().all(ours))
+        }
     }
 }

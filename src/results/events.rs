@@ -125,7 +125,9 @@ struct Line {
 }
 
 fn now() -> f64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64())
+    SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0.0, |time| time.as_secs_f64())
 }
 
 pub struct Log(StoredFile);
@@ -138,11 +140,18 @@ impl Log {
 
     /// Appends an event, unless it comes for each job, or each second: these would be millions of lines.
     pub fn write(&mut self, event: &RunEvent) -> Result<(), StorageError> {
-        if matches!(event, RunEvent::JobDone { .. } | RunEvent::OthersDone { .. } | RunEvent::Tick) {
+        if matches!(
+            event,
+            RunEvent::JobDone { .. } | RunEvent::OthersDone { .. } | RunEvent::Tick
+        ) {
             return Ok(());
         }
         // An event always has a form as JSON: it holds texts and numbers alone.
-        let line = serde_json::to_string(&Line { time: now(), event: event.clone() }).unwrap_or_default();
+        let line = serde_json::to_string(&Line {
+            time: now(),
+            event: event.clone(),
+        })
+        .unwrap_or_default();
         self.0.write(format!("{line}\n").as_bytes())
     }
 }
@@ -152,10 +161,21 @@ impl Results<'_> {
         self.check_place()?;
         let folder = self.layout().logs();
         self.layout().ensure_folder(&folder)?;
-        let plain: String =
-            host().chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
+        let plain: String = host()
+            .chars()
+            .map(|c| {
+                if c.is_ascii_alphanumeric() || c == '-' {
+                    c
+                } else {
+                    '_'
+                }
+            })
+            .collect();
         let (process, number) = (std::process::id(), own_number());
-        let path = folder.join(format!("{:.3}-{plain}-{process}-{number:016x}.jsonl", now()));
+        let path = folder.join(format!(
+            "{:.3}-{plain}-{process}-{number:016x}.jsonl",
+            now()
+        ));
         Ok(Log(self.layout().storage.create(&path)?))
     }
 
@@ -170,7 +190,12 @@ impl Results<'_> {
                 log => BufReader::new(log?),
             };
             let mut line = Vec::new();
-            while log.by_ref().take(MAX_LINE).read_until(b'\n', &mut line).map_err(StorageError::at("read", &path))? > 0
+            while log
+                .by_ref()
+                .take(MAX_LINE)
+                .read_until(b'\n', &mut line)
+                .map_err(StorageError::at("read", &path))?
+                > 0
             {
                 if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
                     visit(event);
@@ -202,15 +227,29 @@ mod tests {
         let results = open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         let mut log = results.begin_log().unwrap();
         let events = [
-            RunEvent::RoundBegun { jobs: 3, predicted_cost: 4.0, rounds: RoundsSoFar::default() },
-            RunEvent::Finished(RunReport { jobs_run: 3, wall: 1.5, ..RunReport::default() }),
-            RunEvent::Error { error: "disk full".to_owned() },
+            RunEvent::RoundBegun {
+                jobs: 3,
+                predicted_cost: 4.0,
+                rounds: RoundsSoFar::default(),
+            },
+            RunEvent::Finished(RunReport {
+                jobs_run: 3,
+                wall: 1.5,
+                ..RunReport::default()
+            }),
+            RunEvent::Error {
+                error: "disk full".to_owned(),
+            },
             RunEvent::Stopping,
         ];
         for event in &events {
             log.write(event).unwrap();
         }
-        log.write(&RunEvent::JobDone { slips: 3, predicted_cost: 1.0 }).unwrap();
+        log.write(&RunEvent::JobDone {
+            slips: 3,
+            predicted_cost: 1.0,
+        })
+        .unwrap();
         log.0.write(b"{\"time\": 1, \"ev").unwrap();
         let mut read_back = Vec::new();
         results.events(|event| read_back.push(event)).unwrap();
@@ -222,10 +261,17 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
         let results = open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
-        results.begin_log().unwrap().write(&RunEvent::Stopping).unwrap();
+        results
+            .begin_log()
+            .unwrap()
+            .write(&RunEvent::Stopping)
+            .unwrap();
         let logs = results.layout().logs();
         std::fs::create_dir(logs.join("0")).unwrap();
-        std::fs::File::create(logs.join("1")).unwrap().set_len(1 << 42).unwrap();
+        std::fs::File::create(logs.join("1"))
+            .unwrap()
+            .set_len(1 << 42)
+            .unwrap();
         let mut events = 0;
         results.events(|_| events += 1).unwrap();
         assert_eq!(events, 1);

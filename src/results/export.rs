@@ -56,13 +56,15 @@ impl Results<'_> {
     ) -> Result<Exported, ResultsError> {
         let storage = self.layout().storage;
         let unfinished = prepare(storage, folder)?;
-        let exported = self.write_all(&unfinished, format, progress).and_then(|exported| {
-            for ExportedFile { name, .. } in &exported.files {
-                storage.rename(&unfinished.join(name), &folder.join(name))?;
-            }
-            storage.sync_folder(folder)?;
-            Ok(exported)
-        });
+        let exported = self
+            .write_all(&unfinished, format, progress)
+            .and_then(|exported| {
+                for ExportedFile { name, .. } in &exported.files {
+                    storage.rename(&unfinished.join(name), &folder.join(name))?;
+                }
+                storage.sync_folder(folder)?;
+                Ok(exported)
+            });
         // What stays is removed by the next export.
         let _ = storage.remove_folder(&unfinished);
         exported
@@ -78,13 +80,19 @@ impl Results<'_> {
         let mut parts: Vec<PartName> = done.0.iter().copied().collect();
         parts.sort_unstable();
         let (parts_missing, jobs_missing) = self.missing()?.unwrap_or_default();
-        let mut exported = Exported { parts: parts.len() as u64, parts_missing, jobs_missing, ..Exported::default() };
+        let mut exported = Exported {
+            parts: parts.len() as u64,
+            parts_missing,
+            jobs_missing,
+            ..Exported::default()
+        };
         let names: Vec<&str> = self.tables().collect();
         let total = (names.len() * parts.len()) as u64;
         for (number, table) in names.into_iter().enumerate() {
             let name = format!("{table}.{}", format.extension());
             let file = storage.create(&to.join(&name))?;
-            let schema = schema_of(self.joined(&tables::recorded_schema(table, self.sweep().recording())));
+            let schema =
+                schema_of(self.joined(&tables::recorded_schema(table, self.sweep().recording())));
             let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
             let mut rows = 0;
             for (done, &part) in parts.iter().enumerate() {
@@ -105,10 +113,22 @@ impl Results<'_> {
     /// The columns of a table, with those that are joined to it.
     fn joined(&self, columns: &SchemaRef) -> Vec<Field> {
         let of_jobs = schema::<JobRow>();
-        let mut fields: Vec<Field> = columns.fields().iter().map(|field| Field::clone(field)).collect();
-        let swept: HashSet<String> = self.extensions().iter().flat_map(|extension| extension.sweep.swept()).collect();
+        let mut fields: Vec<Field> = columns
+            .fields()
+            .iter()
+            .map(|field| Field::clone(field))
+            .collect();
+        let swept: HashSet<String> = self
+            .extensions()
+            .iter()
+            .flat_map(|extension| extension.sweep.swept())
+            .collect();
         let is_new = |field: &&Arc<Field>| columns.field_with_name(field.name()).is_err();
-        let swept = of_jobs.fields().iter().filter(is_new).filter(|field| swept.contains(field.name()));
+        let swept = of_jobs
+            .fields()
+            .iter()
+            .filter(is_new)
+            .filter(|field| swept.contains(field.name()));
         fields.extend(swept.map(|field| Field::clone(field)));
         fields
     }
@@ -135,7 +155,11 @@ impl Results<'_> {
         let mut copied = 0;
         for batch in rows.batches() {
             let Batch { path, rows } = batch?;
-            writer.write(&jobs.join(&rows, schema).map_err(ResultsError::damage_at(&path))?)?;
+            writer.write(
+                &jobs
+                    .join(&rows, schema)
+                    .map_err(ResultsError::damage_at(&path))?,
+            )?;
             copied += rows.num_rows() as u64;
         }
         Ok(copied)
@@ -152,7 +176,10 @@ fn prepare(storage: &dyn Storage, folder: &Path) -> Result<PathBuf, ResultsError
         }
         storage.remove_folder(&folder.join(name))?;
     }
-    let unfinished = folder.join(format!("{UNFINISHED}{:016x}", crate::results::commit::own_number()));
+    let unfinished = folder.join(format!(
+        "{UNFINISHED}{:016x}",
+        crate::results::commit::own_number()
+    ));
     storage.create_folder(&unfinished)?;
     Ok(unfinished)
 }
@@ -164,34 +191,62 @@ struct Jobs {
 
 impl Jobs {
     fn read(dataset: Dataset<'_>, path: &Path) -> Result<Self, ResultsError> {
-        let batches = dataset.batches().map(|batch| Ok(batch?.rows)).collect::<Result<Vec<_>, ResultsError>>()?;
+        let batches = dataset
+            .batches()
+            .map(|batch| Ok(batch?.rows))
+            .collect::<Result<Vec<_>, ResultsError>>()?;
         let first = batches.first().map(RecordBatch::schema);
-        let rows =
-            first.map_or_else(|| Ok(RecordBatch::new_empty(schema::<JobRow>())), |of| concat_batches(&of, &batches));
+        let rows = first.map_or_else(
+            || Ok(RecordBatch::new_empty(schema::<JobRow>())),
+            |of| concat_batches(&of, &batches),
+        );
         let rows = rows.map_err(ResultsError::damage_at(path))?;
-        let ids = rows.column_by_name(JOB_ID).and_then(|column| column.as_string_opt::<i32>());
-        let ids = ids.ok_or("there is no column job_id").map_err(ResultsError::damage_at(path))?;
-        let by_id = ids.iter().zip(0..).filter_map(|(id, row)| Some((id?.to_owned(), row))).collect();
+        let ids = rows
+            .column_by_name(JOB_ID)
+            .and_then(|column| column.as_string_opt::<i32>());
+        let ids = ids
+            .ok_or("there is no column job_id")
+            .map_err(ResultsError::damage_at(path))?;
+        let by_id = ids
+            .iter()
+            .zip(0..)
+            .filter_map(|(id, row)| Some((id?.to_owned(), row)))
+            .collect();
         Ok(Self { rows, by_id })
     }
 
     /// Rows with the columns of a schema: their own, and those of their jobs.
     fn join(&self, rows: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
         let missing = |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
-        let ids = rows.column_by_name(JOB_ID).and_then(|column| column.as_string_opt::<i32>());
+        let ids = rows
+            .column_by_name(JOB_ID)
+            .and_then(|column| column.as_string_opt::<i32>());
         let job = |id: Option<&str>| id.and_then(|id| self.by_id.get(id)).copied();
-        let jobs: Option<Vec<u32>> = ids.ok_or_else(|| missing(JOB_ID))?.iter().map(job).collect();
-        let jobs =
-            UInt32Array::from(jobs.ok_or_else(|| ArrowError::SchemaError("it has rows of other jobs".to_owned()))?);
-        let column_of =
-            |field: &Arc<Field>| match (rows.column_by_name(field.name()), self.rows.column_by_name(field.name())) {
-                (Some(column), _) => Ok(Arc::clone(column)),
-                (None, Some(column)) => take(column, &jobs, None),
-                // Programs of other versions had other columns.
-                (None, None) if field.is_nullable() => Ok(new_null_array(field.data_type(), rows.num_rows())),
-                (None, None) => Err(missing(field.name())),
-            };
-        let columns = schema.fields().iter().map(column_of).collect::<Result<Vec<_>, _>>()?;
+        let jobs: Option<Vec<u32>> = ids
+            .ok_or_else(|| missing(JOB_ID))?
+            .iter()
+            .map(job)
+            .collect();
+        let jobs = UInt32Array::from(
+            jobs.ok_or_else(|| ArrowError::SchemaError("it has rows of other jobs".to_owned()))?,
+        );
+        let column_of = |field: &Arc<Field>| match (
+            rows.column_by_name(field.name()),
+            self.rows.column_by_name(field.name()),
+        ) {
+            (Some(column), _) => Ok(Arc::clone(column)),
+            (None, Some(column)) => take(column, &jobs, None),
+            // Programs of other versions had other columns.
+            (None, None) if field.is_nullable() => {
+                Ok(new_null_array(field.data_type(), rows.num_rows()))
+            }
+            (None, None) => Err(missing(field.name())),
+        };
+        let columns = schema
+            .fields()
+            .iter()
+            .map(column_of)
+            .collect::<Result<Vec<_>, _>>()?;
         RecordBatch::try_new(Arc::clone(schema), columns)
     }
 }

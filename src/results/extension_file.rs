@@ -67,7 +67,14 @@ struct Format {
 fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
     let columns = |table: &str| {
         let schema = recorded_schema(table, sweep.recording());
-        (table.to_owned(), schema.fields().iter().map(|field| field.name().clone()).collect())
+        (
+            table.to_owned(),
+            schema
+                .fields()
+                .iter()
+                .map(|field| field.name().clone())
+                .collect(),
+        )
     };
     tables_of(sweep.recording()).map(columns).collect()
 }
@@ -75,7 +82,12 @@ fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
 impl Record {
     /// That of this program for an extension which begins after these.
     pub fn new(
-        Extension { sweep, part_cost, round, .. }: &Extension,
+        Extension {
+            sweep,
+            part_cost,
+            round,
+            ..
+        }: &Extension,
         before: &[Self],
         kept_before: Option<Vec<RangeInclusive<u64>>>,
     ) -> Self {
@@ -103,7 +115,11 @@ impl Record {
 
     /// What the footers of the extension's parts hold: all but what follows from their columns.
     pub fn footer(&self, name: &str) -> Footer {
-        let rest = Self { tables: BTreeMap::new(), sweep: String::new(), ..self.clone() };
+        let rest = Self {
+            tables: BTreeMap::new(),
+            sweep: String::new(),
+            ..self.clone()
+        };
         let footer = Footer::default().with_sweep(name, &self.sweep);
         footer.with(EXTENSION, &serde_json::to_string(&rest).unwrap_or_default())
     }
@@ -113,15 +129,31 @@ impl Record {
         let rest: Self = serde_json::from_str(texts.get(EXTENSION)?).ok()?;
         let sweep = texts.get(SWEEP)?;
         let parsed = Sweep::parse(sweep, Path::new("the sweep of a footer")).ok()?;
-        (rest.format == FORMAT).then(|| Self { tables: columns_of(&parsed), sweep: sweep.clone(), ..rest })
+        (rest.format == FORMAT).then(|| Self {
+            tables: columns_of(&parsed),
+            sweep: sweep.clone(),
+            ..rest
+        })
     }
 
     /// In what it differs from that of this program for the same sweep.
     pub fn difference(&self, sweep: &Sweep) -> Vec<String> {
         let versions = [
-            ("model version", self.model_version.to_string(), MODEL_VERSION.to_string()),
-            ("random numbers", self.rng_scheme.clone(), RNG_SCHEME.to_owned()),
-            ("plan version", self.plan_version.to_string(), PLAN_VERSION.to_string()),
+            (
+                "model version",
+                self.model_version.to_string(),
+                MODEL_VERSION.to_string(),
+            ),
+            (
+                "random numbers",
+                self.rng_scheme.clone(),
+                RNG_SCHEME.to_owned(),
+            ),
+            (
+                "plan version",
+                self.plan_version.to_string(),
+                PLAN_VERSION.to_string(),
+            ),
         ];
         let mut differences: Vec<String> = versions
             .into_iter()
@@ -130,16 +162,26 @@ impl Record {
             .collect();
         // Versions enter it.
         if differences.is_empty() && self.identity != sweep.job_id(&Parameters::default()) {
-            differences.push(format!("ids of jobs: those of {} -> others of this program", shown_text(&self.program)));
+            differences.push(format!(
+                "ids of jobs: those of {} -> others of this program",
+                shown_text(&self.program)
+            ));
         }
         for (name, after) in &columns_of(sweep) {
-            let Some(before) = self.tables.get(name) else { continue };
+            let Some(before) = self.tables.get(name) else {
+                continue;
+            };
             let missing = |of: &[String], from: &[String]| -> Vec<String> {
-                of.iter().filter(|column| !from.contains(column)).cloned().collect()
+                of.iter()
+                    .filter(|column| !from.contains(column))
+                    .cloned()
+                    .collect()
             };
             let (gone, new) = (missing(before, after), missing(after, before));
             if before != after {
-                differences.push(format!("columns of {name}: without {gone:?}, with {new:?}, or in another order"));
+                differences.push(format!(
+                    "columns of {name}: without {gone:?}, with {new:?}, or in another order"
+                ));
             }
         }
         differences
@@ -155,12 +197,15 @@ impl Record {
         let damaged = |problem: String| ResultsError::damaged(&path, problem);
         let bytes = settled(read)?.ok_or_else(|| damaged(MISSING.to_owned()))?;
         let text = String::from_utf8(bytes).map_err(|error| damaged(error.to_string()))?;
-        let Format { format } = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
+        let Format { format } =
+            serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
         if format != FORMAT {
             return Err(other_format(&path, format));
         }
         let record: Self = checksum::from_json(&text).map_err(damaged)?;
-        record.check(number).map_err(|problem| damaged(problem.to_owned()))?;
+        record
+            .check(number)
+            .map_err(|problem| damaged(problem.to_owned()))?;
         Ok(record)
     }
 
@@ -168,12 +213,19 @@ impl Record {
     fn check(&self, number: usize) -> Result<(), &'static str> {
         let is_ordered = |ranges: &Vec<RangeInclusive<u64>>| {
             ranges.iter().all(|range| range.start() <= range.end())
-                && ranges.windows(2).all(|pair| pair[0].end() < pair[1].start())
+                && ranges
+                    .windows(2)
+                    .all(|pair| pair[0].end() < pair[1].start())
         };
-        let ranges = self.kept_before.iter().chain(self.round.iter().map(|round| &round.points));
+        let ranges = self
+            .kept_before
+            .iter()
+            .chain(self.round.iter().map(|round| &round.points));
         match () {
             () if self.before.is_some() != (number > 0) => Err("it is that of another extension"),
-            () if !(self.part_cost.is_finite() && self.part_cost >= 0.0) => Err("the cost of a part makes no sense"),
+            () if !(self.part_cost.is_finite() && self.part_cost >= 0.0) => {
+                Err("the cost of a part makes no sense")
+            }
             () if !ranges.into_iter().all(is_ordered) => Err("its points are not in order"),
             () => Ok(()),
         }
@@ -213,7 +265,8 @@ pub(super) fn read(layout: &Layout<'_>) -> Result<Vec<Record>, ResultsError> {
         }
         let record = Record::read(layout, number)?;
         if !record.follows(&records) {
-            let problem = "it does not follow the file before it: one of the two is of another directory";
+            let problem =
+                "it does not follow the file before it: one of the two is of another directory";
             return Err(ResultsError::damaged(&layout.extension(number), problem));
         }
         records.push(record);
@@ -225,14 +278,24 @@ pub(super) fn read(layout: &Layout<'_>) -> Result<Vec<Record>, ResultsError> {
 pub(super) fn refuse_old(layout: &Layout<'_>) -> Result<(), ResultsError> {
     let old = layout.run().join(OLD_MANIFEST);
     if layout.storage.exists(&old)? {
-        let format = layout.storage.read(&old).ok().and_then(|text| serde_json::from_slice::<Format>(&text).ok());
-        return Err(other_format(&old, format.map_or(FORMAT - 1, |Format { format }| format)));
+        let format = layout
+            .storage
+            .read(&old)
+            .ok()
+            .and_then(|text| serde_json::from_slice::<Format>(&text).ok());
+        return Err(other_format(
+            &old,
+            format.map_or(FORMAT - 1, |Format { format }| format),
+        ));
     }
     Ok(())
 }
 
 /// The extensions that these records say.
-pub(super) fn extensions(layout: &Layout<'_>, records: &[Record]) -> Result<Vec<Extension>, ResultsError> {
+pub(super) fn extensions(
+    layout: &Layout<'_>,
+    records: &[Record],
+) -> Result<Vec<Extension>, ResultsError> {
     let mut extensions: Vec<Extension> = Vec::with_capacity(records.len());
     for (number, record) in records.iter().enumerate() {
         // Rounds of one sweep follow each other.
@@ -252,7 +315,12 @@ pub(super) fn extensions(layout: &Layout<'_>, records: &[Record]) -> Result<Vec<
         if let Some(last) = extensions.last_mut() {
             last.kept.clone_from(&record.kept_before);
         }
-        extensions.push(Extension { sweep, part_cost: record.part_cost, kept: None, round: record.round.clone() });
+        extensions.push(Extension {
+            sweep,
+            part_cost: record.part_cost,
+            kept: None,
+            round: record.round.clone(),
+        });
     }
     Ok(extensions)
 }

@@ -27,7 +27,9 @@ use std::time::{Duration, Instant};
 pub const RUN: &str = "run";
 /// Folder of the results directories that nobody placed elsewhere.
 const RESULTS: &str = "results";
-pub const RUN_FOLDERS: [&str; 7] = ["staging", "lock", "log", "workers", "claims", "spill", "batch"];
+pub const RUN_FOLDERS: [&str; 7] = [
+    "staging", "lock", "log", "workers", "claims", "spill", "batch",
+];
 /// What the name of an extension's file begins with.
 const EXTENSION: &str = "extension-";
 
@@ -42,18 +44,27 @@ pub struct Layout<'a> {
 
 impl fmt::Debug for Layout<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Layout").field("root", &self.root).finish_non_exhaustive()
+        f.debug_struct("Layout")
+            .field("root", &self.root)
+            .finish_non_exhaustive()
     }
 }
 
 impl<'a> Layout<'a> {
     pub fn new(storage: &'a dyn Storage, root: &Path) -> Self {
-        Self { storage, root: root.to_owned(), elsewhere: None }
+        Self {
+            storage,
+            root: root.to_owned(),
+            elsewhere: None,
+        }
     }
 
     /// The same with reduced data in another folder, which is there.
     pub fn reduced_to(&self, elsewhere: &Path) -> Self {
-        Self { elsewhere: Some(elsewhere.to_owned()), ..self.clone() }
+        Self {
+            elsewhere: Some(elsewhere.to_owned()),
+            ..self.clone()
+        }
     }
 
     /// What reduced data, and what it takes to make them, lie below.
@@ -78,7 +89,10 @@ impl<'a> Layout<'a> {
         } else {
             "there is no such directory"
         };
-        ResultsError::refused(&self.root, format!("{problem}; name one that a run made, such as {RESULTS}/fig3"))
+        ResultsError::refused(
+            &self.root,
+            format!("{problem}; name one that a run made, such as {RESULTS}/fig3"),
+        )
     }
 
     pub fn table(&self, name: &str) -> PathBuf {
@@ -88,28 +102,46 @@ impl<'a> Layout<'a> {
     /// All files of a table as they are now, each of them that of a part.
     pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, ResultsError> {
         let folder = self.table(name);
-        let paths = self.storage.list(&folder)?.into_iter().map(|name| folder.join(name));
+        let paths = self
+            .storage
+            .list(&folder)?
+            .into_iter()
+            .map(|name| folder.join(name));
         let stray = "it is no table file, and a table folder may hold nothing else; move it away";
         let of_part = |path: PathBuf| match PartName::of_path(&path) {
             Some(_) => Ok(path),
             None => Err(ResultsError::damaged(&path, stray)),
         };
-        Ok(Dataset::new(self.storage, paths.map(of_part).collect::<Result<_, _>>()?))
+        Ok(Dataset::new(
+            self.storage,
+            paths.map(of_part).collect::<Result<_, _>>()?,
+        ))
     }
 
     /// The names in a folder; none where a file lies on the way, which is somebody else's.
     fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
-        self.storage.list(folder).or_else(|error| if error.is_missing() { Ok(Vec::new()) } else { Err(error) })
+        self.storage.list(folder).or_else(|error| {
+            if error.is_missing() {
+                Ok(Vec::new())
+            } else {
+                Err(error)
+            }
+        })
     }
 
     /// The parts that have a file in a folder.
     pub(super) fn parts_in(&self, folder: &Path) -> Result<HashSet<PartName>, StorageError> {
-        Ok(self.names_in(folder)?.into_iter().filter_map(|name| PartName::of_path(name.as_ref())).collect())
+        Ok(self
+            .names_in(folder)?
+            .into_iter()
+            .filter_map(|name| PartName::of_path(name.as_ref()))
+            .collect())
     }
 
     /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.
     pub fn ensure_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        self.storage.ensure_folder_below(self.reduced_root(), folder)
+        self.storage
+            .ensure_folder_below(self.reduced_root(), folder)
     }
 
     pub fn reduced(&self) -> PathBuf {
@@ -131,10 +163,21 @@ impl<'a> Layout<'a> {
 
     /// Numbers of the extensions that the folder lists: a network file system may not yet find them by their names.
     pub(super) fn listed_extensions(&self) -> Result<BTreeSet<usize>, StorageError> {
-        let number = |name: &str| name.strip_prefix(EXTENSION)?.strip_suffix(".json")?.parse().ok();
+        let number = |name: &str| {
+            name.strip_prefix(EXTENSION)?
+                .strip_suffix(".json")?
+                .parse()
+                .ok()
+        };
         let names = self.names_in(&self.run())?;
         let numbers = names.iter().filter_map(|name| number(name.to_str()?));
-        Ok(numbers.filter(|&number| names.iter().any(|name| self.extension(number).ends_with(name))).collect())
+        Ok(numbers
+            .filter(|&number| {
+                names
+                    .iter()
+                    .any(|name| self.extension(number).ends_with(name))
+            })
+            .collect())
     }
 
     /// Where one writer, known by a name of its own, prepares files.
@@ -182,9 +225,15 @@ impl PartName {
     /// What the name of a file says; `None` if it is not that of a part's.
     pub fn of_path(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_str()?;
-        let (extension, index) =
-            name.strip_suffix(FILE_EXTENSION)?.strip_suffix('.')?.strip_prefix("part-")?.split_once('-')?;
-        let part = Self { extension: extension.parse().ok()?, index: index.parse().ok()? };
+        let (extension, index) = name
+            .strip_suffix(FILE_EXTENSION)?
+            .strip_suffix('.')?
+            .strip_prefix("part-")?
+            .split_once('-')?;
+        let part = Self {
+            extension: extension.parse().ok()?,
+            index: index.parse().ok()?,
+        };
         (part.file() == name).then_some(part)
     }
 
@@ -195,7 +244,10 @@ impl PartName {
 
 impl From<&Outline> for PartName {
     fn from(part: &Outline) -> Self {
-        Self { extension: part.extension, index: part.index }
+        Self {
+            extension: part.extension,
+            index: part.index,
+        }
     }
 }
 
@@ -216,12 +268,22 @@ impl DoneParts {
 }
 
 /// How long to wait: longer than a network file system shows an old name, and the time between two looks.
-const LATE: Duration = if cfg!(test) { Duration::from_millis(300) } else { Duration::from_mins(1) };
-const PAUSE: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(200) };
+const LATE: Duration = if cfg!(test) {
+    Duration::from_millis(300)
+} else {
+    Duration::from_mins(1)
+};
+const PAUSE: Duration = if cfg!(test) {
+    Duration::ZERO
+} else {
+    Duration::from_millis(200)
+};
 
 /// Looks until there is something to be seen, for a minute at most: a host of a network disk may not see yet what a folder
 /// lists.
-pub(super) fn settled<T>(mut look: impl FnMut() -> Result<Option<T>, ResultsError>) -> Result<Option<T>, ResultsError> {
+pub(super) fn settled<T>(
+    mut look: impl FnMut() -> Result<Option<T>, ResultsError>,
+) -> Result<Option<T>, ResultsError> {
     let begin = Instant::now();
     loop {
         let seen = look()?;

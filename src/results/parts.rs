@@ -9,7 +9,8 @@ use crate::results::commit::Commit;
 use crate::results::directory::Results;
 use crate::results::layout::{Layout, PartName};
 use crate::results::tables::{
-    self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow, label, relabel,
+    self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow,
+    label, relabel,
 };
 use crate::results::workers::Member;
 use crate::sweep::{Outline, Part};
@@ -35,7 +36,10 @@ impl Results<'_> {
     }
 
     pub(super) fn spilled_file(&self, table: &str, part: &Outline) -> PathBuf {
-        self.layout().spill().join(table).join(PartName::from(part).file())
+        self.layout()
+            .spill()
+            .join(table)
+            .join(PartName::from(part).file())
     }
 
     /// Spills the outcomes of some jobs of a part, beside those at the positions that are spilled already.
@@ -46,9 +50,16 @@ impl Results<'_> {
         outcomes: &Outcomes,
         spilled: &BTreeSet<usize>,
     ) -> Result<(), ResultsError> {
-        let is_finished = |position: &usize| outcomes.contains_key(position) || spilled.contains(position);
+        let is_finished =
+            |position: &usize| outcomes.contains_key(position) || spilled.contains(position);
         let spill = self.layout().spill();
-        self.write(member, part, outcomes, is_finished, ((!spilled.is_empty()).then_some(&spill), &spill))
+        self.write(
+            member,
+            part,
+            outcomes,
+            is_finished,
+            ((!spilled.is_empty()).then_some(&spill), &spill),
+        )
     }
 
     /// Commits a part. Jobs without an outcome keep the rows that they have, in the tables or, at these positions, spilled.
@@ -63,8 +74,18 @@ impl Results<'_> {
         let (tables, spill) = (self.layout().tables(), self.layout().spill());
         let from = if spilled.is_empty() { &tables } else { &spill };
         let keeps = outcomes.len() < part.jobs.len();
-        self.write(member, part, outcomes, |_| true, (keeps.then_some(from), &tables))?;
-        if spilled.is_empty() { Ok(()) } else { Ok(self.remove_spilled(part)?) }
+        self.write(
+            member,
+            part,
+            outcomes,
+            |_| true,
+            (keeps.then_some(from), &tables),
+        )?;
+        if spilled.is_empty() {
+            Ok(())
+        } else {
+            Ok(self.remove_spilled(part)?)
+        }
     }
 
     /// Removes what is spilled of those of these parts that are done, as who committed them may have died at that.
@@ -79,13 +100,20 @@ impl Results<'_> {
         }
         let done = self.done_parts()?;
         let is_over = |part: &&Outline| spilled.contains(&PartName::from(*part)) && done.has(part);
-        Ok(parts.iter().filter(is_over).try_for_each(|part| self.remove_spilled(part))?)
+        Ok(parts
+            .iter()
+            .filter(is_over)
+            .try_for_each(|part| self.remove_spilled(part))?)
     }
 
     fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
         // Jobs first: what is spilled without them is nothing.
         for table in self.tables().rev() {
-            match self.layout().storage.remove(&self.spilled_file(table, part)) {
+            match self
+                .layout()
+                .storage
+                .remove(&self.spilled_file(table, part))
+            {
                 // Another worker was first.
                 Err(error) if error.kind() == ErrorKind::NotFound => (),
                 removed => removed?,
@@ -107,19 +135,33 @@ impl Results<'_> {
         let sweep = &self.extensions()[part.extension].sweep;
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
         let positions = (0..part.jobs.len()).filter(is_written);
-        let jobs: Jobs<'_> = positions.map(|position| (label(position), outcomes.get(&position))).collect();
+        let jobs: Jobs<'_> = positions
+            .map(|position| (label(position), outcomes.get(&position)))
+            .collect();
         let mut commit = member.commit();
         self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
-            outcome.iter().flat_map(|result| &result.slips).try_for_each(|slip| writer.push(&(job, slip)))
+            outcome
+                .iter()
+                .flat_map(|result| &result.slips)
+                .try_for_each(|slip| writer.push(&(job, slip)))
         })?;
         if sweep.recording().precursors {
-            self.stage::<PrecursorRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
-                let mut precursors = outcome.iter().flat_map(|result| &result.precursors);
-                precursors.try_for_each(|precursor| writer.push(&(job, precursor)))
-            })?;
+            self.stage::<PrecursorRow<'_>>(
+                &mut commit,
+                part,
+                places,
+                &jobs,
+                |writer, job, outcome| {
+                    let mut precursors = outcome.iter().flat_map(|result| &result.precursors);
+                    precursors.try_for_each(|precursor| writer.push(&(job, precursor)))
+                },
+            )?;
         }
         self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
-            writer.push(&(relabel(job), JobRecord::new(outcome.as_ref().map_err(String::as_str))))
+            writer.push(&(
+                relabel(job),
+                JobRecord::new(outcome.as_ref().map_err(String::as_str)),
+            ))
         })?;
         self.publish(commit)
     }
@@ -131,16 +173,31 @@ impl Results<'_> {
         part: &Part,
         (from, to): (Option<&PathBuf>, &PathBuf),
         jobs: &'j Jobs<'_>,
-        write: impl Fn(&mut TableWriter<R>, &'j Label<DriveAndSeed>, &'j Outcome) -> Result<(), ResultsError>,
+        write: impl Fn(
+            &mut TableWriter<R>,
+            &'j Label<DriveAndSeed>,
+            &'j Outcome,
+        ) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
         let file = |place: &PathBuf| place.join(R::NAME).join(PartName::from(&**part).file());
         // The tables are there from the beginning of a run on.
-        let top = if *to == self.layout().spill() { &self.layout().run() } else { to };
+        let top = if *to == self.layout().spill() {
+            &self.layout().run()
+        } else {
+            to
+        };
         storage.ensure_folder_below(top, &to.join(R::NAME))?;
         let kept = KeptRows::read(Dataset::new(storage, from.map(file).into_iter().collect()))?;
-        let left_out = self.extensions()[part.extension].sweep.recording().left_out();
-        let mut writer = TableWriter::without(&left_out, commit.stage(&file(to))?, &self.footer(part.extension))?;
+        let left_out = self.extensions()[part.extension]
+            .sweep
+            .recording()
+            .left_out();
+        let mut writer = TableWriter::without(
+            &left_out,
+            commit.stage(&file(to))?,
+            &self.footer(part.extension),
+        )?;
         for (job, outcome) in jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,
@@ -168,15 +225,25 @@ impl RowsOfJob {
     /// How many rows the job has in a table. One that may run again, as it failed or was ended by a time limit, may have more:
     /// a run that was killed while it replaced them left them, and the same command puts that right.
     pub(super) fn count(&self, table: &str) -> RowCount {
-        let rows = if table == tables::SLIPS { self.slips } else { self.precursors };
+        let rows = if table == tables::SLIPS {
+            self.slips
+        } else {
+            self.precursors
+        };
         let may_exceed = matches!(self.outcome, JobOutcome::Failed | JobOutcome::TimeLimit);
-        RowCount { least: rows.unwrap_or(0), may_exceed }
+        RowCount {
+            least: rows.unwrap_or(0),
+            may_exceed,
+        }
     }
 }
 
 /// How many rows the jobs of a part have in a table, as its jobs file says.
 pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, ResultsError> {
-    let mut all = RowCount { least: 0, may_exceed: false };
+    let mut all = RowCount {
+        least: 0,
+        may_exceed: false,
+    };
     for batch in jobs.rows::<RowsOfJob>() {
         for RowCount { least, may_exceed } in batch?.iter().map(|job| job.count(table)) {
             all.least = all.least.saturating_add(least);
@@ -188,14 +255,23 @@ pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, Resu
 
 /// The files of a table that count beside these of `jobs`: those of the same parts, with as many rows as these say. A run
 /// killed in between leaves the slips of a part without its jobs. A part without its slips is damaged.
-pub fn committed_files<'a>(layout: &Layout<'a>, table: &str, jobs: &Dataset<'_>) -> Result<Dataset<'a>, ResultsError> {
+pub fn committed_files<'a>(
+    layout: &Layout<'a>,
+    table: &str,
+    jobs: &Dataset<'_>,
+) -> Result<Dataset<'a>, ResultsError> {
     let there: HashSet<PathBuf> = layout.dataset(table)?.files().cloned().collect();
     let mut files = Vec::new();
     for jobs in jobs.files() {
-        let Some(part) = PartName::of_path(jobs) else { continue };
+        let Some(part) = PartName::of_path(jobs) else {
+            continue;
+        };
         let path = layout.table(table).join(part.file());
         if !there.contains(&path) {
-            return Err(ResultsError::damaged(&path, "it is missing, though the jobs of its part are there"));
+            return Err(ResultsError::damaged(
+                &path,
+                "it is missing, though the jobs of its part are there",
+            ));
         }
         let count = row_count(Dataset::new(layout.storage, vec![jobs.clone()]), table)?;
         files.push((path, Some(count)));
@@ -216,9 +292,15 @@ impl KeptRows {
         for batch in before.batches() {
             let batch = batch?;
             let mut begin = 0;
-            for rows in batch.rows_of::<RowOfJob>()?.chunk_by(|row, next| row.job_id == next.job_id) {
+            for rows in batch
+                .rows_of::<RowOfJob>()?
+                .chunk_by(|row, next| row.job_id == next.job_id)
+            {
                 let end = begin + rows.len();
-                kept.by_job.entry(rows[0].job_id.clone()).or_default().push((kept.batches.len(), begin..end));
+                kept.by_job
+                    .entry(rows[0].job_id.clone())
+                    .or_default()
+                    .push((kept.batches.len(), begin..end));
                 begin = end;
             }
             kept.batches.push(batch);
@@ -228,6 +310,7 @@ impl KeptRows {
 
     fn copy<R: Table>(&self, writer: &mut TableWriter<R>, job: &str) -> Result<(), ResultsError> {
         let rows = self.by_job.get(job).into_iter().flatten();
-        rows.cloned().try_for_each(|(batch, rows)| writer.copy(&self.batches[batch], rows))
+        rows.cloned()
+            .try_for_each(|(batch, rows)| writer.copy(&self.batches[batch], rows))
     }
 }

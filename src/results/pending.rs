@@ -56,9 +56,19 @@ pub struct Pending<'a> {
 }
 
 impl<'a> Pending<'a> {
-    pub fn look_up(results: &'a Results<'a>, parts: &'a [Outline], retry_failed: bool) -> Result<Self, ResultsError> {
+    pub fn look_up(
+        results: &'a Results<'a>,
+        parts: &'a [Outline],
+        retry_failed: bool,
+    ) -> Result<Self, ResultsError> {
         let done = results.done_parts()?;
-        let pending = Self { results, parts, retry_failed, done, spilled: RefCell::default() };
+        let pending = Self {
+            results,
+            parts,
+            retry_failed,
+            done,
+            spilled: RefCell::default(),
+        };
         pending.look_at_spill()?;
         Ok(pending)
     }
@@ -76,17 +86,28 @@ impl<'a> Pending<'a> {
     /// Whether a part that is done may have jobs to be run: failed ones, or such as a shorter time has cut off.
     pub fn may_run_again(&self) -> bool {
         let max_time = |extension: &Extension| extension.sweep.recording().max_time;
-        self.retry_failed || self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
+        self.retry_failed
+            || self
+                .results
+                .extensions()
+                .windows(2)
+                .any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
     }
 
     /// What is not finished of a part: by position missing, spilled, failed or cut off. Of one that is done, this reads its
     /// jobs.
     pub fn state(&self, part: &Outline) -> Result<PartState, ResultsError> {
         if self.done.has(part) {
-            Ok(PartState::Done { again: self.results.again(part)? })
+            Ok(PartState::Done {
+                again: self.results.again(part)?,
+            })
         } else {
             let is_spilled = self.spilled.borrow().contains(&part.into());
-            let spilled = if is_spilled { self.results.spilled(part)? } else { BTreeSet::new() };
+            let spilled = if is_spilled {
+                self.results.spilled(part)?
+            } else {
+                BTreeSet::new()
+            };
             Ok(PartState::Missing { spilled })
         }
     }
@@ -112,7 +133,9 @@ impl Results<'_> {
             for row in batch? {
                 let why = match row.outcome {
                     JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
-                    JobOutcome::TimeLimit if row.simulated_time.is_some_and(is_cut_off) => Some(Again::CutOff),
+                    JobOutcome::TimeLimit if row.simulated_time.is_some_and(is_cut_off) => {
+                        Some(Again::CutOff)
+                    }
                     _ => None,
                 };
                 again.extend(why.map(|why| (rows, why)));
@@ -120,7 +143,10 @@ impl Results<'_> {
             }
         }
         if rows != part.job_count {
-            return Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.job_count)));
+            return Err(ResultsError::damaged(
+                &path,
+                format!("{rows} jobs where the plan has {}", part.job_count),
+            ));
         }
         if !again.is_empty() && part.extension + 1 < self.extensions().len() {
             let jobs = self.plan().part(part).jobs;
@@ -140,11 +166,22 @@ impl Results<'_> {
         for table in self.tables() {
             // Nothing yet if this host does not see a file that the folder lists, and no ids in one that is damaged.
             let read = || {
-                let file = Dataset::new(self.layout().storage, vec![self.spilled_file(table, outline)]);
+                let file = Dataset::new(
+                    self.layout().storage,
+                    vec![self.spilled_file(table, outline)],
+                );
                 match file.rows::<RowOfJob>().collect::<Result<Vec<_>, _>>() {
-                    Ok(rows) => Ok(Some(Some(rows.into_iter().flatten().map(|row| row.job_id).collect()))),
-                    Err(ResultsError { kind: ErrorKind::Damaged, .. }) => Ok(Some(None)),
-                    Err(ResultsError { kind: ErrorKind::Disk(io::ErrorKind::NotFound), .. }) => {
+                    Ok(rows) => Ok(Some(Some(
+                        rows.into_iter().flatten().map(|row| row.job_id).collect(),
+                    ))),
+                    Err(ResultsError {
+                        kind: ErrorKind::Damaged,
+                        ..
+                    }) => Ok(Some(None)),
+                    Err(ResultsError {
+                        kind: ErrorKind::Disk(io::ErrorKind::NotFound),
+                        ..
+                    }) => {
                         // Not listed: another worker has just committed the part.
                         let is_listed = self.spilled_parts(table)?.contains(&outline.into());
                         Ok((!is_listed).then_some(None))
@@ -152,10 +189,14 @@ impl Results<'_> {
                     Err(error) => Err(error),
                 }
             };
-            let Some(of_table) = settled(read)?.flatten() else { return Ok(BTreeSet::new()) };
+            let Some(of_table) = settled(read)?.flatten() else {
+                return Ok(BTreeSet::new());
+            };
             ids = of_table;
         }
         let part = self.plan().part(outline);
-        Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(&part, position))).collect())
+        Ok((0..part.jobs.len())
+            .filter(|&position| ids.contains(&self.job_id(&part, position)))
+            .collect())
     }
 }

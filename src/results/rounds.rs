@@ -27,27 +27,48 @@ impl Results<'_> {
     /// The rounds so far of the sweep that was asked for last, in order; itself alone if it decides nothing.
     pub fn rounds(&self) -> &[Extension] {
         let text = self.sweep().text();
-        let others = self.extensions().iter().rev().skip_while(|extension| extension.sweep.text() == text).count();
+        let others = self
+            .extensions()
+            .iter()
+            .rev()
+            .skip_while(|extension| extension.sweep.text() == text)
+            .count();
         &self.extensions()[others..]
     }
 
     /// All points that these have chosen.
     pub fn chosen(&self) -> Round {
-        let rounds = self.rounds().iter().filter_map(|extension| extension.round.as_ref());
-        let points = merged(rounds.flat_map(|round| round.points.iter().cloned()).collect());
-        Round { points, ..Round::default() }
+        let rounds = self
+            .rounds()
+            .iter()
+            .filter_map(|extension| extension.round.as_ref());
+        let points = merged(
+            rounds
+                .flat_map(|round| round.points.iter().cloned())
+                .collect(),
+        );
+        Round {
+            points,
+            ..Round::default()
+        }
     }
 
     /// The round that was begun last; `None` if the sweep has none.
     pub fn round(&self) -> Option<&Round> {
-        self.extensions().last().and_then(|extension| extension.round.as_ref())
+        self.extensions()
+            .last()
+            .and_then(|extension| extension.round.as_ref())
     }
 
     /// How far the rounds are; `None` if the sweep has none.
     pub fn rounds_so_far(&self) -> Option<RoundsSoFar> {
         let round = self.round()?;
         let is_over = round.is_end();
-        Some(RoundsSoFar { round: self.rounds().len() as u64 - u64::from(is_over), is_over, standing: round.standing })
+        Some(RoundsSoFar {
+            round: self.rounds().len() as u64 - u64::from(is_over),
+            is_over,
+            standing: round.standing,
+        })
     }
 
     /// The directory as it goes on, once all its parts are done: in a round that another worker has begun meanwhile, or in
@@ -65,7 +86,8 @@ impl Results<'_> {
         self.check_place()?;
         let current = Self::read(layout)?;
         if !current.is_of(self.sweep()) {
-            let problem = "another sweep file was begun here meanwhile; choose another directory with --out";
+            let problem =
+                "another sweep file was begun here meanwhile; choose another directory with --out";
             return Err(ResultsError::refused(layout.root(), problem));
         }
         let done = current.done_parts()?;
@@ -76,7 +98,9 @@ impl Results<'_> {
             return Ok(Some(current));
         }
         let round = decide(&current)?;
-        let next = current.followed_by(current.sweep(), Some(round), None).write_last(member)?;
+        let next = current
+            .followed_by(current.sweep(), Some(round), None)
+            .write_last(member)?;
         // Without locks, another may have been first.
         next.map_or_else(|| Self::read(layout), Ok).map(Some)
     }

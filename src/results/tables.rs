@@ -55,7 +55,10 @@ columns! {
 
 impl Loading {
     pub fn of(parameters: &Parameters) -> Self {
-        Self { frequency: parameters.frequency(), eta: parameters.eta() }
+        Self {
+            frequency: parameters.frequency(),
+            eta: parameters.eta(),
+        }
     }
 }
 
@@ -86,7 +89,9 @@ pub const TABLES: [&str; 3] = [SLIPS, PRECURSORS, JOBS];
 /// Names of the tables of a recording, that of the jobs last.
 pub fn tables_of(recording: &Recording) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
     let has_precursors = recording.precursors;
-    TABLES.into_iter().filter(move |table| has_precursors || *table != PRECURSORS)
+    TABLES
+        .into_iter()
+        .filter(move |table| has_precursors || *table != PRECURSORS)
 }
 
 /// The columns of the table of this name, with units and meanings, as a recording has it.
@@ -102,7 +107,10 @@ pub fn recorded_schema(table: &str, recording: &Recording) -> SchemaRef {
 /// The label of a job of a sweep.
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
     (
-        Names { job_id: sweep.job_id(parameters), set_id: sweep.set_id(parameters) },
+        Names {
+            job_id: sweep.job_id(parameters),
+            set_id: sweep.set_id(parameters),
+        },
         Selected::new(parameters.clone()),
         Loading::of(parameters),
     )
@@ -111,7 +119,11 @@ pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
 /// The same label with other parameters.
 pub fn relabel<S, T>(label: &Label<S>) -> Label<T> {
     let (names, selected, loading) = label;
-    (names.clone(), Selected::new(selected.parameters.clone()), *loading)
+    (
+        names.clone(),
+        Selected::new(selected.parameters.clone()),
+        *loading,
+    )
 }
 
 pub type SlipRow<'a> = (&'a Label<DriveAndSeed>, &'a Slip);
@@ -159,7 +171,8 @@ impl JobRecord {
             outcome: measured.map_or(JobOutcome::Failed, JobOutcome::of),
             reason: outcome.err().map(str::to_owned),
             slips: measured.map(|measured| measured.slips.len() as u64),
-            precursors: measured.map(|measured| measured.slips.iter().map(|slip| slip.precursors).sum()),
+            precursors: measured
+                .map(|measured| measured.slips.iter().map(|slip| slip.precursors).sum()),
             ruptures: measured.map(|measured| measured.ruptures),
             breaks: summary.map(|summary| summary.breaks),
             reattachments: summary.map(|summary| summary.reattachments),
@@ -220,7 +233,11 @@ pub(crate) mod tests {
 
     #[test]
     fn columns_of_a_table_have_distinct_names() {
-        for columns in [SlipRow::columns(), PrecursorRow::columns(), JobRow::columns()] {
+        for columns in [
+            SlipRow::columns(),
+            PrecursorRow::columns(),
+            JobRow::columns(),
+        ] {
             let names: HashSet<&str> = columns.iter().map(|column| column.name.as_ref()).collect();
             assert_eq!(names.len(), columns.len(), "{columns:?}");
         }

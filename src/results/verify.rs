@@ -74,14 +74,27 @@ pub enum Remedy {
 
 impl Problem {
     fn new(path: PathBuf, problem: impl Into<String>, remedy: Remedy) -> Self {
-        let moved = if matches!(remedy, Remedy::File | Remedy::Extension) { vec![path.clone()] } else { Vec::new() };
-        Self { path, problem: problem.into(), part: None, jobs: Vec::new(), remedy, moved }
+        let moved = if matches!(remedy, Remedy::File | Remedy::Extension) {
+            vec![path.clone()]
+        } else {
+            Vec::new()
+        };
+        Self {
+            path,
+            problem: problem.into(),
+            part: None,
+            jobs: Vec::new(),
+            remedy,
+            moved,
+        }
     }
 }
 
 impl Verification {
     pub fn wants(&self, remedies: &[Remedy]) -> bool {
-        self.problems.iter().any(|problem| remedies.contains(&problem.remedy))
+        self.problems
+            .iter()
+            .any(|problem| remedies.contains(&problem.remedy))
     }
 
     /// Whether a repair has something to do.
@@ -108,13 +121,23 @@ impl<'a> Results<'a> {
     pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
         let ((results, lost), verification) = examine(layout)?;
         let [tables, run, quarantine] = [layout.tables(), layout.run(), layout.quarantine()];
-        for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
-            let below = path.strip_prefix(&tables).or_else(|_| path.strip_prefix(&run)).unwrap_or(path);
+        for path in verification
+            .problems
+            .iter()
+            .flat_map(|problem| &problem.moved)
+        {
+            let below = path
+                .strip_prefix(&tables)
+                .or_else(|_| path.strip_prefix(&run))
+                .unwrap_or(path);
             layout.storage.move_away(path, &quarantine.join(below))?;
         }
         for number in lost {
             let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
-            commit.stage_bytes(&layout.extension(number), results.record(number).text().as_bytes())?;
+            commit.stage_bytes(
+                &layout.extension(number),
+                results.record(number).text().as_bytes(),
+            )?;
             commit.publish()?;
         }
         Ok(verification)
@@ -129,7 +152,9 @@ fn examine<'a>(layout: &Layout<'a>) -> Result<(Salvaged<'a>, Verification), Resu
         for name in layout.storage.list(&layout.reduced())? {
             let path = layout.reduced().join(name);
             let damage = damage_in(footer(layout.storage, &path))?;
-            verification.problems.extend(damage.map(|(path, problem)| Problem::new(path, problem, Remedy::Reduce)));
+            verification
+                .problems
+                .extend(damage.map(|(path, problem)| Problem::new(path, problem, Remedy::Reduce)));
         }
         verification.whole = verification.problems.is_empty();
         // A run may have added a sweep meanwhile, whose parts are then taken for strangers.
@@ -141,11 +166,19 @@ fn examine<'a>(layout: &Layout<'a>) -> Result<(Salvaged<'a>, Verification), Resu
 }
 
 /// Opens a directory from the files of its extensions, and from footers where these are lost.
-fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Salvaged<'a>, ResultsError> {
+fn salvage<'a>(
+    layout: &Layout<'a>,
+    problems: &mut Vec<Problem>,
+) -> Result<Salvaged<'a>, ResultsError> {
     // In this order: whoever has parts there has had its extension there before.
     let mut parts: Vec<(PartName, &str)> = Vec::new();
     for table in [tables::JOBS, tables::SLIPS] {
-        parts.extend(layout.parts_in(&layout.table(table))?.into_iter().map(|part| (part, table)));
+        parts.extend(
+            layout
+                .parts_in(&layout.table(table))?
+                .into_iter()
+                .map(|part| (part, table)),
+        );
     }
     parts.sort_unstable();
     let listed = layout.listed_extensions()?;
@@ -159,8 +192,11 @@ fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Salva
     for number in 0.. {
         let path = layout.extension(number);
         let is_listed = listed.contains(&number);
-        let read =
-            if is_listed { Record::read(layout, number) } else { Err(ResultsError::damaged(&path, "it is missing")) };
+        let read = if is_listed {
+            Record::read(layout, number)
+        } else {
+            Err(ResultsError::damaged(&path, "it is missing"))
+        };
         let of_file = match read {
             Ok(record) if record.follows(&records) => Ok(record),
             Ok(_) => Err("it does not follow the file before it".to_owned()),
@@ -174,11 +210,15 @@ fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Salva
             (Ok(record), None) => record,
             (Err(_), None) if listed.range(number..).next().is_none() => break,
             (Err(problem), None) => {
-                let problem = format!("{problem}, and no part has it in its footer; restore it from a backup");
+                let problem = format!(
+                    "{problem}, and no part has it in its footer; restore it from a backup"
+                );
                 return Err(ResultsError::damaged(&path, problem));
             }
             (of_file, Some(record)) => {
-                let problem = of_file.err().unwrap_or_else(|| "it does not belong to these tables".to_owned());
+                let problem = of_file
+                    .err()
+                    .unwrap_or_else(|| "it does not belong to these tables".to_owned());
                 problems.push(Problem::new(path, problem, Remedy::Extension));
                 lost.push(number);
                 record
@@ -192,7 +232,10 @@ fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Salva
         return Err(ResultsError::damaged(layout.root(), problem));
     }
     let results = Results::new(layout, records)?;
-    results.refuse(&results.version_differences(), "use the program that wrote it")?;
+    results.refuse(
+        &results.version_differences(),
+        "use the program that wrote it",
+    )?;
     Ok((results, lost))
 }
 
@@ -236,7 +279,9 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
     for part in results.plan().parts() {
         let name = PartName::from(&*part);
         planned.insert(name);
-        let tables = results.tables().filter(|table| there[table].contains(&name));
+        let tables = results
+            .tables()
+            .filter(|table| there[table].contains(&name));
         let tables: Vec<&'static str> = tables.collect();
         let mut damage = damage_of(results, &part, &tables)?;
         if !damage.is_empty() {
@@ -262,7 +307,11 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
             first.jobs = ids(results, &part).collect();
             if first.remedy == Remedy::Part {
                 // Jobs first: a part without them is not done.
-                first.moved = results.tables().rev().map(|table| results.part_file(table, &part)).collect();
+                first.moved = results
+                    .tables()
+                    .rev()
+                    .map(|table| results.part_file(table, &part))
+                    .collect();
             }
         }
         found.problems.extend(damage);
@@ -277,7 +326,11 @@ fn ids(results: &Results<'_>, part: &Part) -> impl Iterator<Item = String> {
 }
 
 /// What is wrong with the files of a part, which it has in these tables.
-fn damage_of(results: &Results<'_>, part: &Part, tables: &[&'static str]) -> Result<Vec<Problem>, ResultsError> {
+fn damage_of(
+    results: &Results<'_>,
+    part: &Part,
+    tables: &[&'static str],
+) -> Result<Vec<Problem>, ResultsError> {
     let mut damage = Vec::new();
     for table in results.tables() {
         let path = results.part_file(table, part);
@@ -286,7 +339,8 @@ fn damage_of(results: &Results<'_>, part: &Part, tables: &[&'static str]) -> Res
             match footer(results.layout().storage, &path) {
                 Ok(texts) => {
                     let found = misplacement(results, part, table, &texts);
-                    damage.extend(found.map(|(problem, remedy)| Problem::new(path, problem, remedy)));
+                    damage
+                        .extend(found.map(|(problem, remedy)| Problem::new(path, problem, remedy)));
                 }
                 Err(error) => {
                     let (path, problem) = error.damage()?;
@@ -317,21 +371,37 @@ fn misplacement(
     let expected = results.footer(part.extension);
     let differs = |key: &str| texts.get(key).map(String::as_str) != expected.get(key);
     if let Some(key) = VERSIONS.into_iter().find(|key| differs(key)) {
-        let [found, own] = [texts.get(key).map_or("none", String::as_str), expected.get(key).unwrap_or_default()];
-        return Some((format!("it has {key} {found}, and this program {own}: keep it elsewhere"), Remedy::Hand));
+        let [found, own] = [
+            texts.get(key).map_or("none", String::as_str),
+            expected.get(key).unwrap_or_default(),
+        ];
+        return Some((
+            format!("it has {key} {found}, and this program {own}: keep it elsewhere"),
+            Remedy::Hand,
+        ));
     }
     if ["sweep", "extension"].into_iter().any(differs) {
         return Some(("it is of another sweep".to_owned(), Remedy::Part));
     }
-    let schema = tables::recorded_schema(table, results.extensions()[part.extension].sweep.recording());
+    let schema = tables::recorded_schema(
+        table,
+        results.extensions()[part.extension].sweep.recording(),
+    );
     (!has_columns(texts, &schema)).then(|| ("it is of another table".to_owned(), Remedy::Part))
 }
 
 /// Holds the rows of all tables of a part against each other, and against the plan.
 fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
-    let dataset = |table| Dataset::new(results.layout().storage, vec![results.part_file(table, part)]);
+    let dataset = |table| {
+        Dataset::new(
+            results.layout().storage,
+            vec![results.part_file(table, part)],
+        )
+    };
     let path = results.part_file(tables::JOBS, part);
-    let jobs = dataset(tables::JOBS).rows::<RowsOfJob>().collect::<Result<Vec<_>, _>>()?;
+    let jobs = dataset(tables::JOBS)
+        .rows::<RowsOfJob>()
+        .collect::<Result<Vec<_>, _>>()?;
     let jobs: Vec<RowsOfJob> = jobs.into_iter().flatten().collect();
     let mut planned = 0;
     for (expected, job) in ids(results, part).zip(&jobs) {
@@ -344,7 +414,11 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
         planned += 1;
     }
     if jobs.len() != planned || part.jobs.len() != planned {
-        let problem = format!("it has {} jobs, and its part {}", jobs.len(), part.jobs.len());
+        let problem = format!(
+            "it has {} jobs, and its part {}",
+            jobs.len(),
+            part.jobs.len()
+        );
         return Err(ResultsError::damaged(&path, problem));
     }
     for table in results.tables().filter(|table| *table != tables::JOBS) {
@@ -353,15 +427,21 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
         for batch in dataset(table).rows::<RowOfJob>() {
             for RowOfJob { job_id } in batch? {
                 // Rows stand in the order of the jobs.
-                at += jobs[at..].iter().take_while(|job| job.job_id != job_id).count();
+                at += jobs[at..]
+                    .iter()
+                    .take_while(|job| job.job_id != job_id)
+                    .count();
                 *rows.get_mut(at).ok_or_else(|| {
-                    let problem = format!("it has rows of job {job_id} that are not its part's, or not there");
+                    let problem = format!(
+                        "it has rows of job {job_id} that are not its part's, or not there"
+                    );
                     ResultsError::damaged(&path, problem)
                 })? += 1;
             }
         }
         for (job, rows) in jobs.iter().zip(rows) {
-            let problem = |problem| ResultsError::damaged(&path, format!("of job {} {problem}", job.job_id));
+            let problem =
+                |problem| ResultsError::damaged(&path, format!("of job {} {problem}", job.job_id));
             job.count(table).check(rows).map_err(problem)?;
         }
     }
@@ -369,7 +449,10 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
 }
 
 /// What lies in the folders of the tables and is no table or no part of the plan.
-fn strangers(results: &Results<'_>, planned: &HashSet<PartName>) -> Result<Vec<Problem>, StorageError> {
+fn strangers(
+    results: &Results<'_>,
+    planned: &HashSet<PartName>,
+) -> Result<Vec<Problem>, StorageError> {
     let layout = results.layout();
     let mut strangers = Vec::new();
     for name in layout.storage.list(&layout.tables())? {
@@ -379,18 +462,34 @@ fn strangers(results: &Results<'_>, planned: &HashSet<PartName>) -> Result<Vec<P
     }
     for table in results.tables() {
         let folder = layout.table(table);
-        for path in layout.storage.list(&folder)?.into_iter().map(|name| folder.join(name)) {
+        for path in layout
+            .storage
+            .list(&folder)?
+            .into_iter()
+            .map(|name| folder.join(name))
+        {
             match PartName::of_path(&path) {
                 Some(part) if planned.contains(&part) => (),
-                Some(_) => strangers.push((path, "the plan has no such part, so its rows are there twice")),
-                None => strangers.push((path, "no part has this name, and readers of the folder would read it")),
+                Some(_) => strangers.push((
+                    path,
+                    "the plan has no such part, so its rows are there twice",
+                )),
+                None => strangers.push((
+                    path,
+                    "no part has this name, and readers of the folder would read it",
+                )),
             }
         }
     }
-    Ok(strangers.into_iter().map(|(path, problem)| Problem::new(path, problem, Remedy::File)).collect())
+    Ok(strangers
+        .into_iter()
+        .map(|(path, problem)| Problem::new(path, problem, Remedy::File))
+        .collect())
 }
 
 /// What a check found of a file that must be there: its path and what is wrong.
-fn damage_in<T>(checked: Result<T, ResultsError>) -> Result<Option<(PathBuf, String)>, ResultsError> {
+fn damage_in<T>(
+    checked: Result<T, ResultsError>,
+) -> Result<Option<(PathBuf, String)>, ResultsError> {
     checked.map_or_else(|error| error.damage().map(Some), |_| Ok(None))
 }

@@ -26,9 +26,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant, SystemTime};
 
-pub const BEAT: Duration = if cfg!(test) { Duration::from_secs(1) } else { Duration::from_secs(5) };
+pub const BEAT: Duration = if cfg!(test) {
+    Duration::from_secs(1)
+} else {
+    Duration::from_secs(5)
+};
 /// A worker of another host is dead if its file is older than one's own by this time.
-pub const SILENCE: Duration = if cfg!(test) { Duration::from_secs(4) } else { Duration::from_mins(1) };
+pub const SILENCE: Duration = if cfg!(test) {
+    Duration::from_secs(4)
+} else {
+    Duration::from_mins(1)
+};
 pub(crate) const BEAT_THREAD: &str = "beat";
 /// What the names of workers, and of their staging folders, begin with.
 const PREFIX: &str = "worker-";
@@ -67,12 +75,21 @@ impl Worker {
         let process = std::process::id();
         let (system, process_start) = (system(), process_start(process));
         let sweep = checksum::of_text(sweep.text());
-        Self { host: host(), process, system, process_start, sweep, threads, jobs_per_second: 0.0 }
+        Self {
+            host: host(),
+            process,
+            system,
+            process_start,
+            sweep,
+            threads,
+            jobs_per_second: 0.0,
+        }
     }
 
     /// Whether the process lives, if it is one that can be looked up.
     fn lives_here(&self, name: &str) -> Option<bool> {
-        let can_look = !self.system.is_empty() && self.system == system() && self.process_start.is_some();
+        let can_look =
+            !self.system.is_empty() && self.system == system() && self.process_start.is_some();
         can_look.then(|| {
             let is_lost = self.process == std::process::id() && !own().contains_key(name);
             !is_lost && process_start(self.process) == self.process_start
@@ -83,8 +100,12 @@ impl Worker {
 /// Name of this host, or "unknown".
 pub fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    let name = name.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
-    let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
+    let name = name
+        .or_else(|| std::env::var("HOSTNAME").ok())
+        .or_else(|| std::env::var("COMPUTERNAME").ok());
+    let name = name
+        .map(|name| name.trim().to_owned())
+        .filter(|name| !name.is_empty());
     name.unwrap_or_else(|| "unknown".to_owned())
 }
 
@@ -92,7 +113,11 @@ pub fn host() -> String {
 fn system() -> String {
     let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
     let space = std::fs::read_link("/proc/self/ns/pid").unwrap_or_default();
-    if boot.is_empty() { String::new() } else { format!("{} {}", boot.trim(), space.display()) }
+    if boot.is_empty() {
+        String::new()
+    } else {
+        format!("{} {}", boot.trim(), space.display())
+    }
 }
 
 /// When a process began, in ticks since the boot; `None` if it has ended.
@@ -101,7 +126,11 @@ fn process_start(process: u32) -> Option<u64> {
     // Behind the name in brackets: state, ..., the 22nd field of all.
     let mut fields = status.rsplit_once(')')?.1.split_whitespace();
     let has_ended = matches!(fields.next()?, "Z" | "X");
-    if has_ended { None } else { fields.nth(18)?.parse().ok() }
+    if has_ended {
+        None
+    } else {
+        fields.nth(18)?.parse().ok()
+    }
 }
 
 /// A worker that lives, as far as another can know.
@@ -157,25 +186,42 @@ impl Layout<'_> {
     pub fn living(&self, now: SystemTime) -> Result<BTreeMap<String, Living>, StorageError> {
         let mut living = BTreeMap::new();
         for name in self.storage.list(&self.workers())? {
-            let (name, path) = (name.to_string_lossy().into_owned(), self.workers().join(&name));
+            let (name, path) = (
+                name.to_string_lossy().into_owned(),
+                self.workers().join(&name),
+            );
             if name.ends_with(NEW) {
                 continue;
             }
-            let read = || Ok::<_, StorageError>((self.storage.read(&path)?, self.storage.modified(&path)?));
-            // A beat may have replaced it while it was read.
-            let is_stale = |error: &StorageError| error.kind() == io::ErrorKind::StaleNetworkFileHandle;
-            let (text, beat) = match read().or_else(|error| if is_stale(&error) { read() } else { Err(error) }) {
-                // One that ends at this moment.
-                Err(error) if error.is_missing() || error.is_no_file() => continue,
-                // Who cannot be read may well be at work.
-                found => found?,
+            let read = || {
+                Ok::<_, StorageError>((self.storage.read(&path)?, self.storage.modified(&path)?))
             };
+            // A beat may have replaced it while it was read.
+            let is_stale =
+                |error: &StorageError| error.kind() == io::ErrorKind::StaleNetworkFileHandle;
+            let (text, beat) =
+                match read().or_else(|error| if is_stale(&error) { read() } else { Err(error) }) {
+                    // One that ends at this moment.
+                    Err(error) if error.is_missing() || error.is_no_file() => continue,
+                    // Who cannot be read may well be at work.
+                    found => found?,
+                };
             // What a power cut left has no sense.
-            let Ok(worker) = serde_json::from_slice::<Worker>(&text) else { continue };
+            let Ok(worker) = serde_json::from_slice::<Worker>(&text) else {
+                continue;
+            };
             let lives_here = worker.lives_here(&name);
-            let is_recent = || now.duration_since(beat).is_ok_and(|age| age < SILENCE) || beat > now;
+            let is_recent =
+                || now.duration_since(beat).is_ok_and(|age| age < SILENCE) || beat > now;
             if lives_here.unwrap_or_else(is_recent) {
-                living.insert(name, Living { worker, beat, is_certain: lives_here.is_some() });
+                living.insert(
+                    name,
+                    Living {
+                        worker,
+                        beat,
+                        is_certain: lives_here.is_some(),
+                    },
+                );
             }
         }
         Ok(living)
@@ -184,19 +230,38 @@ impl Layout<'_> {
 
 impl<'a> Member<'a> {
     fn join(layout: &Layout<'a>, worker: Worker) -> Result<Self, ResultsError> {
-        let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+        let plain = |c: char| {
+            if c.is_ascii_alphanumeric() || c == '-' {
+                c
+            } else {
+                '_'
+            }
+        };
         let host: String = worker.host.chars().map(plain).collect();
         let number = own_number();
         let name = format!("{PREFIX}{host}-{}-{number:016x}", worker.process);
         own().insert(name.clone(), std::thread::current().id());
-        let member =
-            Self { layout: layout.clone(), name, number, worker, begin: Instant::now(), jobs: AtomicU64::new(0) };
+        let member = Self {
+            layout: layout.clone(),
+            name,
+            number,
+            worker,
+            begin: Instant::now(),
+            jobs: AtomicU64::new(0),
+        };
         layout.ensure_folder(&layout.workers())?;
         // First, so that nobody takes what follows for a dead one's.
         member.beat()?;
         let folder = layout.ensure_folder(&member.staging());
-        let claim = || layout.storage.create(&member.claim())?.write(member.name.as_bytes());
-        folder.and_then(|()| claim()).map_err(|error| member.burial().unwrap_or_else(|| error.into()))?;
+        let claim = || {
+            layout
+                .storage
+                .create(&member.claim())?
+                .write(member.name.as_bytes())
+        };
+        folder
+            .and_then(|()| claim())
+            .map_err(|error| member.burial().unwrap_or_else(|| error.into()))?;
         Ok(member)
     }
 
@@ -226,11 +291,18 @@ impl<'a> Member<'a> {
     }
 
     fn beat(&self) -> Result<(), StorageError> {
-        let jobs_per_second = self.jobs.load(Ordering::Relaxed) as f64 / self.begin.elapsed().as_secs_f64();
-        let worker = Worker { jobs_per_second, ..self.worker.clone() };
+        let jobs_per_second =
+            self.jobs.load(Ordering::Relaxed) as f64 / self.begin.elapsed().as_secs_f64();
+        let worker = Worker {
+            jobs_per_second,
+            ..self.worker.clone()
+        };
         // It always has a form as JSON: it holds texts and numbers alone.
         let text = serde_json::to_string(&worker).unwrap_or_default();
-        let (storage, new) = (self.layout.storage, self.layout.workers().join(format!("{}{NEW}", self.name)));
+        let (storage, new) = (
+            self.layout.storage,
+            self.layout.workers().join(format!("{}{NEW}", self.name)),
+        );
         loop {
             storage.create(&new)?.write(text.as_bytes())?;
             match storage.rename(&new, &self.file()) {
@@ -248,14 +320,19 @@ impl<'a> Member<'a> {
 
     pub fn others(&self) -> Result<BTreeMap<String, Living>, StorageError> {
         let own = self.layout.storage.modified(&self.file());
-        let mut living = self.layout.living(own.unwrap_or_else(|_| SystemTime::now()))?;
+        let mut living = self
+            .layout
+            .living(own.unwrap_or_else(|_| SystemTime::now()))?;
         living.remove(&self.name);
         Ok(living)
     }
 
     /// Leaves if another is there that works at another sweep.
     fn check_peace(&self) -> Result<(), ResultsError> {
-        let other = self.others()?.into_values().find(|other| other.worker.sweep != self.worker.sweep);
+        let other = self
+            .others()?
+            .into_values()
+            .find(|other| other.worker.sweep != self.worker.sweep);
         other.map_or(Ok(()), |Living { worker: Worker { host, process, .. }, .. }| {
             let problem = format!(
                 "is being run by process {process} on {}, for another sweep file; wait for it or stop it, or choose another \
@@ -269,9 +346,13 @@ impl<'a> Member<'a> {
     /// Why it can commit nothing any more, if others took it for dead: the listing is true also on a network disk.
     pub(super) fn burial(&self) -> Option<ResultsError> {
         let is_listed = |folder: &Path, name: &str| {
-            self.layout.storage.list(folder).map_or(true, |names| names.iter().any(|there| there == name))
+            self.layout
+                .storage
+                .list(folder)
+                .map_or(true, |names| names.iter().any(|there| there == name))
         };
-        let is_buried = is_listed(&self.layout.run(), "staging") && !is_listed(&self.layout.staging(""), &self.name);
+        let is_buried = is_listed(&self.layout.run(), "staging")
+            && !is_listed(&self.layout.staging(""), &self.name);
         let problem = format!(
             "this worker gave no sign of life for over {} s, as on a machine that was suspended, so others have taken over \
              its work; nothing that was committed is lost, and the same command goes on",
@@ -309,7 +390,11 @@ impl<'a> Member<'a> {
             let is_new = name.ends_with(NEW) && !others.is_empty();
             name.starts_with(PREFIX) && !is_new && name != self.name && !others.contains_key(name)
         };
-        for name in left.iter().map(|name| name.to_string_lossy()).filter(|name| is_dead(name)) {
+        for name in left
+            .iter()
+            .map(|name| name.to_string_lossy())
+            .filter(|name| is_dead(name))
+        {
             storage.remove_folder(&layout.staging(&name))?;
             let file = layout.workers().join(&*name);
             if storage.exists(&file)? {
@@ -317,7 +402,9 @@ impl<'a> Member<'a> {
             }
         }
         if others.is_empty() {
-            claims.iter().try_for_each(|claim| gone_is_fine(storage.remove(&layout.claims().join(claim))))?;
+            claims
+                .iter()
+                .try_for_each(|claim| gone_is_fine(storage.remove(&layout.claims().join(claim))))?;
         }
         Ok(())
     }
@@ -364,18 +451,34 @@ pub(crate) mod tests {
     /// Leaves the file of a worker on another host, or of one here that was killed, which last beat so long ago.
     pub fn leave(layout: &Layout<'_>, sweep: &Sweep, name: &str, is_here: bool, silent: Duration) {
         let here = Worker::here(sweep, 3);
-        let elsewhere = Worker { host: "elsewhere".to_owned(), system: "another".to_owned(), ..here.clone() };
+        let elsewhere = Worker {
+            host: "elsewhere".to_owned(),
+            system: "another".to_owned(),
+            ..here.clone()
+        };
         let path = layout.workers().join(name);
         fs::create_dir_all(layout.workers()).unwrap();
         // As a worker beats: nobody sees half of it.
         let new = layout.workers().join(format!("{name}{NEW}"));
-        fs::write(&new, serde_json::to_string(if is_here { &here } else { &elsewhere }).unwrap()).unwrap();
-        File::options().write(true).open(&new).unwrap().set_modified(SystemTime::now() - silent).unwrap();
+        fs::write(
+            &new,
+            serde_json::to_string(if is_here { &here } else { &elsewhere }).unwrap(),
+        )
+        .unwrap();
+        File::options()
+            .write(true)
+            .open(&new)
+            .unwrap()
+            .set_modified(SystemTime::now() - silent)
+            .unwrap();
         fs::rename(new, path).unwrap();
     }
 
     fn join<T>(results: &Results<'static>, body: impl FnOnce(&Member<'static>) -> T) -> T {
-        Results::join::<_, ResultsError>(results.layout(), &sweep(), 1, |member, _| Ok(body(member))).unwrap()
+        Results::join::<_, ResultsError>(results.layout(), &sweep(), 1, |member, _| {
+            Ok(body(member))
+        })
+        .unwrap()
     }
 
     #[test]
@@ -387,13 +490,18 @@ pub(crate) mod tests {
             join(&results, |second| {
                 let seen = &first.others().unwrap()[second.name()];
                 assert!(seen.is_certain && seen.worker.process == std::process::id());
-                assert_eq!(second.others().unwrap().into_keys().collect::<Vec<_>>(), [first.name()]);
+                assert_eq!(
+                    second.others().unwrap().into_keys().collect::<Vec<_>>(),
+                    [first.name()]
+                );
             });
             assert!(first.others().unwrap().is_empty());
         });
         for folder in ["run/workers", "run/staging"] {
-            let left: Vec<_> =
-                fs::read_dir(root.path().join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
+            let left: Vec<_> = fs::read_dir(root.path().join(folder))
+                .unwrap()
+                .map(|entry| entry.unwrap().path())
+                .collect();
             assert!(left.is_empty(), "{left:?}");
         }
     }
@@ -410,12 +518,17 @@ pub(crate) mod tests {
         fs::write(layout.workers().join("worker-torn"), "{").unwrap();
         join(&results, |member| {
             let others = member.others().unwrap();
-            assert_eq!(others.keys().collect::<Vec<_>>(), ["worker-fresh", "worker-slow"]);
+            assert_eq!(
+                others.keys().collect::<Vec<_>>(),
+                ["worker-fresh", "worker-slow"]
+            );
             assert!(others.values().all(|living| !living.is_certain));
             member.tidy().unwrap();
         });
-        let mut left: Vec<_> =
-            fs::read_dir(layout.workers()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        let mut left: Vec<_> = fs::read_dir(layout.workers())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name())
+            .collect();
         left.sort();
         assert_eq!(left, ["worker-fresh", "worker-slow"]);
     }
@@ -465,7 +578,10 @@ pub(crate) mod tests {
             Ok(late?)
         });
         let error = suspended.unwrap_err();
-        assert!(error.kind == ErrorKind::Stopped && error.to_string().contains("suspended"), "{error}");
+        assert!(
+            error.kind == ErrorKind::Stopped && error.to_string().contains("suspended"),
+            "{error}"
+        );
         assert!(!target.exists());
     }
 
@@ -491,9 +607,16 @@ pub(crate) mod tests {
     fn a_worker_joins_however_often_others_tidy_up_before_it_is_seen() {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());
-        let disk = Tidied { workers: results.layout().workers(), times: AtomicU64::new(5) };
-        let joined =
-            Results::join(&Layout::new(&disk, root.path()), &sweep(), 1, |member, _| Ok(member.file().exists()));
+        let disk = Tidied {
+            workers: results.layout().workers(),
+            times: AtomicU64::new(5),
+        };
+        let joined = Results::join(
+            &Layout::new(&disk, root.path()),
+            &sweep(),
+            1,
+            |member, _| Ok(member.file().exists()),
+        );
         assert_eq!(joined, Ok::<_, ResultsError>(true));
         assert_eq!(disk.times.into_inner(), 0);
     }
@@ -502,12 +625,22 @@ pub(crate) mod tests {
     fn workers_at_different_sweeps_keep_each_other_out() {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());
-        let other = Sweep::parse("name = \"test\"\n[axes]\nseed = [1, 2]", Path::new("test.toml")).unwrap();
+        let other = Sweep::parse(
+            "name = \"test\"\n[axes]\nseed = [1, 2]",
+            Path::new("test.toml"),
+        )
+        .unwrap();
         join(&results, |_| {
             let error = open(results.layout(), &other).unwrap_err();
-            assert!(error.to_string().contains("for another sweep file"), "{error}");
+            assert!(
+                error.to_string().contains("for another sweep file"),
+                "{error}"
+            );
         });
-        assert_eq!(open(results.layout(), &other).unwrap().extensions().len(), 2);
+        assert_eq!(
+            open(results.layout(), &other).unwrap().extensions().len(),
+            2
+        );
     }
 
     #[test]
@@ -517,13 +650,14 @@ pub(crate) mod tests {
         join(&results, |first| {
             let mut claims = Claims::list(first).unwrap();
             assert!(claims.take("part", 0).unwrap());
-            let standing =
-                |claims: &Claims<'_>, member: &Member<'_>| match claims.standing("part", &member.others().unwrap()) {
-                    Ok(Standing::Taken(owner)) => Err(owner.to_owned()),
-                    Ok(Standing::Free(generation)) => Ok(Some(generation)),
-                    Ok(Standing::Own) => Ok(None),
-                    Err(error) => panic!("{error}"),
-                };
+            let standing = |claims: &Claims<'_>, member: &Member<'_>| match claims
+                .standing("part", &member.others().unwrap())
+            {
+                Ok(Standing::Taken(owner)) => Err(owner.to_owned()),
+                Ok(Standing::Free(generation)) => Ok(Some(generation)),
+                Ok(Standing::Own) => Ok(None),
+                Err(error) => panic!("{error}"),
+            };
             assert_eq!(standing(&claims, first), Ok(None));
             join(&results, |second| {
                 let mut others = Claims::list(second).unwrap();
@@ -533,7 +667,10 @@ pub(crate) mod tests {
                 second.tidy().unwrap();
             });
             claims.refresh().unwrap();
-            assert!(claims.last("other").is_some(), "its owner has ended, but others are there");
+            assert!(
+                claims.last("other").is_some(),
+                "its owner has ended, but others are there"
+            );
             fs::write(results.layout().claims().join("part.1"), "worker-dead").unwrap();
             join(&results, |third| {
                 let mut others = Claims::list(third).unwrap();
@@ -541,7 +678,13 @@ pub(crate) mod tests {
                 assert!(others.take("part", 2).unwrap());
             });
             first.tidy().unwrap();
-            assert!(fs::read_dir(results.layout().claims()).unwrap().next().is_none(), "nobody else is there");
+            assert!(
+                fs::read_dir(results.layout().claims())
+                    .unwrap()
+                    .next()
+                    .is_none(),
+                "nobody else is there"
+            );
         });
     }
 }

@@ -28,7 +28,13 @@ struct Found {
 }
 
 /// Lets sets end by the rule; `row` is a repetition with some seeds.
-fn ended(repetitions: u64, least: u64, precision: &Precision, truth: f64, row: impl Fn(u64, u64) -> SetRow) -> Found {
+fn ended(
+    repetitions: u64,
+    least: u64,
+    precision: &Precision,
+    truth: f64,
+    row: impl Fn(u64, u64) -> SetRow,
+) -> Found {
     let (mut held, mut seeds_used, mut met) = (0.0, 0.0, 0.0);
     for repetition in 0..repetitions {
         let mut seeds = FROM.min(least);
@@ -46,7 +52,11 @@ fn ended(repetitions: u64, least: u64, precision: &Precision, truth: f64, row: i
         seeds_used += seeds as f64;
     }
     let share = 100.0 / repetitions as f64;
-    Found { coverage: share * held, seeds: seeds_used / repetitions as f64, met: share * met }
+    Found {
+        coverage: share * held,
+        seeds: seeds_used / repetitions as f64,
+        met: share * met,
+    }
 }
 
 fn precision(key: &str, target: Target) -> Precision {
@@ -70,13 +80,26 @@ fn draws(repetition: u64, is_skewed: bool) -> Vec<f64> {
 }
 
 fn of_draws(repetitions: u64, least: u64, target: f64, is_skewed: bool) -> Found {
-    let all: Vec<Vec<f64>> = (0..repetitions).map(|repetition| draws(repetition, is_skewed)).collect();
+    let all: Vec<Vec<f64>> = (0..repetitions)
+        .map(|repetition| draws(repetition, is_skewed))
+        .collect();
     let row = |repetition: u64, seeds: u64| {
-        let of_seeds = &all[usize::try_from(repetition).unwrap()][..usize::try_from(seeds).unwrap()];
+        let of_seeds =
+            &all[usize::try_from(repetition).unwrap()][..usize::try_from(seeds).unwrap()];
         let (mean, interval) = mean_of(of_seeds);
-        SetRow { mean_friction: mean, mean_friction_interval: interval, ..SetRow::default() }
+        SetRow {
+            mean_friction: mean,
+            mean_friction_interval: interval,
+            ..SetRow::default()
+        }
     };
-    ended(repetitions, least, &precision("mean_friction", Target::Absolute(target)), 0.0, row)
+    ended(
+        repetitions,
+        least,
+        &precision("mean_friction", Target::Absolute(target)),
+        0.0,
+        row,
+    )
 }
 
 /// Half-widths in standard deviations, which 8 to 64 seeds reach.
@@ -87,16 +110,25 @@ fn sets_that_end_when_they_are_precise_hold_the_true_value_as_often_as_they_say(
     for target in TARGETS {
         // 2000 repetitions give coverage to 0.5 (standard error).
         let found = of_draws(2000, MIN_SEEDS, target, false);
-        assert!((93.0..97.0).contains(&found.coverage) && found.met > 99.9, "{target}: {found:?}");
+        assert!(
+            (93.0..97.0).contains(&found.coverage) && found.met > 99.9,
+            "{target}: {found:?}"
+        );
         // Of skewed values, intervals of a fixed number of seeds hold the true one in 94 to 95 %.
         let found = of_draws(2000, MIN_SEEDS, target, true);
-        assert!((92.0..97.0).contains(&found.coverage), "{target}, skewed: {found:?}");
+        assert!(
+            (92.0..97.0).contains(&found.coverage),
+            "{target}, skewed: {found:?}"
+        );
     }
 }
 
 #[test]
 fn without_the_least_number_of_seeds_they_would_not() {
-    let worst = TARGETS.map(|target| of_draws(2000, 2, target, false).coverage).into_iter().fold(100.0, f64::min);
+    let worst = TARGETS
+        .map(|target| of_draws(2000, 2, target, false).coverage)
+        .into_iter()
+        .fold(100.0, f64::min);
     assert!(worst < 91.5, "{worst}");
 }
 
@@ -107,7 +139,9 @@ fn coverage_by_the_least_number_of_seeds_is_measured() {
     for is_skewed in [false, true] {
         for target in TARGETS {
             for least in [2, 4, 8, 16, MIN_SEEDS] {
-                let Found { coverage, seeds, .. } = of_draws(4000, least, target, is_skewed);
+                let Found {
+                    coverage, seeds, ..
+                } = of_draws(4000, least, target, is_skewed);
                 println!(
                     "draws, skewed {is_skewed}, target {target}, least {least}: {coverage:.1} %, {seeds:.1} seeds"
                 );
@@ -135,7 +169,8 @@ fn of_repetition(pool: &Pool, set: usize, repetition: u64, most: usize) -> Vec<&
     let mut generator = ChaCha8Rng::seed_from_u64(repetition);
     let mut moved: HashMap<usize, usize> = HashMap::new();
     let next = |place: usize| {
-        let other = place + usize::try_from(generator.next_u64() % (jobs.len() - place) as u64).unwrap();
+        let other =
+            place + usize::try_from(generator.next_u64() % (jobs.len() - place) as u64).unwrap();
         let taken = *moved.get(&other).unwrap_or(&other);
         let here = *moved.get(&place).unwrap_or(&place);
         moved.insert(other, here);
@@ -151,14 +186,28 @@ fn ends(row: &SetRow, statistic: Statistic) -> Option<[f64; 2]> {
 
 /// Whether the interval of a statistic holds its true value; of an angle, any turn of it.
 fn holds(row: &SetRow, truth: &SetRow, statistic: Statistic) -> bool {
-    let (Some([low, high]), Some(truth)) = (ends(row, statistic), truth.number(statistic.key)) else { return false };
-    let turns: &[f64] = if statistic.is_angle() { &[-TAU, 0.0, TAU] } else { &[0.0] };
-    turns.iter().any(|turn| low <= truth + turn && truth + turn <= high)
+    let (Some([low, high]), Some(truth)) = (ends(row, statistic), truth.number(statistic.key))
+    else {
+        return false;
+    };
+    let turns: &[f64] = if statistic.is_angle() {
+        &[-TAU, 0.0, TAU]
+    } else {
+        &[0.0]
+    };
+    turns
+        .iter()
+        .any(|turn| low <= truth + turn && truth + turn <= high)
 }
 
 /// Share of repetitions in %.
 fn share(held: impl Fn(u64) -> bool + Sync) -> f64 {
-    100.0 * (0..REPETITIONS).into_par_iter().filter(|&repetition| held(repetition)).count() as f64 / REPETITIONS as f64
+    100.0
+        * (0..REPETITIONS)
+            .into_par_iter()
+            .filter(|&repetition| held(repetition))
+            .count() as f64
+        / REPETITIONS as f64
 }
 
 /// The coverage of a statistic in all cells of a set: fixed numbers of jobs, then those that end by the rule. `truths` are
@@ -167,13 +216,22 @@ fn cells(pools: &[Pool; 2], truths: &[SetRow; 2], set: usize, statistic: Statist
     let fixed = |(jobs, slips)| {
         let which = usize::from(slips == 30);
         let (pool, truth) = (&pools[which], &truths[which]);
-        share(|repetition| holds(&pool.row(set, of_repetition(pool, set, repetition, jobs)), truth, statistic))
+        share(|repetition| {
+            holds(
+                &pool.row(set, of_repetition(pool, set, repetition, jobs)),
+                truth,
+                statistic,
+            )
+        })
     };
     let by_rule = |enough: f64| {
         let (pool, truth) = (&pools[0], &truths[0]);
         let [low, high] = ends(truth, statistic).unwrap();
         let half = 0.5 * (high - low) * (pool.sets[set].1.len() as f64 / enough).sqrt();
-        let precision = Precision { statistics: vec![statistic], target: Target::Absolute(half) };
+        let precision = Precision {
+            statistics: vec![statistic],
+            target: Target::Absolute(half),
+        };
         share(|repetition| {
             let jobs = of_repetition(pool, set, repetition, usize::try_from(MAX_JOBS).unwrap());
             let mut seeds = MIN_SEEDS;
@@ -186,7 +244,11 @@ fn cells(pools: &[Pool; 2], truths: &[SetRow; 2], set: usize, statistic: Statist
             }
         })
     };
-    SIZES.into_iter().map(fixed).chain(BY_RULE.into_iter().map(by_rule)).collect()
+    SIZES
+        .into_iter()
+        .map(fixed)
+        .chain(BY_RULE.into_iter().map(by_rule))
+        .collect()
 }
 
 /// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to each
@@ -198,8 +260,16 @@ fn of_backbone(pool: &Pool) -> [f64; 2] {
     for repetition in 0..repetitions {
         let bin = pool.bin(2 * repetition..2 * repetition + 2);
         let holds = |[low, high, truth]: [Option<f64>; 3]| low <= truth && truth <= high;
-        held[0] += u32::from(holds([bin.phase_mean_low, bin.phase_mean_high, truth.phase_mean]));
-        held[1] += u32::from(holds([bin.set_phase_mean_low, bin.set_phase_mean_high, truth.set_phase_mean]));
+        held[0] += u32::from(holds([
+            bin.phase_mean_low,
+            bin.phase_mean_high,
+            truth.phase_mean,
+        ]));
+        held[1] += u32::from(holds([
+            bin.set_phase_mean_low,
+            bin.set_phase_mean_high,
+            truth.set_phase_mean,
+        ]));
     }
     held.map(|held| 100.0 * f64::from(held) / repetitions as f64)
 }
@@ -211,30 +281,59 @@ fn coverage_is_measured() {
     let folder = std::env::var_os("STICKSLIP_POOLS").expect("run scripts/coverage");
     let folder = Path::new(&folder);
     let pools = ["15", "30"].map(|name| read_pool(folder, name));
-    let truths: Vec<[SetRow; 2]> =
-        (0..3).map(|set| pools.each_ref().map(|pool| pool.row(set, &pool.sets[set].1))).collect();
-    let columns = SIZES.map(|(jobs, slips)| format!("{jobs} × {slips}")).into_iter();
+    let truths: Vec<[SetRow; 2]> = (0..3)
+        .map(|set| {
+            pools
+                .each_ref()
+                .map(|pool| pool.row(set, &pool.sets[set].1))
+        })
+        .collect();
+    let columns = SIZES
+        .map(|(jobs, slips)| format!("{jobs} × {slips}"))
+        .into_iter();
     let columns = columns.chain(BY_RULE.map(|enough| format!("rule, {enough}")));
     let head: Vec<String> = columns.collect();
     let mut lines = vec![
-        format!("| statistic | locking | true value | {} |", head.join(" | ")),
+        format!(
+            "| statistic | locking | true value | {} |",
+            head.join(" | ")
+        ),
         format!("|---|---|---|{}", "---|".repeat(head.len())),
     ];
-    let shown = |values: &[f64]| values.iter().map(|value| format!("{value:.1}")).collect::<Vec<_>>().join(" | ");
-    for statistic in STATISTICS.iter().copied().filter(|statistic| statistic.has_interval) {
+    let shown = |values: &[f64]| {
+        values
+            .iter()
+            .map(|value| format!("{value:.1}"))
+            .collect::<Vec<_>>()
+            .join(" | ")
+    };
+    for statistic in STATISTICS
+        .iter()
+        .copied()
+        .filter(|statistic| statistic.has_interval)
+    {
         let mut all = Vec::new();
         for (set, locking) in ["weak", "middle", "strong"].into_iter().enumerate() {
             let truth = truths[set][0].number(statistic.key).unwrap();
             let found = cells(&pools, &truths[set], set, statistic);
-            lines.push(format!("| `{}` | {locking} | {truth:.4} | {} |", statistic.key, shown(&found)));
+            lines.push(format!(
+                "| `{}` | {locking} | {truth:.4} | {} |",
+                statistic.key,
+                shown(&found)
+            ));
             all.push(found);
         }
         let mean = |cells: &[usize]| {
-            all.iter().flat_map(|row| cells.iter().map(|&cell| row[cell])).sum::<f64>()
+            all.iter()
+                .flat_map(|row| cells.iter().map(|&cell| row[cell]))
+                .sum::<f64>()
                 / (all.len() * cells.len()) as f64
         };
         let (two, more) = (mean(&[0]), mean(&[1, 2, 3, 4, 5]));
-        lines.push(format!("| | mean | | **{two:.1}** | **{more:.1}** {}|", "| ".repeat(head.len() - 2)));
+        lines.push(format!(
+            "| | mean | | **{two:.1}** | **{more:.1}** {}|",
+            "| ".repeat(head.len() - 2)
+        ));
     }
     let worst = |level: f64, lines: f64| {
         level - 100.0 * lines * (0.01 * level * (1.0 - 0.01 * level) / REPETITIONS as f64).sqrt()
@@ -253,5 +352,9 @@ fn coverage_is_measured() {
         worst(93.0, 3.5),
         worst(95.0, 3.5),
     );
-    std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/coverage.md"), text).unwrap();
+    std::fs::write(
+        concat!(env!("CARGO_MANIFEST_DIR"), "/docs/coverage.md"),
+        text,
+    )
+    .unwrap();
 }

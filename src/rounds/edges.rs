@@ -7,12 +7,23 @@ use crate::sweep::{MIN_SEEDS, Refinement, Round, Standing, Sweep};
 use std::collections::BTreeMap;
 
 /// The round after these sets, by their numbers.
-pub(super) fn decide(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEdges>) -> Round {
-    let from = sweep.rounds().map_or(MIN_SEEDS, |rounds| *rounds.seeds.start());
+pub(super) fn decide(
+    sweep: &Sweep,
+    refinement: &Refinement,
+    sets: &BTreeMap<u64, SetOfEdges>,
+) -> Round {
+    let from = sweep
+        .rounds()
+        .map_or(MIN_SEEDS, |rounds| *rounds.seeds.start());
     let had = |set: u64| sets.get(&set).map_or(0, |set| set.seeds);
-    let mut room = refinement.max_jobs.saturating_sub(sets.values().map(|set| set.seeds).sum());
+    let mut room = refinement
+        .max_jobs
+        .saturating_sub(sets.values().map(|set| set.seeds).sum());
     let (mut wanted, mut standing) = (BTreeMap::new(), Standing::default());
-    for Line { mut rows, edges, .. } in lines(sweep, refinement, sets) {
+    for Line {
+        mut rows, edges, ..
+    } in lines(sweep, refinement, sets)
+    {
         for edge in edges.iter().filter(|edge| !edge.is_done()) {
             let [fewest, most] = edge.seeds();
             let seeds = match edge.wanted_row {
@@ -20,13 +31,19 @@ pub(super) fn decide(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64
                 None if fewest < most => most,
                 None => seeds_for(most, edge.error, MIN_SEEDS, sweep.seed_count()).unwrap_or(most),
             };
-            let at = edge.wanted_row.map_or_else(|| edge.sets.iter().map(|set| set.row).collect(), |row| vec![row]);
+            let at = edge.wanted_row.map_or_else(
+                || edge.sets.iter().map(|set| set.row).collect(),
+                |row| vec![row],
+            );
             let set = |row: u64| {
                 rows[refinement.axis] = row;
                 sweep.set_at(&rows).filter(|&set| had(set) < seeds)
             };
             let new: Vec<u64> = at.into_iter().filter_map(set).collect();
-            let jobs: u64 = new.iter().map(|&set| seeds.saturating_sub(*wanted.get(&set).unwrap_or(&had(set)))).sum();
+            let jobs: u64 = new
+                .iter()
+                .map(|&set| seeds.saturating_sub(*wanted.get(&set).unwrap_or(&had(set))))
+                .sum();
             if new.is_empty() || jobs > room {
                 standing.edges_capped += 1;
                 continue;
@@ -40,6 +57,12 @@ pub(super) fn decide(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64
     }
     standing.sets_open = wanted.len() as u64;
     standing.sets_done = sets.keys().filter(|set| !wanted.contains_key(set)).count() as u64;
-    let points = wanted.iter().flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds)).collect();
-    Round { points: sweep.with_controls(points), standing }
+    let points = wanted
+        .iter()
+        .flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds))
+        .collect();
+    Round {
+        points: sweep.with_controls(points),
+        standing,
+    }
 }

@@ -23,10 +23,17 @@ use std::collections::BTreeMap;
 pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
     let sweep = results.sweep();
     if let Some(refinement) = sweep.refinement() {
-        return Ok(edges::decide(sweep, refinement, &sets_of_edges(results, refinement)?));
+        return Ok(edges::decide(
+            sweep,
+            refinement,
+            &sets_of_edges(results, refinement)?,
+        ));
     }
     let precision = sweep.rounds().and_then(|rounds| rounds.precision.as_ref());
-    precision.map_or_else(|| Ok(Round::default()), |known| Ok(decide(sweep, known, &reduce_chosen(results)?)))
+    precision.map_or_else(
+        || Ok(Round::default()),
+        |known| Ok(decide(sweep, known, &reduce_chosen(results)?)),
+    )
 }
 
 /// The round after these sets, by their numbers.
@@ -44,5 +51,8 @@ fn decide(sweep: &Sweep, precision: &Precision, sets: &BTreeMap<u64, SetRow>) ->
             }
         }
     }
-    Round { points: sweep.with_controls(points), standing }
+    Round {
+        points: sweep.with_controls(points),
+        standing,
+    }
 }

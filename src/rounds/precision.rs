@@ -36,7 +36,11 @@ pub(super) fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option
     } else {
         many
     };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count, at most twice one")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a count, at most twice one"
+    )]
     let next = next as u64;
     Some(next.max(seeds + 1).min(most))
 }
@@ -53,12 +57,22 @@ mod tests {
     }
 
     fn precision(keys: &[&str], target: Target) -> Precision {
-        Precision { statistics: keys.iter().map(|key| statistic(key)).collect(), target }
+        Precision {
+            statistics: keys.iter().map(|key| statistic(key)).collect(),
+            target,
+        }
     }
 
     fn row(mean: f64, half: f64) -> SetRow {
-        let interval = Some(Interval { low: mean - half, high: mean + half });
-        SetRow { tau_mean: Some(mean), tau_interval: interval, ..SetRow::default() }
+        let interval = Some(Interval {
+            low: mean - half,
+            high: mean + half,
+        });
+        SetRow {
+            tau_mean: Some(mean),
+            tau_interval: interval,
+            ..SetRow::default()
+        }
     }
 
     #[test]
@@ -86,10 +100,31 @@ mod tests {
     #[test]
     fn the_worst_of_several_statistics_counts_and_one_without_value_does_not() {
         let both = precision(&["tau_mean", "drop_mean"], Target::Relative(0.01));
-        let row = SetRow { drop_mean: Some(1.0), ..row(2.0, 0.01) };
-        assert_eq!(need(&both, 40, 256, &row), Some(80), "a value without interval");
-        let interval = Some(Interval { low: 0.995, high: 1.005 });
-        assert_eq!(need(&both, 40, 256, &SetRow { drop_interval: interval, ..row }), None);
+        let row = SetRow {
+            drop_mean: Some(1.0),
+            ..row(2.0, 0.01)
+        };
+        assert_eq!(
+            need(&both, 40, 256, &row),
+            Some(80),
+            "a value without interval"
+        );
+        let interval = Some(Interval {
+            low: 0.995,
+            high: 1.005,
+        });
+        assert_eq!(
+            need(
+                &both,
+                40,
+                256,
+                &SetRow {
+                    drop_interval: interval,
+                    ..row
+                }
+            ),
+            None
+        );
         // A slider that slides has no intervals between slips, and never will.
         assert_eq!(need(&both, 4, 256, &SetRow::default()), None);
     }

@@ -38,16 +38,22 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
         let mean = (self.mean)(amplitude, velocity);
         for seed in 0..seeds {
             let group = usize::try_from(seed).unwrap() % GROUPS;
-            let noise = self.common.sqrt() * normal(0, seed) + (1.0 - self.common).sqrt() * normal(1 + number, seed);
+            let noise = self.common.sqrt() * normal(0, seed)
+                + (1.0 - self.common).sqrt() * normal(1 + number, seed);
             counts[group] += 1;
             sums[group] += mean.unwrap_or(0.0) + self.deviation * noise;
         }
         let (count, total): (u64, f64) = (counts.iter().sum(), sums.iter().sum());
         let less = |group: Option<usize>| {
             let (of_group, sum) = group.map_or((0, 0.0), |group| (counts[group], sums[group]));
-            mean.filter(|_| count > of_group).map(|_| (total - sum) / (count - of_group) as f64)
+            mean.filter(|_| count > of_group)
+                .map(|_| (total - sum) / (count - of_group) as f64)
         };
-        SetOfEdges { seeds, samples: vec![Sample::new(&counts, 0.0, less)], ..SetOfEdges::default() }
+        SetOfEdges {
+            seeds,
+            samples: vec![Sample::new(&counts, 0.0, less)],
+            ..SetOfEdges::default()
+        }
     }
 
     /// Runs the rounds to their end.
@@ -62,10 +68,13 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
             for (number, more) in seeds {
                 let rows = sweep.rows(number);
                 let value = |key: &str| {
-                    (0..rows.len()).filter_map(|axis| sweep.value_at(axis, rows[axis])).find(|found| found.0 == key)
+                    (0..rows.len())
+                        .filter_map(|axis| sweep.value_at(axis, rows[axis]))
+                        .find(|found| found.0 == key)
                 };
                 let had = sets.get(&number).map_or(0, |set| set.seeds);
-                let [amplitude, velocity] = ["Delta", "V0"].map(|key| value(key).map_or(0.0, |found| found.1));
+                let [amplitude, velocity] =
+                    ["Delta", "V0"].map(|key| value(key).map_or(0.0, |found| found.1));
                 sets.insert(number, self.set(number, had + more, amplitude, velocity));
             }
             rounds.push(decide(sweep, sweep.refinement().unwrap(), &sets));
@@ -81,10 +90,16 @@ fn found(sweep: &Sweep, sets: &BTreeMap<u64, SetOfEdges>) -> Vec<Vec<([f64; 3], 
     let [first, second] = [0, 1].map(|row| sweep.value_at(axis, row).unwrap().1);
     let of_edge = |edge: &Edge<'_>| {
         let [low, high] = edge.interval;
-        ([low, edge.place, high].map(|row| first + row * (second - first)), edge.is_done())
+        (
+            [low, edge.place, high].map(|row| first + row * (second - first)),
+            edge.is_done(),
+        )
     };
     let lines = lines(sweep, sweep.refinement().unwrap(), sets);
-    lines.iter().map(|Line { edges, .. }| edges.iter().map(of_edge).collect()).collect()
+    lines
+        .iter()
+        .map(|Line { edges, .. }| edges.iter().map(of_edge).collect())
+        .collect()
 }
 
 /// What repetitions came to, of an edge at a place that the grid does not know.
@@ -98,7 +113,13 @@ struct Coverage {
 }
 
 /// Of a response that rises from -1 to 1 over a width, in units of the width that is wanted.
-fn coverage(repetitions: u64, steepness: f64, deviation: f64, common: f64, response: fn(f64) -> f64) -> Coverage {
+fn coverage(
+    repetitions: u64,
+    steepness: f64,
+    deviation: f64,
+    common: f64,
+    response: fn(f64) -> f64,
+) -> Coverage {
     let sweep = sweep(
         "Delta = { linear = [0, 1e-6], points = 5 }",
         "to = 1e-8\nseeds = { from = 24, to = 2000 }\njobs = 100000",
@@ -108,8 +129,16 @@ fn coverage(repetitions: u64, steepness: f64, deviation: f64, common: f64, respo
         // Anywhere between two of the first sets.
         let edge = 1e-6 * (0.3 + 0.15 * ((repetition * 89 % 144) as f64 / 144.0));
         let mean = |amplitude: f64, _: f64| Some(response((amplitude - edge) / (steepness * 1e-8)));
-        let (rounds, sets) = Noisy { mean, deviation, common, repetition }.rounds(&sweep);
-        let [of_row] = &found(&sweep, &sets)[..] else { panic!("one row") };
+        let (rounds, sets) = Noisy {
+            mean,
+            deviation,
+            common,
+            repetition,
+        }
+        .rounds(&sweep);
+        let [of_row] = &found(&sweep, &sets)[..] else {
+            panic!("one row")
+        };
         if let [([low, _, high], is_done)] = of_row[..] {
             held += u64::from(low <= edge && edge <= high);
             reached += u64::from(is_done);
@@ -119,7 +148,12 @@ fn coverage(repetitions: u64, steepness: f64, deviation: f64, common: f64, respo
     }
     let share = |count: u64| 100.0 * count as f64 / repetitions as f64;
     let mean = |sum: f64| sum / repetitions as f64;
-    Coverage { held: share(held), reached: share(reached), jobs: mean(jobs as f64), rounds: mean(rounds_run as f64) }
+    Coverage {
+        held: share(held),
+        reached: share(reached),
+        jobs: mean(jobs as f64),
+        rounds: mean(rounds_run as f64),
+    }
 }
 
 fn tanh(place: f64) -> f64 {
@@ -138,12 +172,22 @@ fn skewed(place: f64) -> f64 {
 
 /// Jobs of plain bisection to the same width, and the share of brackets that hold the edge, in %: a set gets twice as many
 /// seeds until it is clear on which side it lies, and at the cap it counts by its estimate.
-fn plain_bisection(repetitions: u64, steepness: f64, deviation: f64, response: fn(f64) -> f64) -> (f64, f64) {
+fn plain_bisection(
+    repetitions: u64,
+    steepness: f64,
+    deviation: f64,
+    response: fn(f64) -> f64,
+) -> (f64, f64) {
     let (mut jobs, mut held) = (0, 0);
     for repetition in 0..repetitions {
         let edge = 0.3 + 0.15 * ((repetition * 89 % 144) as f64 / 144.0);
         let mean = |amplitude: f64, _: f64| Some(response((amplitude - edge) / (steepness * 1e-2)));
-        let noisy = Noisy { mean, deviation, common: 0.0, repetition };
+        let noisy = Noisy {
+            mean,
+            deviation,
+            common: 0.0,
+            repetition,
+        };
         let (mut low, mut high) = (0.25_f64, 0.5);
         jobs += 5 * 24;
         while high - low > 1e-2 {
@@ -157,22 +201,50 @@ fn plain_bisection(repetitions: u64, steepness: f64, deviation: f64, response: f
                 seeds = (2 * seeds).min(2000);
             };
             jobs += seeds;
-            if side > 0.0 { high = middle } else { low = middle }
+            if side > 0.0 {
+                high = middle
+            } else {
+                low = middle
+            }
         }
         held += u64::from(low <= edge && edge <= high);
     }
-    (jobs as f64 / repetitions as f64, 100.0 * held as f64 / repetitions as f64)
+    (
+        jobs as f64 / repetitions as f64,
+        100.0 * held as f64 / repetitions as f64,
+    )
 }
 
 /// The table of coverage of edges in `docs/rounds.md`: run with `--ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn coverage_of_edges_is_measured() {
-    let bounded = [(0.01, 1.0), (0.5, 0.3), (1.0, 1.0), (2.0, 1.0), (5.0, 1.0), (10.0, 0.6), (20.0, 0.3)];
-    for (name, response) in [("tanh", tanh as fn(f64) -> f64), ("skewed", skewed), ("bent", bent)] {
-        let cases = if name == "bent" { &bounded[2..6] } else { &bounded[..] };
+    let bounded = [
+        (0.01, 1.0),
+        (0.5, 0.3),
+        (1.0, 1.0),
+        (2.0, 1.0),
+        (5.0, 1.0),
+        (10.0, 0.6),
+        (20.0, 0.3),
+    ];
+    for (name, response) in [
+        ("tanh", tanh as fn(f64) -> f64),
+        ("skewed", skewed),
+        ("bent", bent),
+    ] {
+        let cases = if name == "bent" {
+            &bounded[2..6]
+        } else {
+            &bounded[..]
+        };
         for &(steepness, deviation) in cases {
-            let Coverage { held, reached, jobs, rounds } = coverage(300, steepness, deviation, 0.3, response);
+            let Coverage {
+                held,
+                reached,
+                jobs,
+                rounds,
+            } = coverage(300, steepness, deviation, 0.3, response);
             let (plain, plain_held) = plain_bisection(300, steepness, deviation, response);
             println!(
                 "| {name} | {steepness} | {deviation} | {held:.1} | {reached:.1} | {rounds:.1} | {jobs:.0} | {plain:.0} | {plain_held:.1} |"
@@ -183,32 +255,55 @@ fn coverage_of_edges_is_measured() {
 
 #[test]
 fn intervals_of_steep_and_of_flat_edges_hold_them_as_often_as_they_say() {
-    for (steepness, deviation, at_least) in [(0.01, 1.0, 98.0), (1.0, 1.0, 90.0), (10.0, 0.3, 90.0)] {
+    for (steepness, deviation, at_least) in [(0.01, 1.0, 98.0), (1.0, 1.0, 90.0), (10.0, 0.3, 90.0)]
+    {
         let found = coverage(100, steepness, deviation, 0.3, tanh);
-        assert!(found.held >= at_least && found.reached > 99.9, "{steepness} {deviation}: {found:?}");
+        assert!(
+            found.held >= at_least && found.reached > 99.9,
+            "{steepness} {deviation}: {found:?}"
+        );
     }
     // By their number, seeds of a flat response are many: what is common to neighbours is no error of their difference.
     assert!(coverage(50, 10.0, 0.3, 0.0, tanh).jobs > 2.0 * coverage(50, 1.0, 0.3, 0.0, tanh).jobs);
 }
 
 fn noisy(mean: impl Fn(f64, f64) -> Option<f64>) -> Noisy<impl Fn(f64, f64) -> Option<f64>> {
-    Noisy { mean, deviation: 0.1, common: 0.3, repetition: 1 }
+    Noisy {
+        mean,
+        deviation: 0.1,
+        common: 0.3,
+        repetition: 1,
+    }
 }
 
 const DELTA: &str = "Delta = { linear = [0.5e-6, 4.5e-6], points = 9 }";
 
 #[test]
 fn edges_up_and_down_are_found_and_sets_without_a_value_are_no_side() {
-    let sweep = sweep(DELTA, "to = 1e-8\nseeds = { from = 24, to = 500 }\njobs = 20000");
+    let sweep = sweep(
+        DELTA,
+        "to = 1e-8\nseeds = { from = 24, to = 500 }\njobs = 20000",
+    );
     // Above 1.23 µm, but between 2.71 and 3.3 µm; there is nothing between 1.6 and 2.1 µm.
     let mean = |amplitude: f64, _: f64| {
         let side = |edge: f64| libm::tanh((1e6 * amplitude - edge) / 0.02);
         (!(1.6e-6..2.1e-6).contains(&amplitude)).then(|| side(1.23) * side(2.71) * side(3.3))
     };
     let (_, sets) = noisy(mean).rounds(&sweep);
-    let [of_row] = &found(&sweep, &sets)[..] else { panic!() };
-    let places: Vec<f64> = of_row.iter().map(|([_, place, _], _)| 1e6 * place).collect();
-    assert!(places.iter().zip([1.23, 2.71, 3.3]).all(|(found, edge)| (found - edge).abs() < 0.02), "{places:?}");
+    let [of_row] = &found(&sweep, &sets)[..] else {
+        panic!()
+    };
+    let places: Vec<f64> = of_row
+        .iter()
+        .map(|([_, place, _], _)| 1e6 * place)
+        .collect();
+    assert!(
+        places
+            .iter()
+            .zip([1.23, 2.71, 3.3])
+            .all(|(found, edge)| (found - edge).abs() < 0.02),
+        "{places:?}"
+    );
     assert!(places.len() == 3 && of_row.iter().all(|(_, is_done)| *is_done));
     let (rounds, _) = noisy(|_, _| Some(1.0)).rounds(&sweep);
     assert_eq!(rounds.len(), 2, "no edge, no further round");
@@ -220,21 +315,46 @@ fn edges_up_and_down_are_found_and_sets_without_a_value_are_no_side() {
 fn what_ends_an_edge_too_early_is_counted_and_no_more_jobs_run_than_are_allowed() {
     let mean = |amplitude: f64, _: f64| Some(1e6 * (amplitude - 2.345e-6));
     let ended = |seeds: u64, jobs: u64| {
-        let sweep = sweep(DELTA, &format!("to = 1e-8\nseeds = {{ from = 24, to = {seeds} }}\njobs = {jobs}"));
+        let sweep = sweep(
+            DELTA,
+            &format!("to = 1e-8\nseeds = {{ from = 24, to = {seeds} }}\njobs = {jobs}"),
+        );
         let (rounds, sets) = noisy(mean).rounds(&sweep);
         let total: u64 = sets.values().map(|set| set.seeds).sum();
-        assert!(total <= jobs && sets.values().all(|set| set.seeds <= seeds), "{total}");
-        let [(interval, is_done)] = found(&sweep, &sets)[0][..] else { panic!("one edge") };
-        assert!(interval[0] < 2.345e-6 && 2.345e-6 < interval[2], "{interval:?}");
+        assert!(
+            total <= jobs && sets.values().all(|set| set.seeds <= seeds),
+            "{total}"
+        );
+        let [(interval, is_done)] = found(&sweep, &sets)[0][..] else {
+            panic!("one edge")
+        };
+        assert!(
+            interval[0] < 2.345e-6 && 2.345e-6 < interval[2],
+            "{interval:?}"
+        );
         (rounds.last().unwrap().standing.edges_capped, is_done)
     };
-    assert_eq!([ended(2000, 90_000), ended(50, 90_000), ended(2000, 300)], [(0, true), (1, false), (1, false)]);
+    assert_eq!(
+        [ended(2000, 90_000), ended(50, 90_000), ended(2000, 300)],
+        [(0, true), (1, false), (1, false)]
+    );
     // So near the edge that a line through few seeds may be level.
-    let sweep = sweep(DELTA, "to = 1e-8\nseeds = { from = 24, to = 24 }\njobs = 90000");
+    let sweep = sweep(
+        DELTA,
+        "to = 1e-8\nseeds = { from = 24, to = 24 }\njobs = 90000",
+    );
     let (_, sets) = noisy(mean).rounds(&sweep);
     let lines = lines(&sweep, sweep.refinement().unwrap(), &sets);
-    let Edge { interval: [low, high], place, error, .. } = lines[0].edges[0];
-    assert!(error.is_infinite() && low < place && place < high, "the bracket: {low} {place} {high}");
+    let Edge {
+        interval: [low, high],
+        place,
+        error,
+        ..
+    } = lines[0].edges[0];
+    assert!(
+        error.is_infinite() && low < place && place < high,
+        "the bracket: {low} {place} {high}"
+    );
 }
 
 #[test]
@@ -244,17 +364,32 @@ fn each_row_has_its_edges_and_points_that_are_no_jobs_are_passed_over() {
                 [refine]\nby = \"mean_friction\"\nthreshold = 0\naxis = \"Delta\"\nto = 5e-8\n\
                 seeds = { first = 1000, from = 2, to = 90 }\njobs = 9000";
     let sweep = Sweep::parse(text, Path::new("test.toml")).unwrap();
-    assert!(sweep.warnings()[0].contains("from = 2 is raised to 24"), "{:?}", sweep.warnings());
+    assert!(
+        sweep.warnings()[0].contains("from = 2 is raised to 24"),
+        "{:?}",
+        sweep.warnings()
+    );
     let mean = |amplitude: f64, velocity: f64| Some(1e6 * (amplitude - 0.03 * velocity - 4e-7));
     let (_, sets) = noisy(mean).rounds(&sweep);
-    let places: Vec<Vec<f64>> =
-        found(&sweep, &sets).into_iter().map(|row| row.into_iter().map(|(at, _)| 1e6 * at[1]).collect()).collect();
+    let places: Vec<Vec<f64>> = found(&sweep, &sets)
+        .into_iter()
+        .map(|row| row.into_iter().map(|(at, _)| 1e6 * at[1]).collect())
+        .collect();
     let expected: [&[f64]; 3] = [&[0.7], &[2.05], &[]];
     for (places, expected) in places.iter().zip(expected) {
         assert_eq!(places.len(), expected.len(), "{places:?}");
-        assert!(places.iter().zip(expected).all(|(place, edge)| (place - edge).abs() < 0.05), "{places:?}");
+        assert!(
+            places
+                .iter()
+                .zip(expected)
+                .all(|(place, edge)| (place - edge).abs() < 0.05),
+            "{places:?}"
+        );
     }
     let jobs: Vec<_> = sweep.jobs().collect();
-    assert!(sets.keys().all(|set| jobs.iter().any(|job| job.point == *set)));
+    assert!(
+        sets.keys()
+            .all(|set| jobs.iter().any(|job| job.point == *set))
+    );
     assert_eq!(jobs.iter().map(|job| job.parameters.seed).min(), Some(1000));
 }

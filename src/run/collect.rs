@@ -21,12 +21,20 @@ use std::time::{Duration, Instant};
 /// How often the collector looks at the stop flag.
 const STOP_POLL: Duration = Duration::from_millis(if cfg!(test) { 2 } else { 20 });
 /// How often it lets the display know that time passes.
-const TICK: Duration = if cfg!(test) { Duration::from_millis(20) } else { Duration::from_secs(1) };
+const TICK: Duration = if cfg!(test) {
+    Duration::from_millis(20)
+} else {
+    Duration::from_secs(1)
+};
 /// How often it looks what others have done.
 const LOOK_AT_OTHERS: Duration = Duration::from_secs(10);
 /// A job is reported as long once it has run for this time and this multiple of its predicted cost, and again each time
 /// that its time has doubled.
-const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(5) };
+const LONG: Duration = if cfg!(test) {
+    Duration::from_millis(50)
+} else {
+    Duration::from_secs(5)
+};
 const LONG_BY_PREDICTION: f64 = 20.0;
 /// Threads have jobs in advance, to work on during a commit: as many as are predicted to take this time on each thread, in
 /// s, and at most [`MAX_AHEAD`] for each.
@@ -87,17 +95,29 @@ impl<'a, 'e> Collector<'a, 'e> {
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
-        Self { joined, pending, walltime, events, report, open: BTreeMap::new(), own: (0, 0.0) }
+        Self {
+            joined,
+            pending,
+            walltime,
+            events,
+            report,
+            open: BTreeMap::new(),
+            own: (0, 0.0),
+        }
     }
 
     /// Runs pending jobs until none is left for this worker, the flag turns true, the
     /// time is over, or something fails that is not a job. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let threads = self.joined.threads;
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
-            let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
-            ResultsError::refused(self.pending.results.layout().root(), problem)
-        })?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|error| {
+                let problem =
+                    format!("cannot start {threads} threads: {error}; take fewer with --threads");
+                ResultsError::refused(self.pending.results.layout().root(), problem)
+            })?;
         // Apart from the caller's flag, since an error here also ends the workers.
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
@@ -128,7 +148,9 @@ impl<'a, 'e> Collector<'a, 'e> {
                 self.commit(open)?;
             } else {
                 let Taken { part, spilled, .. } = &*open.of;
-                self.pending.results.spill(self.joined.member, part, &open.outcomes, spilled)?;
+                self.pending
+                    .results
+                    .spill(self.joined.member, part, &open.outcomes, spilled)?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
                 self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
@@ -156,19 +178,25 @@ impl<'a, 'e> Collector<'a, 'e> {
                 let (jobs, cost) = self.pending.done_since()?;
                 let jobs = jobs.saturating_sub(self.own.0);
                 let predicted_cost = (cost - self.own.1).max(0.0);
-                self.events.send(&RunEvent::OthersDone { jobs, predicted_cost })?;
+                self.events.send(&RunEvent::OthersDone {
+                    jobs,
+                    predicted_cost,
+                })?;
             }
             if last_tick.elapsed() >= TICK {
                 last_tick = Instant::now();
                 self.report_long_jobs(under_way)?;
                 self.events.send(&RunEvent::Tick)?;
             }
-            let must_end = self.joined.options.stop.load(Ordering::Relaxed) || self.walltime.is_over();
+            let must_end =
+                self.joined.options.stop.load(Ordering::Relaxed) || self.walltime.is_over();
             if must_end && !interrupt.swap(true, Ordering::Relaxed) {
                 self.events.send(&RunEvent::Stopping)?;
             }
             let is_interrupted = interrupt.load(Ordering::Relaxed);
-            let has_room = |jobs, cost| jobs < threads || (jobs < threads * MAX_AHEAD && cost < threads as f64 * AHEAD);
+            let has_room = |jobs, cost| {
+                jobs < threads || (jobs < threads * MAX_AHEAD && cost < threads as f64 * AHEAD)
+            };
             while !is_interrupted
                 && has_room(jobs_out, cost_out)
                 && let Some(job) = work.next(jobs_out > 0)?
@@ -197,13 +225,22 @@ impl<'a, 'e> Collector<'a, 'e> {
 
     /// Tells of jobs that take long.
     fn report_long_jobs(&mut self, under_way: &AllUnderWay) -> Result<(), ResultsError> {
-        for UnderWay { job, begin, long_after } in locked(under_way).values_mut() {
+        for UnderWay {
+            job,
+            begin,
+            long_after,
+        } in locked(under_way).values_mut()
+        {
             let elapsed = begin.elapsed();
             if elapsed >= *long_after {
                 *long_after = 2 * elapsed;
                 let part = &job.of.part;
                 self.events.send(&RunEvent::JobTakesLong {
-                    command: self.pending.results.sweep().command(&part.jobs[job.position]),
+                    command: self
+                        .pending
+                        .results
+                        .sweep()
+                        .command(&part.jobs[job.position]),
                     predicted_cost: part.jobs[job.position].cost,
                     wall: elapsed.as_secs_f64(),
                 })?;
@@ -218,7 +255,10 @@ impl<'a, 'e> Collector<'a, 'e> {
         self.joined.member.count_job();
         let predicted_cost = job.cost;
         let event = match &outcome {
-            Ok(measured) => RunEvent::JobDone { slips: measured.slips.len(), predicted_cost },
+            Ok(measured) => RunEvent::JobDone {
+                slips: measured.slips.len(),
+                predicted_cost,
+            },
             Err(reason) => RunEvent::JobFailed {
                 job_id: self.pending.results.job_id(part, of.position),
                 reason: reason.clone(),
@@ -251,22 +291,45 @@ impl<'a, 'e> Collector<'a, 'e> {
     fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
         let Taken { part, spilled, .. } = &*whole.of;
-        self.pending.results.commit(self.joined.member, part, &whole.outcomes, spilled)?;
-        self.walltime.committed(whole.of.begin.elapsed(), begin.elapsed());
+        self.pending
+            .results
+            .commit(self.joined.member, part, &whole.outcomes, spilled)?;
+        self.walltime
+            .committed(whole.of.begin.elapsed(), begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);
         }
         let (part, jobs) = (PartName::from(&**part).to_string(), whole.outcomes.len());
-        let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();
-        let OpenPart { predicted_cost, measured: JobTime { cpu: measured_cost, wall }, .. } = *whole;
+        let failed = whole
+            .outcomes
+            .values()
+            .filter(|outcome| outcome.is_err())
+            .count();
+        let OpenPart {
+            predicted_cost,
+            measured:
+                JobTime {
+                    cpu: measured_cost,
+                    wall,
+                },
+            ..
+        } = *whole;
         let report = &mut *self.report;
         report.parts_committed += 1;
         report.jobs_run += jobs as u64;
         report.jobs_left = report.jobs_left.saturating_sub(jobs as u64);
-        report.jobs_failed = (report.jobs_failed + failed as u64).saturating_sub(whole.failed_before);
+        report.jobs_failed =
+            (report.jobs_failed + failed as u64).saturating_sub(whole.failed_before);
         report.predicted_cost += predicted_cost;
         report.measured_cost += measured_cost;
-        Ok(self.events.send(&RunEvent::PartCommitted { part, jobs, failed, predicted_cost, measured_cost, wall })?)
+        Ok(self.events.send(&RunEvent::PartCommitted {
+            part,
+            jobs,
+            failed,
+            predicted_cost,
+            measured_cost,
+            wall,
+        })?)
     }
 }
 
@@ -275,17 +338,38 @@ fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(usize, u64, usize
     under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn run_job(job: PartJob, kernel: &Kernel<'_>, interrupt: &AtomicBool, under_way: &AllUnderWay) -> Ended {
+fn run_job(
+    job: PartJob,
+    kernel: &Kernel<'_>,
+    interrupt: &AtomicBool,
+    under_way: &AllUnderWay,
+) -> Ended {
     if interrupt.load(Ordering::Relaxed) {
-        return Ended { job, outcome: None, time: JobTime::default() };
+        return Ended {
+            job,
+            outcome: None,
+            time: JobTime::default(),
+        };
     }
     let (begin, task) = (Instant::now(), &job.of.part.jobs[job.position]);
-    let long_after = Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost).unwrap_or(Duration::MAX).max(LONG);
+    let long_after = Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost)
+        .unwrap_or(Duration::MAX)
+        .max(LONG);
     let key = (job.of.part.extension, job.of.part.index, job.position);
-    locked(under_way).insert(key, UnderWay { job: job.clone(), begin, long_after });
+    locked(under_way).insert(
+        key,
+        UnderWay {
+            job: job.clone(),
+            begin,
+            long_after,
+        },
+    );
     let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
     locked(under_way).remove(&key);
-    let time = JobTime { cpu, wall: begin.elapsed().as_secs_f64() };
+    let time = JobTime {
+        cpu,
+        wall: begin.elapsed().as_secs_f64(),
+    };
     Ended { job, outcome, time }
 }
 
@@ -301,5 +385,6 @@ fn outcome(job: &Job, kernel: &Kernel<'_>, interrupt: &AtomicBool) -> Option<Out
 
 fn message_of(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
-    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a message")
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("without a message")
 }

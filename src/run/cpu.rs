@@ -10,7 +10,10 @@ pub fn thread_seconds() -> f64 {
     #[cfg(not(unix))]
     {
         static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-        BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+        BEGIN
+            .get_or_init(std::time::Instant::now)
+            .elapsed()
+            .as_secs_f64()
     }
 }
 
@@ -28,7 +31,8 @@ mod tests {
     #[test]
     fn a_thread_that_sleeps_uses_no_processor_time() {
         let (asleep, ()) = timed(|| std::thread::sleep(std::time::Duration::from_millis(30)));
-        let (busy, sum) = timed(|| (0..3_000_000).fold(0.0_f64, |sum, i| (sum + f64::from(i)).sqrt()));
+        let (busy, sum) =
+            timed(|| (0..3_000_000).fold(0.0_f64, |sum, i| (sum + f64::from(i)).sqrt()));
         assert!(asleep < 0.02, "{asleep}");
         assert!(busy > 0.0 && sum > 0.0);
     }

@@ -50,7 +50,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// What runs a job: until it is done, cannot continue, or the flag turns true, which is [`SimulationError::Interrupted`].
-pub type Kernel<'a> = dyn Fn(&Job, &AtomicBool) -> Result<Measurements, SimulationError> + Sync + 'a;
+pub type Kernel<'a> =
+    dyn Fn(&Job, &AtomicBool) -> Result<Measurements, SimulationError> + Sync + 'a;
 
 /// What the claim of the reduction is called, and the mark of one that has ended, which has its generation.
 const REDUCTION: &str = "reduce";
@@ -101,7 +102,10 @@ pub fn join<T, E: From<ResultsError>>(
     body: impl FnOnce(&Joined<'_>) -> Result<T, E>,
 ) -> Result<T, E> {
     let begin = Instant::now();
-    let threads = options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
+    let threads = options
+        .threads
+        .or_else(|| std::thread::available_parallelism().ok())
+        .map_or(1, NonZeroUsize::get);
     if sweep.rounds().is_some() && options.shard != Shard::default() {
         let problem = "a sweep with [precision] or [refine] has no shards: each round needs all results of the one before; \
                        run it on a common disk, started as often as you like";
@@ -111,8 +115,17 @@ pub fn join<T, E: From<ResultsError>>(
         let all: Vec<Outline> = results.plan().outlines().collect();
         results.refuse_strangers(&all)?;
         let parts: Vec<Outline> = options.shard.parts(all.into_iter()).collect();
-        layout.ensure_folder(&layout.tables()).map_err(ResultsError::from)?;
-        let ended = body(&Joined { results, parts: &parts, member, begin, threads, options })?;
+        layout
+            .ensure_folder(&layout.tables())
+            .map_err(ResultsError::from)?;
+        let ended = body(&Joined {
+            results,
+            parts: &parts,
+            member,
+            begin,
+            threads,
+            options,
+        })?;
         member.tidy().map_err(ResultsError::from)?;
         Ok(ended)
     })
@@ -123,7 +136,11 @@ impl Joined<'_> {
     ///
     /// A job that fails or panics becomes a row with its reason. Events come on the calling thread.
     /// On an error, what was committed is kept, and the same command resumes.
-    pub fn run(&self, kernel: &Kernel<'_>, display: &mut dyn FnMut(&RunEvent)) -> Result<RunReport, ResultsError> {
+    pub fn run(
+        &self,
+        kernel: &Kernel<'_>,
+        display: &mut dyn FnMut(&RunEvent),
+    ) -> Result<RunReport, ResultsError> {
         self.results.sync_names()?;
         self.member.tidy()?;
         let (mut events, mut report) = (Events { log: None, display }, RunReport::default());
@@ -131,13 +148,22 @@ impl Joined<'_> {
         let mut round = (Cow::Borrowed(self.results), Cow::Borrowed(self.parts));
         loop {
             let (results, parts) = &round;
-            self.run_parts(results, parts, retry_failed, kernel, &mut events, &mut report)?;
+            self.run_parts(
+                results,
+                parts,
+                retry_failed,
+                kernel,
+                &mut events,
+                &mut report,
+            )?;
             // Those that failed in this run fail again.
             retry_failed = false;
             if report.jobs_left > 0 {
                 break;
             }
-            let Some(next) = results.next_round(self.member, rounds::next)? else { break };
+            let Some(next) = results.next_round(self.member, rounds::next)? else {
+                break;
+            };
             let parts = next.plan().outlines().collect();
             round = (Cow::Owned(next), Cow::Owned(parts));
         }
@@ -161,11 +187,20 @@ impl Joined<'_> {
         events: &mut Events<'_>,
         report: &mut RunReport,
     ) -> Result<(), ResultsError> {
-        let Self { member, begin, threads, options, .. } = *self;
+        let Self {
+            member,
+            begin,
+            threads,
+            options,
+            ..
+        } = *self;
         let pending = Pending::look_up(results, parts, retry_failed)?;
         let overview = pending.overview(false, |_, _, _| ())?;
-        let (jobs_again, cost_again) =
-            if retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
+        let (jobs_again, cost_again) = if retry_failed {
+            (overview.jobs_failed, overview.predicted_cost_failed)
+        } else {
+            (0, 0.0)
+        };
         report.jobs_failed += jobs_again;
         report.jobs_left = overview.jobs_missing + jobs_again;
         if jobs_again > 0 {
@@ -175,9 +210,16 @@ impl Joined<'_> {
         }
         if report.jobs_left > 0 {
             let walltime = Walltime::new(begin, options.walltime);
-            let (jobs, predicted_cost) = (report.jobs_left, overview.predicted_cost_missing + cost_again);
+            let (jobs, predicted_cost) = (
+                report.jobs_left,
+                overview.predicted_cost_missing + cost_again,
+            );
             if let (Some(_), Some(rounds)) = (&events.log, results.rounds_so_far()) {
-                events.send(&RunEvent::RoundBegun { jobs, predicted_cost, rounds })?;
+                events.send(&RunEvent::RoundBegun {
+                    jobs,
+                    predicted_cost,
+                    rounds,
+                })?;
             } else {
                 events.log = Some(results.begin_log()?);
                 events.send(&RunEvent::Started {
@@ -202,9 +244,11 @@ impl Joined<'_> {
                 let left = loop {
                     match pending.left(member) {
                         // There may be work for this one in the next round.
-                        Ok(Left { jobs: 1.., has_abandoned: false, .. })
-                            if results.round().is_some() && !must_end() =>
-                        {
+                        Ok(Left {
+                            jobs: 1..,
+                            has_abandoned: false,
+                            ..
+                        }) if results.round().is_some() && !must_end() => {
                             std::thread::sleep(LOOK);
                         }
                         left => break left,
@@ -212,7 +256,10 @@ impl Joined<'_> {
                 };
                 match left {
                     // Their worker has died since this one looked.
-                    Ok(Left { has_abandoned: true, .. }) => (),
+                    Ok(Left {
+                        has_abandoned: true,
+                        ..
+                    }) => (),
                     Ok(Left { jobs: 1.., .. }) if must_end() => break Ok(None),
                     left => break left.map(Some),
                 }
@@ -220,7 +267,9 @@ impl Joined<'_> {
             report.wall = begin.elapsed().as_secs_f64();
             let left = ended.inspect_err(|error| {
                 // The disk may be what failed: the first error counts.
-                let _ = events.send(&RunEvent::Error { error: error.to_string() });
+                let _ = events.send(&RunEvent::Error {
+                    error: error.to_string(),
+                });
             })?;
             report.stopped = left.is_none() && report.jobs_left > 0;
             if let Some(left) = left {
@@ -231,8 +280,13 @@ impl Joined<'_> {
     }
 
     /// Reduces with `body`, once every job is done; `None` if another worker does so, or has.
-    pub fn reduce<T, E: From<ResultsError>>(&self, body: impl FnOnce() -> Result<T, E>) -> Result<Option<T>, E> {
-        let Some((mut claims, generation)) = self.take_reduction()? else { return Ok(None) };
+    pub fn reduce<T, E: From<ResultsError>>(
+        &self,
+        body: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Option<T>, E> {
+        let Some((mut claims, generation)) = self.take_reduction()? else {
+            return Ok(None);
+        };
         let reduced = body()?;
         claims.take(REDUCED, generation)?;
         Ok(Some(reduced))

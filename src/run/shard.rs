@@ -20,7 +20,10 @@ pub struct Shard {
 
 impl Default for Shard {
     fn default() -> Self {
-        Self { number: 1, count: NonZeroU64::MIN }
+        Self {
+            number: 1,
+            count: NonZeroU64::MIN,
+        }
     }
 }
 
@@ -29,10 +32,17 @@ impl FromStr for Shard {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let parsed = text.split_once('/').and_then(|(number, count)| {
-            let shard = Self { number: number.parse().ok()?, count: count.parse().ok()? };
-            (1..=shard.count.get()).contains(&shard.number).then_some(shard)
+            let shard = Self {
+                number: number.parse().ok()?,
+                count: count.parse().ok()?,
+            };
+            (1..=shard.count.get())
+                .contains(&shard.number)
+                .then_some(shard)
         });
-        parsed.ok_or_else(|| format!("{text:?}: must be K/N with whole numbers 1 <= K <= N, such as 2/8"))
+        parsed.ok_or_else(|| {
+            format!("{text:?}: must be K/N with whole numbers 1 <= K <= N, such as 2/8")
+        })
     }
 }
 
@@ -44,7 +54,10 @@ impl fmt::Display for Shard {
 
 impl Shard {
     /// Its own of all parts of a plan. Memory: a few bytes for each of the N.
-    pub fn parts<P: Iterator<Item = Outline>>(self, plan: P) -> impl Iterator<Item = Outline> + use<P> {
+    pub fn parts<P: Iterator<Item = Outline>>(
+        self,
+        plan: P,
+    ) -> impl Iterator<Item = Outline> + use<P> {
         // Costs are >= 0, so their bits have their order.
         let mut loads: BinaryHeap<Reverse<(u64, u64)>> = BinaryHeap::new();
         plan.filter(move |part| {
@@ -71,9 +84,20 @@ mod tests {
     fn plan(costs: &[f64]) -> impl Iterator<Item = Outline> {
         let part = |(index, &cost): (usize, &f64)| {
             let point = index as u64;
-            Outline { extension: index / 7, index: point, points: point..=point, job_count: 1, cost }
+            Outline {
+                extension: index / 7,
+                index: point,
+                points: point..=point,
+                job_count: 1,
+                cost,
+            }
         };
-        costs.iter().enumerate().map(part).collect::<Vec<_>>().into_iter()
+        costs
+            .iter()
+            .enumerate()
+            .map(part)
+            .collect::<Vec<_>>()
+            .into_iter()
     }
 
     fn shards(count: u64) -> impl Iterator<Item = Shard> {

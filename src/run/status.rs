@@ -69,7 +69,11 @@ pub struct Failure {
 impl Pending<'_> {
     /// How far the parts are, by their names alone unless jobs of them may run again. With `looks`, looks into every part;
     /// visits jobs that failed, each with its part, its position and the reason.
-    pub fn overview(&self, looks: bool, mut visit: impl FnMut(&Part, usize, &str)) -> Result<Overview, ResultsError> {
+    pub fn overview(
+        &self,
+        looks: bool,
+        mut visit: impl FnMut(&Part, usize, &str),
+    ) -> Result<Overview, ResultsError> {
         let looks = looks || self.may_run_again();
         let mut overview = Overview::default();
         for outline in self.parts {
@@ -83,8 +87,13 @@ impl Pending<'_> {
             }
             match self.state(outline)? {
                 PartState::Missing { spilled } => {
-                    let jobs = if spilled.is_empty() { Vec::new() } else { self.part(outline).jobs };
-                    let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
+                    let jobs = if spilled.is_empty() {
+                        Vec::new()
+                    } else {
+                        self.part(outline).jobs
+                    };
+                    let spilled_cost: f64 =
+                        spilled.iter().map(|&position| jobs[position].cost).sum();
                     overview.parts_missing += 1;
                     overview.jobs_missing += (outline.job_count - spilled.len()) as u64;
                     overview.predicted_cost_missing += outline.cost - spilled_cost;
@@ -120,9 +129,13 @@ impl Pending<'_> {
 /// Of the jobs of parts that are done, those that the sweep which was asked for last does not have.
 fn jobs_kept(pending: &Pending<'_>) -> u64 {
     let last = pending.results.extensions().len() - 1;
-    let earlier = pending.parts.iter().filter(|part| part.extension < last && pending.done.has(part));
+    let earlier = pending
+        .parts
+        .iter()
+        .filter(|part| part.extension < last && pending.done.has(part));
     let jobs = earlier.flat_map(|part| pending.part(part).jobs);
-    jobs.filter(|job| !pending.results.sweep().contains(&job.parameters)).count() as u64
+    jobs.filter(|job| !pending.results.sweep().contains(&job.parameters))
+        .count() as u64
 }
 
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
@@ -147,7 +160,11 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
     let (mut last_threads, mut predicted, mut measured) = (None, 0.0, 0.0);
     results.events(|event| match event {
         RunEvent::Started { threads, .. } => last_threads = Some(threads),
-        RunEvent::PartCommitted { predicted_cost, wall, .. } => {
+        RunEvent::PartCommitted {
+            predicted_cost,
+            wall,
+            ..
+        } => {
             predicted += predicted_cost;
             measured += wall;
         }
@@ -158,11 +175,21 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
         let last_beat = now.duration_since(beat).unwrap_or_default().as_secs_f64();
         Present { worker, last_beat }
     };
-    let workers: Vec<Present> = results.layout().living(now)?.into_values().map(present).collect();
+    let workers: Vec<Present> = results
+        .layout()
+        .living(now)?
+        .into_values()
+        .map(present)
+        .collect();
     let threads = if workers.is_empty() {
         last_threads
     } else {
-        Some(workers.iter().map(|present| present.worker.threads).fold(0, usize::saturating_add))
+        Some(
+            workers
+                .iter()
+                .map(|present| present.worker.threads)
+                .fold(0, usize::saturating_add),
+        )
     };
     let pace = (predicted > 0.0).then(|| measured / predicted);
     Ok(Status {

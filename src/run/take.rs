@@ -19,7 +19,11 @@ use std::vec::IntoIter;
 /// Lost claims after which all are listed.
 const LOSSES: u32 = 3;
 /// Time between two looks at workers who may have died, for one that has nothing else to do, and for one that has.
-pub(super) const LOOK: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(500) };
+pub(super) const LOOK: Duration = if cfg!(test) {
+    Duration::ZERO
+} else {
+    Duration::from_millis(500)
+};
 const LOOK_BUSY: Duration = Duration::from_secs(5);
 
 /// A part that this worker has taken.
@@ -64,8 +68,13 @@ impl Pending<'_> {
     /// Number and predicted cost of the jobs of the parts that were done since they were looked up.
     pub(super) fn done_since(&self) -> Result<(u64, f64), ResultsError> {
         let done = self.results.done_parts()?;
-        let new = self.parts.iter().filter(|part| done.has(part) && !self.done.has(part));
-        Ok(new.fold((0, 0.0), |(jobs, cost), part| (jobs + part.job_count as u64, cost + part.cost)))
+        let new = self
+            .parts
+            .iter()
+            .filter(|part| done.has(part) && !self.done.has(part));
+        Ok(new.fold((0, 0.0), |(jobs, cost), part| {
+            (jobs + part.job_count as u64, cost + part.cost)
+        }))
     }
 
     /// What is left now, once this worker has committed all that it has taken. The last of all workers to look finds
@@ -109,9 +118,16 @@ pub(super) struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    pub fn new(pending: &'a Pending<'a>, member: &'a Member<'a>, walltime: &'a Walltime) -> Result<Self, ResultsError> {
+    pub fn new(
+        pending: &'a Pending<'a>,
+        member: &'a Member<'a>,
+        walltime: &'a Walltime,
+    ) -> Result<Self, ResultsError> {
         let (others, claims) = (member.others()?, Claims::list(member)?);
-        let parts = pending.parts.iter().filter(|part| !pending.done.has(part) || pending.may_run_again());
+        let parts = pending
+            .parts
+            .iter()
+            .filter(|part| !pending.done.has(part) || pending.may_run_again());
         let mut pass: Vec<&Outline> = parts.collect();
         if !others.is_empty() && !pass.is_empty() {
             let place = member.number() % pass.len() as u64;
@@ -193,10 +209,17 @@ impl<'a> Work<'a> {
         let done = self.pending.results.done_parts()?;
         let mut is_certain = true;
         for part in self.pending.parts.iter().filter(|part| !done.has(part)) {
-            match self.claims.standing(&PartName::from(part).to_string(), &others)? {
+            match self
+                .claims
+                .standing(&PartName::from(part).to_string(), &others)?
+            {
                 Standing::Own => (),
                 Standing::Taken(owner) => {
-                    let Living { beat, is_certain: is_known, .. } = &others[owner];
+                    let Living {
+                        beat,
+                        is_certain: is_known,
+                        ..
+                    } = &others[owner];
                     let has_beaten = self.beats.entry(owner.to_owned()).or_insert(*beat) != beat;
                     is_certain &= *is_known || has_beaten;
                 }
@@ -223,9 +246,19 @@ impl<'a> Work<'a> {
                 self.take(self.pending.part(outline), spilled, jobs, generation)
             }
             PartState::Done { again } => {
-                let again = again.into_iter().map(|(position, why)| (position, why != Again::CutOff));
-                let jobs: Vec<_> = again.filter(|&(_, failed)| self.pending.retry_failed || !failed).collect();
-                Ok(!jobs.is_empty() && self.take(self.pending.part(outline), BTreeSet::new(), jobs, generation)?)
+                let again = again
+                    .into_iter()
+                    .map(|(position, why)| (position, why != Again::CutOff));
+                let jobs: Vec<_> = again
+                    .filter(|&(_, failed)| self.pending.retry_failed || !failed)
+                    .collect();
+                Ok(!jobs.is_empty()
+                    && self.take(
+                        self.pending.part(outline),
+                        BTreeSet::new(),
+                        jobs,
+                        generation,
+                    )?)
             }
         }
     }
@@ -241,7 +274,10 @@ impl<'a> Work<'a> {
         if !self.walltime.admits_part() {
             return Ok(false);
         }
-        if !self.claims.take(&PartName::from(&*part).to_string(), generation)? {
+        if !self
+            .claims
+            .take(&PartName::from(&*part).to_string(), generation)?
+        {
             self.losses += 1;
             if self.losses == LOSSES {
                 self.losses = 0;
@@ -250,8 +286,18 @@ impl<'a> Work<'a> {
             return Ok(false);
         }
         let again = self.pending.done.has(&part);
-        let taken = Arc::new(Taken { part, spilled, again, together: jobs.len(), begin: Instant::now() });
-        let job = |(position, failed_before)| PartJob { of: Arc::clone(&taken), position, failed_before };
+        let taken = Arc::new(Taken {
+            part,
+            spilled,
+            again,
+            together: jobs.len(),
+            begin: Instant::now(),
+        });
+        let job = |(position, failed_before)| PartJob {
+            of: Arc::clone(&taken),
+            position,
+            failed_before,
+        };
         self.jobs.extend(jobs.into_iter().map(job));
         Ok(true)
     }

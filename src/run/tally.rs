@@ -17,15 +17,28 @@ pub struct Tally {
 impl Tally {
     pub fn note(&mut self, event: &RunEvent) {
         match event {
-            RunEvent::Started { jobs, predicted_cost, .. } | RunEvent::RoundBegun { jobs, predicted_cost, .. } => {
+            RunEvent::Started {
+                jobs,
+                predicted_cost,
+                ..
+            }
+            | RunEvent::RoundBegun {
+                jobs,
+                predicted_cost,
+                ..
+            } => {
                 self.jobs += jobs;
                 self.predicted += predicted_cost;
             }
-            RunEvent::JobDone { predicted_cost, .. } | RunEvent::JobFailed { predicted_cost, .. } => {
+            RunEvent::JobDone { predicted_cost, .. }
+            | RunEvent::JobFailed { predicted_cost, .. } => {
                 self.jobs_done += 1;
                 self.predicted_own += predicted_cost;
             }
-            RunEvent::OthersDone { jobs, predicted_cost } => {
+            RunEvent::OthersDone {
+                jobs,
+                predicted_cost,
+            } => {
                 self.jobs_done = self.jobs_done + jobs - self.jobs_of_others;
                 (self.jobs_of_others, self.predicted_others) = (*jobs, *predicted_cost);
             }
@@ -36,6 +49,10 @@ impl Tally {
     /// Share of the predicted cost that is done; exactly 1 at the end, in whatever order costs were summed.
     pub fn share(&self) -> f64 {
         let done = self.predicted_own + self.predicted_others;
-        if self.jobs_done < self.jobs && self.predicted > 0.0 { (done / self.predicted).min(1.0) } else { 1.0 }
+        if self.jobs_done < self.jobs && self.predicted > 0.0 {
+            (done / self.predicted).min(1.0)
+        } else {
+            1.0
+        }
     }
 }

@@ -6,7 +6,13 @@ use std::num::NonZeroUsize;
 
 /// Variables that hold the cores of a job, the most specific first: Slurm, OpenMP and HyperQueue, PBS, Grid Engine, LSF.
 /// `HQ_CPUS` is not among them: it lists the cores by their ids.
-const VARIABLES: [&str; 5] = ["SLURM_CPUS_PER_TASK", "OMP_NUM_THREADS", "NCPUS", "NSLOTS", "LSB_DJOB_NUMPROC"];
+const VARIABLES: [&str; 5] = [
+    "SLURM_CPUS_PER_TASK",
+    "OMP_NUM_THREADS",
+    "NCPUS",
+    "NSLOTS",
+    "LSB_DJOB_NUMPROC",
+];
 
 /// Most threads of one process: nearly no machine has more cores. Starting this many takes seconds, and four times as
 /// many minutes, in which no signal stops a run.
@@ -32,21 +38,52 @@ impl Threads {
         asked: Option<NonZeroUsize>,
         environment: impl Fn(&str) -> Option<OsString>,
     ) -> Result<Self, ThreadsError> {
-        let granted = |variable| Some((variable, environment(variable).filter(|value| !value.is_empty())?));
-        let Some((variable, value)) = VARIABLES.into_iter().find_map(granted).filter(|_| asked.is_none()) else {
-            let count = asked.map(|count| parse(&count.to_string()).map_err(|must| format!("{count} threads: {must}")));
-            return Ok(Self { count: count.transpose().map_err(ThreadsError)?, variable: None });
+        let granted = |variable| {
+            Some((
+                variable,
+                environment(variable).filter(|value| !value.is_empty())?,
+            ))
+        };
+        let Some((variable, value)) = VARIABLES
+            .into_iter()
+            .find_map(granted)
+            .filter(|_| asked.is_none())
+        else {
+            let count = asked.map(|count| {
+                parse(&count.to_string()).map_err(|must| format!("{count} threads: {must}"))
+            });
+            return Ok(Self {
+                count: count.transpose().map_err(ThreadsError)?,
+                variable: None,
+            });
         };
         // OpenMP's may be a list, of one number for each level of nesting.
-        let count = parse(value.to_str().and_then(|value| value.split(',').next()).unwrap_or_default().trim());
-        let refuse = |must| format!("{variable}={}: {must}; unset it, or give --threads", shown(value.as_ref()));
-        Ok(Self { count: Some(count.map_err(refuse).map_err(ThreadsError)?), variable: Some(variable) })
+        let count = parse(
+            value
+                .to_str()
+                .and_then(|value| value.split(',').next())
+                .unwrap_or_default()
+                .trim(),
+        );
+        let refuse = |must| {
+            format!(
+                "{variable}={}: {must}; unset it, or give --threads",
+                shown(value.as_ref())
+            )
+        };
+        Ok(Self {
+            count: Some(count.map_err(refuse).map_err(ThreadsError)?),
+            variable: Some(variable),
+        })
     }
 }
 
 /// A number of threads, as a flag has it.
 pub fn parse(text: &str) -> Result<NonZeroUsize, String> {
-    let count = text.parse().ok().filter(|count: &NonZeroUsize| count.get() <= MAX_THREADS);
+    let count = text
+        .parse()
+        .ok()
+        .filter(|count: &NonZeroUsize| count.get() <= MAX_THREADS);
     count.ok_or_else(|| format!("must be a whole number from 1 to {MAX_THREADS}"))
 }
 
@@ -55,12 +92,20 @@ mod tests {
     use super::*;
 
     fn choose(asked: Option<usize>, environment: &[(&str, &str)]) -> Result<Threads, ThreadsError> {
-        let value = |name: &str| environment.iter().find(|(key, _)| *key == name).map(|(_, value)| value.into());
+        let value = |name: &str| {
+            environment
+                .iter()
+                .find(|(key, _)| *key == name)
+                .map(|(_, value)| value.into())
+        };
         Threads::choose(asked.map(|count| NonZeroUsize::new(count).unwrap()), value)
     }
 
     fn threads(count: usize, variable: Option<&'static str>) -> Threads {
-        Threads { count: NonZeroUsize::new(count), variable }
+        Threads {
+            count: NonZeroUsize::new(count),
+            variable,
+        }
     }
 
     #[test]
@@ -68,11 +113,26 @@ mod tests {
         let slurm = ("SLURM_CPUS_PER_TASK", "16");
         let openmp = ("OMP_NUM_THREADS", "4,2");
         assert_eq!(choose(Some(3), &[slurm]).unwrap(), threads(3, None));
-        assert_eq!(choose(Some(3), &[("NCPUS", "many")]).unwrap(), threads(3, None));
-        assert_eq!(choose(None, &[openmp, slurm]).unwrap(), threads(16, Some("SLURM_CPUS_PER_TASK")));
-        assert_eq!(choose(None, &[("NSLOTS", "8"), openmp]).unwrap(), threads(4, Some("OMP_NUM_THREADS")));
-        assert_eq!(choose(None, &[("OMP_NUM_THREADS", ""), ("NCPUS", "2")]).unwrap(), threads(2, Some("NCPUS")));
-        assert_eq!(choose(None, &[("HQ_CPUS", "0,1,7")]).unwrap(), threads(0, None));
+        assert_eq!(
+            choose(Some(3), &[("NCPUS", "many")]).unwrap(),
+            threads(3, None)
+        );
+        assert_eq!(
+            choose(None, &[openmp, slurm]).unwrap(),
+            threads(16, Some("SLURM_CPUS_PER_TASK"))
+        );
+        assert_eq!(
+            choose(None, &[("NSLOTS", "8"), openmp]).unwrap(),
+            threads(4, Some("OMP_NUM_THREADS"))
+        );
+        assert_eq!(
+            choose(None, &[("OMP_NUM_THREADS", ""), ("NCPUS", "2")]).unwrap(),
+            threads(2, Some("NCPUS"))
+        );
+        assert_eq!(
+            choose(None, &[("HQ_CPUS", "0,1,7")]).unwrap(),
+            threads(0, None)
+        );
     }
 
     #[test]
@@ -80,7 +140,10 @@ mod tests {
         assert_eq!(choose(Some(1024), &[]).unwrap(), threads(1024, None));
         for count in [1025, 1 << 62] {
             let error = choose(Some(count), &[]).unwrap_err().to_string();
-            assert_eq!(error, format!("{count} threads: must be a whole number from 1 to 1024"));
+            assert_eq!(
+                error,
+                format!("{count} threads: must be a whole number from 1 to 1024")
+            );
             assert!(parse(&count.to_string()).is_err());
         }
     }
@@ -88,9 +151,13 @@ mod tests {
     #[test]
     fn a_bad_variable_is_named_with_its_value() {
         for value in ["0", "-1", "many", "1.5", "2(x3)", "1025", "99999999"] {
-            let error = choose(None, &[("LSB_DJOB_NUMPROC", value)]).unwrap_err().to_string();
+            let error = choose(None, &[("LSB_DJOB_NUMPROC", value)])
+                .unwrap_err()
+                .to_string();
             assert!(
-                error.starts_with(&format!("LSB_DJOB_NUMPROC={value}: must be a whole number from 1 to 1024")),
+                error.starts_with(&format!(
+                    "LSB_DJOB_NUMPROC={value}: must be a whole number from 1 to 1024"
+                )),
                 "{error}"
             );
         }

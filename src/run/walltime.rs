@@ -25,13 +25,19 @@ impl Walltime {
     pub fn new(begin: Instant, longest: Option<Duration>) -> Self {
         // A time beyond what the clock holds never comes.
         let end = longest.and_then(|longest| begin.checked_add(longest));
-        Self { end, dearest_part: Cell::default(), slowest_commit: Cell::default(), has_refused: Cell::default() }
+        Self {
+            end,
+            dearest_part: Cell::default(),
+            slowest_commit: Cell::default(),
+            has_refused: Cell::default(),
+        }
     }
 
     /// Whether another part may be taken. Once it may not, none may.
     pub fn admits_part(&self) -> bool {
         let is_short = |left: Duration| left.is_zero() || left < self.dearest_part.get();
-        self.has_refused.update(|has_refused| has_refused || self.left().is_some_and(is_short));
+        self.has_refused
+            .update(|has_refused| has_refused || self.left().is_some_and(is_short));
         !self.has_refused.get()
     }
 
@@ -54,7 +60,11 @@ impl Walltime {
     /// Time left but for what is set aside.
     fn left(&self) -> Option<Duration> {
         let reserve = MIN_RESERVE.max(COMMITS_IN_RESERVE * self.slowest_commit.get());
-        Some(self.end?.saturating_duration_since(Instant::now()).saturating_sub(reserve))
+        Some(
+            self.end?
+                .saturating_duration_since(Instant::now())
+                .saturating_sub(reserve),
+        )
     }
 }
 

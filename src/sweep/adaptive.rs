@@ -25,7 +25,9 @@ impl Sweep {
 
     /// Number of the axis of seeds, if they have one.
     pub fn seed_axis(&self) -> Option<usize> {
-        self.axes.iter().position(|axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)])
+        self.axes
+            .iter()
+            .position(|axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)])
     }
 
     /// Number of seeds of a set in the grid.
@@ -35,7 +37,9 @@ impl Sweep {
 
     /// Distance of the points of a set.
     fn seed_stride(&self) -> u64 {
-        self.seed_axis().map_or(1, |axis| self.axes[axis + 1..].iter().map(Axis::len).product())
+        self.seed_axis().map_or(1, |axis| {
+            self.axes[axis + 1..].iter().map(Axis::len).product()
+        })
     }
 
     pub fn rows(&self, point: u64) -> Vec<u64> {
@@ -51,9 +55,14 @@ impl Sweep {
 
     /// Key and value of an axis of one quantity at a row; `None` of a word, or of several quantities.
     pub fn value_at(&self, axis: usize, row: u64) -> Option<(&'static str, f64)> {
-        let mut point = Point { parameters: self.base.clone(), fixes_period: None };
+        let mut point = Point {
+            parameters: self.base.clone(),
+            fixes_period: None,
+        };
         self.axes[axis].apply(row, &mut point);
-        let [quantity] = self.axes[axis].quantities()[..] else { return None };
+        let [quantity] = self.axes[axis].quantities()[..] else {
+            return None;
+        };
         let value = match (point.fixes_period, quantity) {
             (Some((_, value)), _) => Some(value),
             (None, Quantity::Parameter(symbol)) => point.parameters.get(symbol).number(),
@@ -73,7 +82,10 @@ impl Sweep {
 
     /// The set of a job with these canonical parameters, whatever its seed.
     pub fn set_with(&self, parameters: &Parameters) -> Option<u64> {
-        let mut point = Point { parameters: parameters.clone(), fixes_period: None };
+        let mut point = Point {
+            parameters: parameters.clone(),
+            fixes_period: None,
+        };
         if let Some(axis) = self.seed_axis() {
             self.axes[axis].apply(0, &mut point);
         }
@@ -87,9 +99,15 @@ impl Sweep {
     }
 
     /// The points of a set with these of its seeds.
-    pub fn points_of_set(&self, set: u64, seeds: Range<u64>) -> impl Iterator<Item = RangeInclusive<u64>> + use<> {
+    pub fn points_of_set(
+        &self,
+        set: u64,
+        seeds: Range<u64>,
+    ) -> impl Iterator<Item = RangeInclusive<u64>> + use<> {
         let stride = self.seed_stride();
-        seeds.map(move |seed| set + seed * stride).map(|point| point..=point)
+        seeds
+            .map(move |seed| set + seed * stride)
+            .map(|point| point..=point)
     }
 
     /// The sets of the first round, in order: all combinations of the rows that the sweep file has.
@@ -102,12 +120,18 @@ impl Sweep {
         if let Some(axis) = self.seed_axis() {
             spacing[axis] = self.axes[axis].len();
         }
-        let counts: Vec<u64> =
-            self.axes.iter().zip(&spacing).map(|(axis, spacing)| axis.len().div_ceil(*spacing)).collect();
+        let counts: Vec<u64> = self
+            .axes
+            .iter()
+            .zip(&spacing)
+            .map(|(axis, spacing)| axis.len().div_ceil(*spacing))
+            .collect();
         let mut rows = vec![0; counts.len()];
         let set = |number| {
             find_rows(number, &counts, &mut rows);
-            rows.iter_mut().zip(&spacing).for_each(|(row, spacing)| *row *= spacing);
+            rows.iter_mut()
+                .zip(&spacing)
+                .for_each(|(row, spacing)| *row *= spacing);
             self.set_at(&rows)
         };
         (0..counts.iter().product()).filter_map(set).collect()
@@ -116,8 +140,12 @@ impl Sweep {
     /// What its rounds may add up to; `None` for a sweep without.
     pub fn bounds(&self) -> Option<Bounds> {
         let rounds = self.rounds.as_ref()?;
-        let costs: Vec<f64> =
-            self.first_sets().into_iter().flat_map(|set| self.jobs_at(set..set + 1)).map(|job| job.cost).collect();
+        let costs: Vec<f64> = self
+            .first_sets()
+            .into_iter()
+            .flat_map(|set| self.jobs_at(set..set + 1))
+            .map(|job| job.cost)
+            .collect();
         let dearest = costs.iter().copied().fold(0.0, f64::max);
         let known = costs.len() as u64;
         let (seeds, jobs) = match &rounds.refinement {
@@ -125,16 +153,34 @@ impl Sweep {
             Some(refinement) => (*rounds.seeds.start(), refinement.max_jobs),
         };
         let sets = jobs / seeds;
-        let predicted_cost = costs.iter().sum::<f64>() * seeds as f64 + (jobs - known * seeds) as f64 * dearest;
-        let controls = self.controls.as_ref().map_or(0, |controls| controls.point_count().min(jobs));
-        Some(Bounds { sets, jobs: jobs + controls, predicted_cost: predicted_cost + controls as f64 * dearest })
+        let predicted_cost =
+            costs.iter().sum::<f64>() * seeds as f64 + (jobs - known * seeds) as f64 * dearest;
+        let controls = self
+            .controls
+            .as_ref()
+            .map_or(0, |controls| controls.point_count().min(jobs));
+        Some(Bounds {
+            sets,
+            jobs: jobs + controls,
+            predicted_cost: predicted_cost + controls as f64 * dearest,
+        })
     }
 
     /// The first round; `None` for a sweep without.
     pub fn first_round(&self) -> Option<Round> {
         let seeds = *self.rounds.as_ref()?.seeds.start();
         let sets = self.first_sets();
-        let points = self.with_controls(sets.iter().flat_map(|&set| self.points_of_set(set, 0..seeds)).collect());
-        Some(Round { points, standing: Standing { sets_open: sets.len() as u64, ..Standing::default() } })
+        let points = self.with_controls(
+            sets.iter()
+                .flat_map(|&set| self.points_of_set(set, 0..seeds))
+                .collect(),
+        );
+        Some(Round {
+            points,
+            standing: Standing {
+                sets_open: sets.len() as u64,
+                ..Standing::default()
+            },
+        })
     }
 }

@@ -67,14 +67,22 @@ impl Axis {
             let rows = group.iter().map(|&(.., row)| row);
             is_first[rows.clone().min().unwrap_or_default() as usize] = true;
             let neighbours = rows.clone().zip(rows.skip(1));
-            let close = neighbours.filter(|&(a, b)| period.is_none_or(|period| period.is_close(a, b)));
+            let close =
+                neighbours.filter(|&(a, b)| period.is_none_or(|period| period.is_close(a, b)));
             repeated.extend(close.map(|(a, b)| (a.max(b), a.min(b))));
         }
         if let Some((later, earlier)) = repeated.into_iter().min() {
-            return Err(Repeated { earlier: earlier as usize, later: later as usize });
+            return Err(Repeated {
+                earlier: earlier as usize,
+                later: later as usize,
+            });
         }
         let sorted = ranked.into_iter().map(|(.., row)| row).collect();
-        Ok(Self::Table(Table { columns, sorted, is_first }))
+        Ok(Self::Table(Table {
+            columns,
+            sorted,
+            is_first,
+        }))
     }
 
     pub fn quantities(&self) -> Vec<Quantity> {
@@ -94,7 +102,9 @@ impl Axis {
     /// Moves a point to a row.
     pub fn apply(&self, row: u64, point: &mut Point) {
         match self {
-            Self::Counted { symbol, first, .. } => point.set(Quantity::Parameter(*symbol), Value::Count(first + row)),
+            Self::Counted { symbol, first, .. } => {
+                point.set(Quantity::Parameter(*symbol), Value::Count(first + row))
+            }
             Self::Table(table) => {
                 for column in &table.columns {
                     point.set(column.quantity, column.values[index(row)]);
@@ -114,15 +124,26 @@ impl Axis {
     /// The only row that can lead to these parameters; without modulation the first of those that differ in the period alone.
     pub fn find(&self, wanted: &Parameters) -> Option<u64> {
         match self {
-            Self::Counted { symbol, first, count } => match wanted.get(*symbol) {
+            Self::Counted {
+                symbol,
+                first,
+                count,
+            } => match wanted.get(*symbol) {
                 Value::Count(value) => value.checked_sub(*first).filter(|row| row < count),
                 _ => None,
             },
             Self::Table(table) => {
-                let begin = table.sorted.partition_point(|&row| table.compare(row, wanted).is_lt());
-                let mut found = table.sorted[begin..].iter().take_while(|&&row| table.compare(row, wanted).is_eq());
-                let is_counted = |row: u32| wanted.modulation_period.is_some() || table.is_first[row as usize];
-                found.find(|&&row| is_counted(row)).map(|&row| u64::from(row))
+                let begin = table
+                    .sorted
+                    .partition_point(|&row| table.compare(row, wanted).is_lt());
+                let mut found = table.sorted[begin..]
+                    .iter()
+                    .take_while(|&&row| table.compare(row, wanted).is_eq());
+                let is_counted =
+                    |row: u32| wanted.modulation_period.is_some() || table.is_first[row as usize];
+                found
+                    .find(|&&row| is_counted(row))
+                    .map(|&row| u64::from(row))
             }
         }
     }
@@ -131,9 +152,17 @@ impl Axis {
 impl Table {
     /// Where a row stands among the sorted ones, against one that leads to these parameters.
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
-        let columns = |fix_period| self.columns.iter().filter(move |column| column.quantity.is_period() == fix_period);
-        let mut orders = columns(false).chain(columns(true)).map(|column| column.compare(row, wanted));
-        orders.find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+        let columns = |fix_period| {
+            self.columns
+                .iter()
+                .filter(move |column| column.quantity.is_period() == fix_period)
+        };
+        let mut orders = columns(false)
+            .chain(columns(true))
+            .map(|column| column.compare(row, wanted));
+        orders
+            .find(|order| order.is_ne())
+            .unwrap_or(Ordering::Equal)
     }
 }
 
@@ -150,9 +179,9 @@ impl Column {
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
         let value = self.values[row as usize];
         match self.quantity {
-            Quantity::Parameter(symbol) if symbol != Symbol::T => {
-                value.partial_cmp(&wanted.get(symbol)).unwrap_or(Ordering::Equal)
-            }
+            Quantity::Parameter(symbol) if symbol != Symbol::T => value
+                .partial_cmp(&wanted.get(symbol))
+                .unwrap_or(Ordering::Equal),
             quantity => match (value.number(), wanted.modulation_period) {
                 (Some(number), Some(period)) => quantity.period(number, wanted).total_cmp(&period),
                 _ => Ordering::Equal,
@@ -163,7 +192,11 @@ impl Column {
     /// Whether two rows are too close to lead to different periods.
     fn is_close(&self, a: u32, b: u32) -> bool {
         let [a, b] = [a, b].map(|row| self.values[row as usize].number().unwrap_or(f64::NAN));
-        let gap = if self.is_inverse_period() { MIN_GAP } else { 0.0 };
+        let gap = if self.is_inverse_period() {
+            MIN_GAP
+        } else {
+            0.0
+        };
         a.max(b) <= a.min(b) * (1.0 + gap)
     }
 
@@ -185,14 +218,28 @@ mod tests {
     fn column(key: &str, values: &[f64]) -> Column {
         let quantity = Quantity::from_key(key).unwrap();
         let checked = |&value: &f64| quantity.checked(Value::Real(value)).unwrap();
-        Column { quantity, values: values.iter().map(checked).collect() }
+        Column {
+            quantity,
+            values: values.iter().map(checked).collect(),
+        }
     }
 
     #[test]
     fn equal_rows_are_found_and_named_in_order() {
         let repeated = Axis::table(vec![column("V0", &[3.0, 1.0, 2.0, 1.0])]).unwrap_err();
-        assert_eq!(repeated, Repeated { earlier: 1, later: 3 });
-        let zip = |periods: &[f64]| Axis::table(vec![column("Delta", &[0.0, 0.0, 1.0]), column("T", periods)]);
+        assert_eq!(
+            repeated,
+            Repeated {
+                earlier: 1,
+                later: 3
+            }
+        );
+        let zip = |periods: &[f64]| {
+            Axis::table(vec![
+                column("Delta", &[0.0, 0.0, 1.0]),
+                column("T", periods),
+            ])
+        };
         assert!(zip(&[1.0, 1.0, 1.0]).is_err());
         assert!(zip(&[1.0, 2.0, 1.0]).is_ok());
     }
@@ -206,9 +253,19 @@ mod tests {
 
     #[test]
     fn without_modulation_the_first_row_of_a_group_counts() {
-        let axis = Axis::table(vec![column("dfs", &[0.0, 0.1, 0.0, 0.1]), column("T", &[4.0, 3.0, 2.0, 1.0])]).unwrap();
-        assert_eq!((0..4).map(|row| axis.is_first(row)).collect::<Vec<_>>(), [true, true, false, false]);
-        let wanted = Parameters { threshold_deviation: 0.1, ..Parameters::default() };
+        let axis = Axis::table(vec![
+            column("dfs", &[0.0, 0.1, 0.0, 0.1]),
+            column("T", &[4.0, 3.0, 2.0, 1.0]),
+        ])
+        .unwrap();
+        assert_eq!(
+            (0..4).map(|row| axis.is_first(row)).collect::<Vec<_>>(),
+            [true, true, false, false]
+        );
+        let wanted = Parameters {
+            threshold_deviation: 0.1,
+            ..Parameters::default()
+        };
         assert_eq!(axis.find(&wanted), Some(1));
     }
 }

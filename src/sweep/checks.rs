@@ -30,23 +30,34 @@ struct Place {
 
 impl<'a> Places<'a> {
     pub const fn new(source: &'a Source<'a>) -> Self {
-        Self { source, set: Vec::new() }
+        Self {
+            source,
+            set: Vec::new(),
+        }
     }
 
     /// A quantity is set in a section; refused if something else sets it, or the period, already.
     pub fn set(&mut self, quantity: Quantity, at: usize, section: &'static str) {
-        let clash = |place: &&Place| place.quantity == quantity || (place.quantity.is_period() && quantity.is_period());
+        let clash = |place: &&Place| {
+            place.quantity == quantity || (place.quantity.is_period() && quantity.is_period())
+        };
         if let Some(place) = self.set.iter().find(clash) {
             let (key, other) = (quantity.key(), place.quantity.key());
             let (there, line) = (place.section, self.source.line(place.at));
             let problem = if place.quantity == quantity {
                 format!("{key} in {section}: is set in {there}, too (line {line}); keep one")
             } else {
-                format!("{key} in {section}: fixes the period, as does {other} in {there} (line {line}); keep one")
+                format!(
+                    "{key} in {section}: fixes the period, as does {other} in {there} (line {line}); keep one"
+                )
             };
             self.source.refuse(at, problem);
         } else {
-            self.set.push(Place { quantity, at, section });
+            self.set.push(Place {
+                quantity,
+                at,
+                section,
+            });
         }
     }
 
@@ -58,7 +69,12 @@ impl<'a> Places<'a> {
             other => other,
         };
         let place = |quantity| self.set.iter().find(|place| place.quantity == quantity);
-        self.source.refuse(place(quantity).or_else(|| place(bound)).map_or(0, |place| place.at), problem)
+        self.source.refuse(
+            place(quantity)
+                .or_else(|| place(bound))
+                .map_or(0, |place| place.at),
+            problem,
+        )
     }
 }
 
@@ -68,9 +84,15 @@ const MAX_POINTS: u64 = 10_000_000;
 
 /// All checks of a sweep that is read.
 pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), Refused> {
-    let points = sweep.axes.iter().try_fold(1_u64, |points, axis| points.checked_mul(axis.len()));
+    let points = sweep
+        .axes
+        .iter()
+        .try_fold(1_u64, |points, axis| points.checked_mul(axis.len()));
     if points.is_none_or(|points| points > MAX_POINTS) {
-        let points = points.map_or_else(|| "2^64 points or more".to_owned(), |points| format!("{points} points"));
+        let points = points.map_or_else(
+            || "2^64 points or more".to_owned(),
+            |points| format!("{points} points"),
+        );
         let problem = format!(
             "[axes]: {points}; a sweep has at most {MAX_POINTS}, before conditions. Take fewer, or a sample \
              ([axes.sobol]), or several sweeps"
@@ -78,25 +100,42 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
         return Err(file.source.refuse(file.place_of("axes"), problem));
     }
     modulation(sweep, file, places)?;
-    if sweep.points_of_one_seed().any(|point| invalid(&point).is_some())
-        && let Some(((quantity, problem), point)) =
-            sweep.admitted(0..sweep.point_count()).find_map(|(_, point)| Some((invalid(&point)?, point)))
+    if sweep
+        .points_of_one_seed()
+        .any(|point| invalid(&point).is_some())
+        && let Some(((quantity, problem), point)) = sweep
+            .admitted(0..sweep.point_count())
+            .find_map(|(_, point)| Some((invalid(&point)?, point)))
     {
         return Err(places.refuse(quantity, problem + &place(sweep, &point)));
     }
     let Some((_, first)) = sweep.admitted(0..sweep.point_count()).next() else {
-        return Err(file
-            .source
-            .refuse(file.place_of("where"), "where: drops every point; relax it, or extend the axes"));
+        return Err(file.source.refuse(
+            file.place_of("where"),
+            "where: drops every point; relax it, or extend the axes",
+        ));
     };
-    if sweep.recording.energies && matches!(sweep.solver, Solver::EventDriven { resolve: Resolve::Grid, .. }) {
+    if sweep.recording.energies
+        && matches!(
+            sweep.solver,
+            Solver::EventDriven {
+                resolve: Resolve::Grid,
+                ..
+            }
+        )
+    {
         let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
         return Err(file.source.refuse(file.place_of("record"), problem));
     }
     // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others continue.
-    let solver = file.entry("solver").and_then(|entry| entry.section("[solver]"));
+    let solver = file
+        .entry("solver")
+        .and_then(|entry| entry.section("[solver]"));
     let time_step = solver.map_or(0, |solver| solver.place_of("dt"));
-    sweep.solver.check(&first.parameters).map_err(|error| file.source.refuse(time_step, error.to_string()))
+    sweep
+        .solver
+        .check(&first.parameters)
+        .map_err(|error| file.source.refuse(time_step, error.to_string()))
 }
 
 /// Drive velocity in m/s from which a slip of microseconds would be driven through: micrometres per second were meant.
@@ -112,10 +151,17 @@ impl Sweep {
     pub fn warnings(&self) -> Vec<String> {
         let points: Vec<Point> = self.points_of_one_seed().take(MAX_LOOKED_AT).collect();
         let worst = |quantity: Quantity, is_odd: &dyn Fn(f64) -> bool| {
-            points.iter().map(|point| point.number(quantity)).find(|number| is_odd(*number))
+            points
+                .iter()
+                .map(|point| point.number(quantity))
+                .find(|number| is_odd(*number))
         };
-        let fast = worst(Quantity::Parameter(Symbol::V0), &|velocity| velocity >= FAST);
-        let odd = worst(Quantity::Eta, &|eta| eta != 0.0 && !USUAL_ETA.contains(&eta));
+        let fast = worst(Quantity::Parameter(Symbol::V0), &|velocity| {
+            velocity >= FAST
+        });
+        let odd = worst(Quantity::Eta, &|eta| {
+            eta != 0.0 && !USUAL_ETA.contains(&eta)
+        });
         let fast = fast.map(|velocity| {
             format!(
                 "V0 = {} m/s is far too fast for stick-slip; 100 micrometres per second are V0 = 1e-4",
@@ -128,9 +174,15 @@ impl Sweep {
                 "eta = {eta:.3e} at a point; from {low:e} to {high:e} there is locking to see: check Delta, T and V0"
             )
         });
-        let few = self.rounds.as_ref().filter(|rounds| rounds.asked < *rounds.seeds.start());
+        let few = self
+            .rounds
+            .as_ref()
+            .filter(|rounds| rounds.asked < *rounds.seeds.start());
         let few = few.map(|Rounds { asked, seeds, .. }| {
-            format!("seeds: from = {asked} is raised to {}: intervals of fewer seeds are not trusted", seeds.start())
+            format!(
+                "seeds: from = {asked} is raised to {}: intervals of fewer seeds are not trusted",
+                seeds.start()
+            )
         });
         fast.into_iter().chain(odd).chain(few).collect()
     }
@@ -143,7 +195,8 @@ fn modulation(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<
     match places.set.iter().find(|place| place.quantity.is_period()) {
         Some(place) if !is_modulated => {
             let key = place.quantity.key();
-            let problem = format!("{key}: has no effect while Delta = 0; set Delta > 0 (m), or remove {key}");
+            let problem =
+                format!("{key}: has no effect while Delta = 0; set Delta > 0 (m), or remove {key}");
             return Err(places.source.refuse(place.at, problem));
         }
         None if is_modulated => {
@@ -153,16 +206,35 @@ fn modulation(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<
         _ => {}
     }
     if sweep.controls.is_some() {
-        let problem = "control: has no effect while Delta = 0; set Delta > 0 (m), or remove control";
-        return if is_modulated { Ok(()) } else { Err(file.source.refuse(file.place_of("record"), problem)) };
+        let problem =
+            "control: has no effect while Delta = 0; set Delta > 0 (m), or remove control";
+        return if is_modulated {
+            Ok(())
+        } else {
+            Err(file.source.refuse(file.place_of("record"), problem))
+        };
     }
-    let Some(Rounds { precision, refinement, .. }) = &sweep.rounds else { return Ok(()) };
-    let precise = precision.iter().flat_map(|precision| &precision.statistics).map(|by| ("precision", by));
-    let refined = refinement.iter().flat_map(|refinement| &refinement.by).map(|by| ("refine", by));
+    let Some(Rounds {
+        precision,
+        refinement,
+        ..
+    }) = &sweep.rounds
+    else {
+        return Ok(());
+    };
+    let precise = precision
+        .iter()
+        .flat_map(|precision| &precision.statistics)
+        .map(|by| ("precision", by));
+    let refined = refinement
+        .iter()
+        .flat_map(|refinement| &refinement.by)
+        .map(|by| ("refine", by));
     match precise.chain(refined).find(|(_, by)| by.needs_control()) {
         None => Ok(()),
         Some((section, Statistic { key, .. })) => {
-            let problem = format!("[{section}]: {key} needs controls; set control = true in [record]");
+            let problem =
+                format!("[{section}]: {key} needs controls; set control = true in [record]");
             Err(file.source.refuse(file.place_of(section), problem))
         }
     }
@@ -172,7 +244,8 @@ fn modulation(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<
 fn invalid(point: &Point) -> Option<(Quantity, String)> {
     if !point.period_is_derivable() {
         let period = Shortest(point.number(Quantity::Parameter(Symbol::T)));
-        let problem = format!("eta: gives T = {period} s; T, Delta and V0 must lie between 1e-100 and 1e100");
+        let problem =
+            format!("eta: gives T = {period} s; T, Delta and V0 must lie between 1e-100 and 1e100");
         return Some((Quantity::Eta, problem));
     }
     let error = point.parameters.check_rules().err()?;
@@ -181,11 +254,19 @@ fn invalid(point: &Point) -> Option<(Quantity, String)> {
 
 /// Where a point lies on the axes, and the way out.
 fn place(sweep: &Sweep, point: &Point) -> String {
-    let quantities = sweep.axes.iter().flat_map(Axis::quantities).filter(|quantity| *quantity != Quantity::BREAK_ON);
-    let moved: Vec<String> =
-        quantities.map(|quantity| format!("{} = {}", quantity.key(), Shortest(point.number(quantity)))).collect();
+    let quantities = sweep
+        .axes
+        .iter()
+        .flat_map(Axis::quantities)
+        .filter(|quantity| *quantity != Quantity::BREAK_ON);
+    let moved: Vec<String> = quantities
+        .map(|quantity| format!("{} = {}", quantity.key(), Shortest(point.number(quantity))))
+        .collect();
     if moved.is_empty() {
         return String::new();
     }
-    format!(", at the point {}; change the axes, or drop it by a where", moved.join(", "))
+    format!(
+        ", at the point {}; change the axes, or drop it by a where",
+        moved.join(", ")
+    )
 }

@@ -48,20 +48,34 @@ const FOLLOWS: f64 = 0.6;
 /// Predicted CPU time of a job, in s.
 pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: Solver) -> f64 {
     let blocks = parameters.blocks as f64;
-    let Motion { time, resolved, breaks, steps_of_periods } = Motion::of(parameters, recording);
-    let ledger = if recording.energies { LEDGER_SHARE } else { 1.0 };
+    let Motion {
+        time,
+        resolved,
+        breaks,
+        steps_of_periods,
+    } = Motion::of(parameters, recording);
+    let ledger = if recording.energies {
+        LEDGER_SHARE
+    } else {
+        1.0
+    };
     let fourth_root = |ratio: f64| ratio.sqrt().sqrt();
     let of_motion = match solver {
-        Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) && !recording.energies => {
+        Solver::EventDriven { tolerance, resolve }
+            if resolve.takes_grid(tolerance) && !recording.energies =>
+        {
             let step = step_length(parameters) * fourth_root(tolerance / 1e-3);
             let steps = (resolved / step + steps_of_periods).min(time / step);
             breaks * GRID_EVENT + steps * (GRID_STEP_OVERHEAD + GRID_STEP_OF_A_BLOCK * blocks)
         }
         Solver::EventDriven { tolerance, .. } => {
-            let steps = breaks * TAYLOR_STEPS_OF_A_BREAK * fourth_root(fourth_root(1e-3 / tolerance));
+            let steps =
+                breaks * TAYLOR_STEPS_OF_A_BREAK * fourth_root(fourth_root(1e-3 / tolerance));
             ledger * steps * (TAYLOR_STEP_OVERHEAD + TAYLOR_STEP_OF_A_BLOCK * blocks)
         }
-        Solver::FixedStep { time_step } => ledger * time / time_step * (STEP_OVERHEAD + STEP_OF_A_BLOCK * blocks),
+        Solver::FixedStep { time_step } => {
+            ledger * time / time_step * (STEP_OVERHEAD + STEP_OF_A_BLOCK * blocks)
+        }
     };
     JOB_OVERHEAD + of_motion
 }
@@ -84,35 +98,63 @@ impl Motion {
         let longest = recording.max_time.unwrap_or(f64::INFINITY);
         let slips = recording.slips as f64 + recording.discard as f64;
         // A slip takes half a swing on the springs and the time in which damping slows it.
-        let (mass, damping) = (parameters.slider_mass, parameters.slider_mass * parameters.damping_rate);
-        let stiffness = 1.0 / (1.0 / parameters.drive_stiffness + 1.0 / parameters.slider_stiffness);
+        let (mass, damping) = (
+            parameters.slider_mass,
+            parameters.slider_mass * parameters.damping_rate,
+        );
+        let stiffness =
+            1.0 / (1.0 / parameters.drive_stiffness + 1.0 / parameters.slider_stiffness);
         let duration = PI * (mass / stiffness).sqrt() + damping / stiffness;
         // At a velocity v a contact holds for reach/v and is off for the delay, so that friction is half the strength times
         // reach/(reach + v delay). Sliding is stable where damping grows faster with v than this falls.
-        let critical = ((0.5 * total_strength(parameters) * reach * delay / damping).sqrt() - reach) / delay;
+        let critical =
+            ((0.5 * total_strength(parameters) * reach * delay / damping).sqrt() - reach) / delay;
 
-        let amplitude = parameters.modulation_amplitude.max(parameters.turning_amplitude.unwrap_or(0.0));
+        let amplitude = parameters
+            .modulation_amplitude
+            .max(parameters.turning_amplitude.unwrap_or(0.0));
         let period = TAU / parameters.largest_modulation_frequency();
         let swing = amplitude / (velocity * (interval - delay));
         let follows = swing > FOLLOWS;
         let slides = velocity > critical || follows && period < 2.0 * duration + delay;
         if slides || follows {
-            let time = if slides { recording.give_up_time(parameters) } else { 0.5 * slips * period };
+            let time = if slides {
+                recording.give_up_time(parameters)
+            } else {
+                0.5 * slips * period
+            };
             let (time, fastest) = (time.min(longest), velocity.max(4.0 * amplitude / period));
             let breaks = contacts * (1.0 + time / (delay + reach / fastest));
-            return Self { time, resolved: time, breaks, steps_of_periods: 0.0 };
+            return Self {
+                time,
+                resolved: time,
+                breaks,
+                steps_of_periods: 0.0,
+            };
         }
         let time = (slips * interval).min(longest);
         let (slips, periods) = (time / interval, time / period);
         // In a slip each contact breaks, and again as often as it attaches again on the way.
-        let breaks = contacts * slips * (1.0 + 1.0 / (delay / duration + reach / (velocity * interval)));
+        let breaks =
+            contacts * slips * (1.0 + 1.0 / (delay / duration + reach / (velocity * interval)));
         if swing > SHAKEN {
             let breaks = breaks + contacts * periods * BREAKS_OF_A_PERIOD;
-            return Self { time, resolved: time, breaks, steps_of_periods: 0.0 };
+            return Self {
+                time,
+                resolved: time,
+                breaks,
+                steps_of_periods: 0.0,
+            };
         }
-        let about_a_slip = RESOLVED_REATTACHMENTS * delay + RESOLVED_DAMPINGS / parameters.damping_rate;
+        let about_a_slip =
+            RESOLVED_REATTACHMENTS * delay + RESOLVED_DAMPINGS / parameters.damping_rate;
         let resolved = time * (about_a_slip / interval).min(1.0);
-        Self { time, resolved, breaks, steps_of_periods: STEPS_OF_A_PERIOD * swing * periods }
+        Self {
+            time,
+            resolved,
+            breaks,
+            steps_of_periods: STEPS_OF_A_PERIOD * swing * periods,
+        }
     }
 }
 
@@ -121,8 +163,12 @@ fn step_length(parameters: &Parameters) -> f64 {
     let contacts = parameters.block_contact_stiffness();
     let stiffest = 4.0 * parameters.coupling_stiffness() + contacts + parameters.drive_stiffness;
     let mass = parameters.block_mass();
-    let fastest = (stiffest / mass).sqrt().max(17.0 * (contacts / mass).sqrt());
-    2.0 / fastest.max(4.0 * parameters.damping_rate).max(8.0 * parameters.largest_modulation_frequency())
+    let fastest = (stiffest / mass)
+        .sqrt()
+        .max(17.0 * (contacts / mass).sqrt());
+    2.0 / fastest
+        .max(4.0 * parameters.damping_rate)
+        .max(8.0 * parameters.largest_modulation_frequency())
 }
 
 #[cfg(test)]
@@ -135,8 +181,17 @@ mod tests {
     fn cost_grows_with_slips_up_to_the_longest_time() {
         let parameters = Parameters::default();
         let cost = |slips, max_time| {
-            let recording = Recording { slips, discard: 0, max_time, ..Recording::default() };
-            predicted_cost(&parameters, &recording, Solver::FixedStep { time_step: 1e-6 })
+            let recording = Recording {
+                slips,
+                discard: 0,
+                max_time,
+                ..Recording::default()
+            };
+            predicted_cost(
+                &parameters,
+                &recording,
+                Solver::FixedStep { time_step: 1e-6 },
+            )
         };
         let of_slips = |slips| cost(slips, None) - JOB_OVERHEAD;
         assert!((of_slips(20) / of_slips(10) - 2.0).abs() < 1e-9);
@@ -147,7 +202,10 @@ mod tests {
     #[test]
     fn what_was_measured_is_predicted_within_a_factor_of_two() {
         let grid = Solver::default();
-        let taylor = Solver::EventDriven { tolerance: 1e-8, resolve: Resolve::Taylor };
+        let taylor = Solver::EventDriven {
+            tolerance: 1e-8,
+            resolve: Resolve::Taylor,
+        };
         for (settings, solver, measured) in [
             ("", grid, 18.3),
             ("", taylor, 95.6),
@@ -175,19 +233,32 @@ mod tests {
             let mut parameters = Parameters::default();
             for setting in settings.split_whitespace() {
                 let (key, value) = setting.split_once('=').unwrap();
-                let value = value.parse().map_or_else(|_| Value::Real(value.parse().unwrap()), Value::Count);
-                parameters.put(Symbol::from_key(key).unwrap(), value).unwrap();
+                let value = value
+                    .parse()
+                    .map_or_else(|_| Value::Real(value.parse().unwrap()), Value::Count);
+                parameters
+                    .put(Symbol::from_key(key).unwrap(), value)
+                    .unwrap();
             }
-            let recording = Recording { slips: 15, ..Recording::default() };
+            let recording = Recording {
+                slips: 15,
+                ..Recording::default()
+            };
             let predicted = 1e3 * predicted_cost(&parameters, &recording, solver);
-            assert!((0.5..2.0).contains(&(predicted / measured)), "{settings}: {predicted} ms against {measured}");
+            assert!(
+                (0.5..2.0).contains(&(predicted / measured)),
+                "{settings}: {predicted} ms against {measured}"
+            );
         }
     }
 
     #[test]
     fn sliding_costs_until_the_job_gives_up() {
         let at = |drive_velocity| {
-            let parameters = Parameters { drive_velocity, ..Parameters::default() };
+            let parameters = Parameters {
+                drive_velocity,
+                ..Parameters::default()
+            };
             Motion::of(&parameters, &Recording::default()).time / typical_interval(&parameters)
         };
         assert_eq!((at(1e-4).round(), at(1e-2).round()), (45.0, 20.0));

@@ -43,23 +43,67 @@ const SUM: u8 = 4;
 const PRODUCT: u8 = 5;
 
 const OPERATORS: [Operator; 12] = [
-    Operator { sign: "or", precedence: OR, combine: f64::max },
-    Operator { sign: "and", precedence: AND, combine: f64::min },
-    Operator { sign: "<", precedence: COMPARISON, combine: |a, b| f64::from(a < b) },
-    Operator { sign: "<=", precedence: COMPARISON, combine: |a, b| f64::from(a <= b) },
-    Operator { sign: ">", precedence: COMPARISON, combine: |a, b| f64::from(a > b) },
-    Operator { sign: ">=", precedence: COMPARISON, combine: |a, b| f64::from(a >= b) },
-    Operator { sign: "==", precedence: COMPARISON, combine: |a, b| f64::from(a == b) },
+    Operator {
+        sign: "or",
+        precedence: OR,
+        combine: f64::max,
+    },
+    Operator {
+        sign: "and",
+        precedence: AND,
+        combine: f64::min,
+    },
+    Operator {
+        sign: "<",
+        precedence: COMPARISON,
+        combine: |a, b| f64::from(a < b),
+    },
+    Operator {
+        sign: "<=",
+        precedence: COMPARISON,
+        combine: |a, b| f64::from(a <= b),
+    },
+    Operator {
+        sign: ">",
+        precedence: COMPARISON,
+        combine: |a, b| f64::from(a > b),
+    },
+    Operator {
+        sign: ">=",
+        precedence: COMPARISON,
+        combine: |a, b| f64::from(a >= b),
+    },
+    Operator {
+        sign: "==",
+        precedence: COMPARISON,
+        combine: |a, b| f64::from(a == b),
+    },
     // Not `a != b`, which holds for what is no number.
     Operator {
         sign: "!=",
         precedence: COMPARISON,
         combine: |a, b| f64::from(a.partial_cmp(&b).is_some_and(Ordering::is_ne)),
     },
-    Operator { sign: "+", precedence: SUM, combine: |a, b| a + b },
-    Operator { sign: "-", precedence: SUM, combine: |a, b| a - b },
-    Operator { sign: "*", precedence: PRODUCT, combine: |a, b| a * b },
-    Operator { sign: "/", precedence: PRODUCT, combine: |a, b| a / b },
+    Operator {
+        sign: "+",
+        precedence: SUM,
+        combine: |a, b| a + b,
+    },
+    Operator {
+        sign: "-",
+        precedence: SUM,
+        combine: |a, b| a - b,
+    },
+    Operator {
+        sign: "*",
+        precedence: PRODUCT,
+        combine: |a, b| a * b,
+    },
+    Operator {
+        sign: "/",
+        precedence: PRODUCT,
+        combine: |a, b| a / b,
+    },
 ];
 
 /// What is wrong with an expression, and where.
@@ -86,12 +130,19 @@ impl<N> Expression<N> {
     }
 
     fn parse(text: &str, names: Names<'_, N>, is_condition: bool) -> Result<Self, ExpressionError> {
-        let mut reader = Reader { text, next: text.len() - text.trim_start().len(), words: 0, names };
+        let mut reader = Reader {
+            text,
+            next: text.len() - text.trim_start().len(),
+            words: 0,
+            names,
+        };
         let start = reader.position();
         let expression = reader.expression(OR)?;
         match reader.peek() {
             "" => expression.demanded(is_condition, start),
-            found => Err(reader.error(format!("\"{found}\" is not expected here; join conditions by and, or"))),
+            found => Err(reader.error(format!(
+                "\"{found}\" is not expected here; join conditions by and, or"
+            ))),
         }
     }
 
@@ -120,13 +171,19 @@ impl<N> Expression<N> {
 
     /// This expression, which starts at `position`, where a condition or a number is needed.
     fn demanded(self, condition: bool, position: usize) -> Result<Self, ExpressionError> {
-        let is_condition = matches!(&self, Self::Combined(combined) if combined.1.precedence <= COMPARISON);
+        let is_condition =
+            matches!(&self, Self::Combined(combined) if combined.1.precedence <= COMPARISON);
         let problem = match (condition, is_condition) {
             (true, false) => "a comparison is needed here, such as frequency < 500",
-            (false, true) => "a number is needed here, this is a condition; join conditions by and, or",
+            (false, true) => {
+                "a number is needed here, this is a condition; join conditions by and, or"
+            }
             _ => return Ok(self),
         };
-        Err(ExpressionError { position, problem: problem.to_owned() })
+        Err(ExpressionError {
+            position,
+            problem: problem.to_owned(),
+        })
     }
 }
 
@@ -147,14 +204,18 @@ impl<'a, N> Reader<'a, N> {
 
     /// What is wrong with the next word or sign, unless it means nothing anywhere.
     fn error(&self, problem: impl Into<String>) -> ExpressionError {
-        let has_meaning = |letter: char| letter.is_ascii_alphanumeric() || "_.<>=!+-*/()".contains(letter);
+        let has_meaning =
+            |letter: char| letter.is_ascii_alphanumeric() || "_.<>=!+-*/()".contains(letter);
         let problem = match self.peek() {
             other if other.chars().all(has_meaning) => problem.into(),
             other => format!(
                 "\"{other}\" has no meaning here; allowed are keys, numbers, + - * / ( ), < <= > >= == !=, and, or"
             ),
         };
-        ExpressionError { position: self.position(), problem }
+        ExpressionError {
+            position: self.position(),
+            problem,
+        }
     }
 
     /// The next word, number or sign; empty at the end.
@@ -168,7 +229,11 @@ impl<'a, N> Reader<'a, N> {
             !(letter.is_ascii_alphanumeric() || "_.".contains(letter) || is_of_exponent)
         };
         let mut letters = rest.chars();
-        let length = match (rest.find(ends).unwrap_or(rest.len()), letters.next(), letters.next()) {
+        let length = match (
+            rest.find(ends).unwrap_or(rest.len()),
+            letters.next(),
+            letters.next(),
+        ) {
             (0, Some('<' | '>' | '=' | '!'), Some('=')) => 2,
             (0, Some(sign), _) => sign.len_utf8(),
             (length, ..) => length,
@@ -191,22 +256,35 @@ impl<'a, N> Reader<'a, N> {
     }
 
     fn operator(&self) -> Option<Operator> {
-        OPERATORS.into_iter().find(|operator| operator.sign == self.peek())
+        OPERATORS
+            .into_iter()
+            .find(|operator| operator.sign == self.peek())
     }
 
     /// Reads an expression whose operators have at least this precedence.
     fn expression(&mut self, min: u8) -> Result<Expression<N>, ExpressionError> {
         let start = self.position();
         let mut left = self.factor()?;
-        while let Some(operator) = self.operator().filter(|operator| operator.precedence >= min) {
+        while let Some(operator) = self
+            .operator()
+            .filter(|operator| operator.precedence >= min)
+        {
             let joins_conditions = operator.precedence < COMPARISON;
             let demanded = left.demanded(joins_conditions, start)?;
             self.advance();
             let position = self.position();
-            let right = self.expression(operator.precedence + 1)?.demanded(joins_conditions, position)?;
+            let right = self
+                .expression(operator.precedence + 1)?
+                .demanded(joins_conditions, position)?;
             left = Expression::Combined(Box::new((demanded, operator, right)));
-            if [operator.precedence, self.operator().map_or(0, |next| next.precedence)] == [COMPARISON; 2] {
-                return Err(self.error("a second comparison; write a < b and b < c instead of a < b < c"));
+            if [
+                operator.precedence,
+                self.operator().map_or(0, |next| next.precedence),
+            ] == [COMPARISON; 2]
+            {
+                return Err(
+                    self.error("a second comparison; write a < b and b < c instead of a < b < c")
+                );
             }
         }
         if matches!(self.peek(), "=" | "!") {
@@ -217,21 +295,29 @@ impl<'a, N> Reader<'a, N> {
 
     fn factor(&mut self) -> Result<Expression<N>, ExpressionError> {
         if self.words >= MAX_WORDS {
-            return Err(
-                self.error(format!("more than {MAX_WORDS} words and signs; split it into a list of conditions"))
-            );
+            return Err(self.error(format!(
+                "more than {MAX_WORDS} words and signs; split it into a list of conditions"
+            )));
         }
         if self.accept("-") {
             let start = self.position();
-            return Ok(Expression::Negative(Box::new(self.factor()?.demanded(false, start)?)));
+            return Ok(Expression::Negative(Box::new(
+                self.factor()?.demanded(false, start)?,
+            )));
         }
         if self.accept("(") {
             let inside = self.expression(OR)?;
-            return if self.accept(")") { Ok(inside) } else { Err(self.error("a closing ) is missing")) };
+            return if self.accept(")") {
+                Ok(inside)
+            } else {
+                Err(self.error("a closing ) is missing"))
+            };
         }
         let text = self.peek();
         let expression = match text.chars().next() {
-            None => return Err(self.error("the condition ends too early; a key or a number is needed")),
+            None => {
+                return Err(self.error("the condition ends too early; a key or a number is needed"));
+            }
             Some('0'..='9' | '.') => match text.parse() {
                 Ok(constant) if f64::is_finite(constant) => Expression::Constant(constant),
                 _ => return Err(self.error(format!("\"{text}\" is not a number"))),
@@ -239,7 +325,11 @@ impl<'a, N> Reader<'a, N> {
             Some('a'..='z' | 'A'..='Z' | '_') => {
                 Expression::Name((self.names)(text).map_err(|problem| self.error(problem))?)
             }
-            Some(_) => return Err(self.error(format!("\"{text}\" is not expected here; a key or a number is needed"))),
+            Some(_) => {
+                return Err(self.error(format!(
+                    "\"{text}\" is not expected here; a key or a number is needed"
+                )));
+            }
         };
         self.advance();
         Ok(expression)
@@ -259,9 +349,19 @@ mod tests {
     }
 
     fn holds_at(text: &str, amplitude: f64, period: (Quantity, f64)) -> bool {
-        let parameters = Parameters { modulation_amplitude: amplitude, ..Parameters::default() };
-        let point = Point { parameters, fixes_period: Some(period) }.canonical();
-        parse(text).unwrap_or_else(|error| panic!("{text}: {error}")).evaluate(&|&name| point.number(name)) == 1.0
+        let parameters = Parameters {
+            modulation_amplitude: amplitude,
+            ..Parameters::default()
+        };
+        let point = Point {
+            parameters,
+            fixes_period: Some(period),
+        }
+        .canonical();
+        parse(text)
+            .unwrap_or_else(|error| panic!("{text}: {error}"))
+            .evaluate(&|&name| point.number(name))
+            == 1.0
     }
 
     fn holds(text: &str) -> bool {

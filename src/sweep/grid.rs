@@ -60,7 +60,10 @@ impl Sweep {
 
     /// Keys of all axes.
     pub fn swept(&self) -> impl Iterator<Item = String> {
-        self.axes.iter().flat_map(Axis::quantities).map(|quantity| quantity.key().to_owned())
+        self.axes
+            .iter()
+            .flat_map(Axis::quantities)
+            .map(|quantity| quantity.key().to_owned())
     }
 
     /// Number of points of the grid, before the conditions drop some.
@@ -70,7 +73,11 @@ impl Sweep {
 
     /// Numbers of the points of the grid, and of the controls after them.
     pub(super) fn points(&self) -> Range<u64> {
-        0..self.point_count() + self.controls.as_ref().map_or(0, |controls| controls.point_count())
+        0..self.point_count()
+            + self
+                .controls
+                .as_ref()
+                .map_or(0, |controls| controls.point_count())
     }
 
     /// The jobs in grid order, then their controls.
@@ -88,13 +95,22 @@ impl Sweep {
         let count = self.point_count();
         let of_grid = self.admitted(points.start.min(count)..points.end.min(count));
         let others = points.start.max(count) - count..points.end.max(count) - count;
-        let controls = self.controls.iter().flat_map(move |controls| controls.admitted(others.clone()));
+        let controls = self
+            .controls
+            .iter()
+            .flat_map(move |controls| controls.admitted(others.clone()));
         let controls = controls.map(move |(number, point)| (count + number, point));
         let is_own = |(_, point): &(u64, Point)| self.find_in_grid(&point.parameters).is_none();
-        of_grid.chain(controls.filter(is_own)).map(|(point, Point { parameters, .. })| {
-            let cost = predicted_cost(&parameters, &self.recording, self.solver);
-            Job { point, parameters, cost }
-        })
+        of_grid
+            .chain(controls.filter(is_own))
+            .map(|(point, Point { parameters, .. })| {
+                let cost = predicted_cost(&parameters, &self.recording, self.solver);
+                Job {
+                    point,
+                    parameters,
+                    cost,
+                }
+            })
     }
 
     /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
@@ -104,15 +120,25 @@ impl Sweep {
 
     /// Number of the point that is the job with these canonical parameters.
     pub fn find(&self, parameters: &Parameters) -> Option<u64> {
-        let control = || Some(self.point_count() + self.controls.as_ref()?.find_in_grid(parameters)?);
+        let control =
+            || Some(self.point_count() + self.controls.as_ref()?.find_in_grid(parameters)?);
         self.find_in_grid(parameters).or_else(control)
     }
 
     fn find_in_grid(&self, parameters: &Parameters) -> Option<u64> {
-        let rows: Vec<u64> = self.axes.iter().map(|axis| axis.find(parameters)).collect::<Option<_>>()?;
+        let rows: Vec<u64> = self
+            .axes
+            .iter()
+            .map(|axis| axis.find(parameters))
+            .collect::<Option<_>>()?;
         let point = self.point(&rows).canonical();
         let is_job = point.parameters == *parameters && self.admits(&point);
-        is_job.then(|| self.axes.iter().zip(rows).fold(0, |number, (axis, row)| number * axis.len() + row))
+        is_job.then(|| {
+            self.axes
+                .iter()
+                .zip(rows)
+                .fold(0, |number, (axis, row)| number * axis.len() + row)
+        })
     }
 
     pub fn job_id(&self, parameters: &Parameters) -> String {
@@ -125,7 +151,8 @@ impl Sweep {
 
     /// The same with the ids that a program of other versions gave.
     pub fn with_ids_of(mut self, model_version: u32, rng_scheme: &str) -> Self {
-        self.identity = Identity::of_versions(model_version, rng_scheme, self.solver, &self.recording);
+        self.identity =
+            Identity::of_versions(model_version, rng_scheme, self.solver, &self.recording);
         self
     }
 
@@ -138,15 +165,27 @@ impl Sweep {
             let model = Symbol::ALL
                 .into_iter()
                 .filter(|symbol| !moved(*symbol))
-                .map(|symbol| (format!("model.{}", symbol.key()), sweep.base.get(symbol).to_string()));
+                .map(|symbol| {
+                    (
+                        format!("model.{}", symbol.key()),
+                        sweep.base.get(symbol).to_string(),
+                    )
+                });
             let name = std::iter::once(("name".to_owned(), sweep.name.clone()));
-            name.chain(model).chain(settings(sweep.solver, &sweep.recording)).collect::<Vec<_>>()
+            name.chain(model)
+                .chain(settings(sweep.solver, &sweep.recording))
+                .collect::<Vec<_>>()
         };
         let (before, after) = (values(self), values(other));
         let value = |values: &[(String, String)], key: &str| {
-            values.iter().find(|(other, _)| other == key).map_or_else(|| "none".to_owned(), |(_, value)| value.clone())
+            values
+                .iter()
+                .find(|(other, _)| other == key)
+                .map_or_else(|| "none".to_owned(), |(_, value)| value.clone())
         };
-        let added = after.iter().filter(|(key, _)| before.iter().all(|(other, _)| other != key));
+        let added = after
+            .iter()
+            .filter(|(key, _)| before.iter().all(|(other, _)| other != key));
         before
             .iter()
             .chain(added)
@@ -158,15 +197,18 @@ impl Sweep {
 
     /// Whether an axis sets a parameter; T also through η or the frequency.
     fn moves(&self, symbol: Symbol) -> bool {
-        self.axes
-            .iter()
-            .flat_map(Axis::quantities)
-            .any(|quantity| quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period()))
+        self.axes.iter().flat_map(Axis::quantities).any(|quantity| {
+            quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period())
+        })
     }
 
     /// Those of these points of the grid that are jobs, with their numbers, in canonical form.
-    pub(super) fn admitted(&self, points: Range<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
-        self.walk(self.row_counts(), points).filter(|(_, point)| self.admits(point))
+    pub(super) fn admitted(
+        &self,
+        points: Range<u64>,
+    ) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
+        self.walk(self.row_counts(), points)
+            .filter(|(_, point)| self.admits(point))
     }
 
     /// The points of one seed that are jobs if the conditions hold, in canonical form.
@@ -181,19 +223,31 @@ impl Sweep {
 
     /// Walks through these points of a grid with this many rows of each axis, past points that repeat an earlier one.
     /// Yields canonical points with their numbers.
-    fn walk(&self, counts: Vec<u64>, points: Range<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
+    fn walk(
+        &self,
+        counts: Vec<u64>,
+        points: Range<u64>,
+    ) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
         let mut rows = vec![0; counts.len()];
         points.filter_map(move |number| {
             find_rows(number, &counts, &mut rows);
             let point = self.point(&rows);
-            let is_first = || self.axes.iter().zip(&rows).all(|(axis, &row)| axis.is_first(row));
+            let is_first = || {
+                self.axes
+                    .iter()
+                    .zip(&rows)
+                    .all(|(axis, &row)| axis.is_first(row))
+            };
             (point.is_modulated() || is_first()).then(|| (number, point.canonical()))
         })
     }
 
     /// The point of these rows, as the axes set it.
     pub(super) fn point(&self, rows: &[u64]) -> Point {
-        let mut point = Point { parameters: self.base.clone(), fixes_period: None };
+        let mut point = Point {
+            parameters: self.base.clone(),
+            fixes_period: None,
+        };
         for (axis, &row) in self.axes.iter().zip(rows) {
             axis.apply(row, &mut point);
         }
@@ -202,7 +256,9 @@ impl Sweep {
 
     /// Whether a canonical point fulfils the conditions.
     fn admits(&self, point: &Point) -> bool {
-        self.conditions.iter().all(|condition| condition.evaluate(&|&quantity| point.number(quantity)) == 1.0)
+        self.conditions
+            .iter()
+            .all(|condition| condition.evaluate(&|&quantity| point.number(quantity)) == 1.0)
     }
 }
 

@@ -35,7 +35,10 @@ fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
             ("resolve", resolve.word().to_owned()),
         ],
         Solver::FixedStep { time_step } => {
-            vec![("method", "fixed-step".to_owned()), ("dt", Shortest(time_step).to_string())]
+            vec![
+                ("method", "fixed-step".to_owned()),
+                ("dt", Shortest(time_step).to_string()),
+            ]
         }
     }
 }
@@ -46,18 +49,30 @@ impl Sweep {
     pub fn command(&self, job: &Job) -> String {
         let mut words = vec!["stickslip simulate".to_owned()];
         let defaults = Parameters::default();
-        let parameters = Symbol::ALL.into_iter().map(|symbol| (symbol, job.parameters.get(symbol)));
-        let parameters = parameters.filter(|(symbol, value)| *value != defaults.get(*symbol) && *value != Value::Null);
+        let parameters = Symbol::ALL
+            .into_iter()
+            .map(|symbol| (symbol, job.parameters.get(symbol)));
+        let parameters = parameters
+            .filter(|(symbol, value)| *value != defaults.get(*symbol) && *value != Value::Null);
         words.extend(parameters.map(|(symbol, value)| format!("--set {}={value}", symbol.key())));
         // Its default is another there.
         words.push(format!("--slips {}", self.recording.slips));
         // A single job has no control.
-        let defaults =
-            Recording { slips: self.recording.slips, control: self.recording.control, ..Recording::default() };
-        let recording = RecordingKey::ALL.into_iter().filter(|&key| self.recording.get(key) != defaults.get(key));
-        words.extend(recording.map(|key| format!("--record {}={}", key.key(), self.recording.get(key))));
+        let defaults = Recording {
+            slips: self.recording.slips,
+            control: self.recording.control,
+            ..Recording::default()
+        };
+        let recording = RecordingKey::ALL
+            .into_iter()
+            .filter(|&key| self.recording.get(key) != defaults.get(key));
+        words.extend(
+            recording.map(|key| format!("--record {}={}", key.key(), self.recording.get(key))),
+        );
         let defaults = solver_settings(Solver::default());
-        let settings = solver_settings(self.solver).into_iter().filter(|setting| !defaults.contains(setting));
+        let settings = solver_settings(self.solver)
+            .into_iter()
+            .filter(|setting| !defaults.contains(setting));
         words.extend(settings.map(|(key, value)| format!("--set {key}={value}")));
         words.join(" ")
     }
@@ -65,12 +80,32 @@ impl Sweep {
 
 /// Those of the solver and the recording, but for the longest time, the budget of events and the controls: they change no
 /// job that ends by itself, and always count as the default.
-pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<Item = (String, String)> + use<> {
+pub(super) fn settings(
+    solver: Solver,
+    recording: &Recording,
+) -> impl Iterator<Item = (String, String)> + use<> {
     let default = Recording::default();
-    let Recording { max_time, max_events, control, .. } = default;
-    let recording = Recording { max_time, max_events, control, ..*recording };
-    let solver = solver_settings(solver).into_iter().map(|(key, value)| (format!("solver.{key}"), value));
-    solver.chain(RecordingKey::ALL.map(|key| (format!("record.{}", key.key()), recording.get(key).to_string())))
+    let Recording {
+        max_time,
+        max_events,
+        control,
+        ..
+    } = default;
+    let recording = Recording {
+        max_time,
+        max_events,
+        control,
+        ..*recording
+    };
+    let solver = solver_settings(solver)
+        .into_iter()
+        .map(|(key, value)| (format!("solver.{key}"), value));
+    solver.chain(RecordingKey::ALL.map(|key| {
+        (
+            format!("record.{}", key.key()),
+            recording.get(key).to_string(),
+        )
+    }))
 }
 
 /// Gives jobs their ids, of 32 hexadecimal characters: all that they share is hashed once.
@@ -86,11 +121,18 @@ impl Identity {
     }
 
     /// The same of a program with another version of the model or scheme of random numbers.
-    pub fn of_versions(model_version: u32, rng_scheme: &str, solver: Solver, recording: &Recording) -> Self {
+    pub fn of_versions(
+        model_version: u32,
+        rng_scheme: &str,
+        solver: Solver,
+        recording: &Recording,
+    ) -> Self {
         let mut shared = Sha256::new();
         shared.update(format!("model={model_version}\nrng={rng_scheme}\n"));
         let defaults: Vec<_> = settings(Solver::default(), &Recording::default()).collect();
-        for (key, value) in settings(solver, recording).filter(|setting| !defaults.contains(setting)) {
+        for (key, value) in
+            settings(solver, recording).filter(|setting| !defaults.contains(setting))
+        {
             shared.update(format!("{key}={value}\n"));
         }
         Self { shared }
@@ -103,7 +145,10 @@ impl Identity {
 
     /// The id of the set that such a job belongs to.
     pub fn set(&self, parameters: &Parameters) -> String {
-        self.hash(parameters, Symbol::ALL.split_last().map_or(&[], |(_, others)| others))
+        self.hash(
+            parameters,
+            Symbol::ALL.split_last().map_or(&[], |(_, others)| others),
+        )
     }
 
     fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> String {
@@ -146,9 +191,18 @@ mod tests {
             ..Parameters::default()
         };
         let default = Identity::new(Solver::default(), &Recording::default());
-        assert_eq!(default.job(&Parameters::default()), "bab35d576d47772b9e873ad5feec74a9");
-        assert_eq!(identity().job(&modulated), "c1c5713d6c70a765d8aecf2654bff0c4");
-        assert_eq!(identity().set(&modulated), "65055c1b1d57b93a6d5536d6da740b90");
+        assert_eq!(
+            default.job(&Parameters::default()),
+            "bab35d576d47772b9e873ad5feec74a9"
+        );
+        assert_eq!(
+            identity().job(&modulated),
+            "c1c5713d6c70a765d8aecf2654bff0c4"
+        );
+        assert_eq!(
+            identity().set(&modulated),
+            "65055c1b1d57b93a6d5536d6da740b90"
+        );
     }
 
     #[test]
@@ -156,8 +210,10 @@ mod tests {
         // What is at its default is no part of an id: with another default an id would name another job. Change one, and
         // raise MODEL_VERSION; what is added is added here alone.
         let defaults = Parameters::default();
-        let parameters = Symbol::ALL.map(|symbol| format!("{}={}", symbol.key(), defaults.get(symbol)));
-        let settings = settings(Solver::default(), &Recording::default()).map(|(key, value)| format!("{key}={value}"));
+        let parameters =
+            Symbol::ALL.map(|symbol| format!("{}={}", symbol.key(), defaults.get(symbol)));
+        let settings = settings(Solver::default(), &Recording::default())
+            .map(|(key, value)| format!("{key}={value}"));
         let defaults: Vec<String> = parameters.into_iter().chain(settings).collect();
         assert_eq!(
             (MODEL_VERSION, defaults.join(" ").as_str()),
@@ -201,16 +257,27 @@ mod tests {
     #[test]
     fn solver_and_recording_but_for_bounds_change_every_id() {
         let mut recordings = vec![Recording::default()];
-        let bounded = Recording { max_time: Some(7.0), max_events: 7, control: true, ..Recording::default() };
+        let bounded = Recording {
+            max_time: Some(7.0),
+            max_events: 7,
+            control: true,
+            ..Recording::default()
+        };
         let solver = Solver::FixedStep { time_step: 1e-6 };
         let id = |recording| Identity::new(solver, recording).job(&Parameters::default());
         assert_eq!(id(&bounded), id(&Recording::default()));
-        for key in RecordingKey::ALL
-            .into_iter()
-            .filter(|key| !matches!(key, RecordingKey::MaxTime | RecordingKey::MaxEvents | RecordingKey::Control))
-        {
+        for key in RecordingKey::ALL.into_iter().filter(|key| {
+            !matches!(
+                key,
+                RecordingKey::MaxTime | RecordingKey::MaxEvents | RecordingKey::Control
+            )
+        }) {
             let before = recordings.len();
-            for value in [Value::Real(7.0), Value::Real(7.0_f64.next_up()), Value::Flag(true)] {
+            for value in [
+                Value::Real(7.0),
+                Value::Real(7.0_f64.next_up()),
+                Value::Flag(true),
+            ] {
                 let mut other = Recording::default();
                 recordings.extend(other.put(key, value).map(|()| other));
             }

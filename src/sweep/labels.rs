@@ -22,21 +22,53 @@ const LABELS: [(&str, &str, &str); 31] = [
     ("periods_mean", "⟨τ/T⟩", "Mean interval in periods"),
     ("periods", "n", "Periods per slip"),
     ("locking_index", "locking", "Locking index of τ"),
-    ("locking_index_drive", "locking, drive", "Locking index by the drive alone"),
-    ("locking_index_excess", "locking, excess", "Locking index beyond the drive's"),
+    (
+        "locking_index_drive",
+        "locking, drive",
+        "Locking index by the drive alone",
+    ),
+    (
+        "locking_index_excess",
+        "locking, excess",
+        "Locking index beyond the drive's",
+    ),
     ("phase_mean", "⟨φ⟩", "Mean phase"),
     ("resultant_length", "R", "Resultant length of the phase"),
-    ("resultant_drive", "R, drive", "Resultant length by the drive alone"),
-    ("resultant_excess", "R, excess", "Resultant length beyond the drive's"),
-    ("expected_resultant", "R, random loads", "Resultant length at random loads"),
+    (
+        "resultant_drive",
+        "R, drive",
+        "Resultant length by the drive alone",
+    ),
+    (
+        "resultant_excess",
+        "R, excess",
+        "Resultant length beyond the drive's",
+    ),
+    (
+        "expected_resultant",
+        "R, random loads",
+        "Resultant length at random loads",
+    ),
     ("drop_mean", "⟨ΔF⟩", ""),
     ("drop_sd", "σ(ΔF)", "S.d. of the stress drop"),
     ("peak_force_mean", "⟨F⟩ at onsets", "Mean peak force"),
     ("mean_friction", "⟨Fₛ⟩", "Mean friction"),
     ("friction_coefficient", "μ", "Friction coefficient"),
-    ("edge_distance_mean", "edge distance", "Mean slip distance of the driven edge"),
-    ("least_attached_mean", "least attached", "Least attached contacts in a slip"),
-    ("slow_front_speed_mean", "slow fronts", "Mean speed of slow fronts"),
+    (
+        "edge_distance_mean",
+        "edge distance",
+        "Mean slip distance of the driven edge",
+    ),
+    (
+        "least_attached_mean",
+        "least attached",
+        "Least attached contacts in a slip",
+    ),
+    (
+        "slow_front_speed_mean",
+        "slow fronts",
+        "Mean speed of slow fronts",
+    ),
 ];
 
 /// Longest meaning, in bytes, that is what a column is in a few words.
@@ -52,36 +84,66 @@ pub struct Label {
 }
 
 /// What ends the names of columns of intervals and of a comparison.
-const COMPARED: [(&str, &str); 5] =
-    [("_low", ", lower end"), ("_high", ", upper end"), ("_a", ", A"), ("_b", ", B"), ("_difference", ", B − A")];
+const COMPARED: [(&str, &str); 5] = [
+    ("_low", ", lower end"),
+    ("_high", ", upper end"),
+    ("_a", ", A"),
+    ("_b", ", B"),
+    ("_difference", ", B − A"),
+];
 
 /// The label of a column of the sets, or of a comparison of such; that of a formula has symbols in place of columns.
 pub fn label(column: &str) -> Label {
     for (end, words) in COMPARED {
         if let Some(column) = column.strip_suffix(end) {
             let Label { symbol, what, unit } = label(column);
-            return Label { symbol: symbol + words, what: what + words, unit };
+            return Label {
+                symbol: symbol + words,
+                what: what + words,
+                unit,
+            };
         }
     }
     let is_of_name = |letter: char| letter.is_alphanumeric() || letter == '_';
     if !column.chars().all(is_of_name) {
-        let words = column.split_inclusive(|letter| !is_of_name(letter)).map(|part| {
-            let name = part.trim_end_matches(|letter| !is_of_name(letter));
-            label(name).symbol + &part[name.len()..]
-        });
+        let words = column
+            .split_inclusive(|letter| !is_of_name(letter))
+            .map(|part| {
+                let name = part.trim_end_matches(|letter| !is_of_name(letter));
+                label(name).symbol + &part[name.len()..]
+            });
         let symbol: String = words.collect();
-        return Label { what: symbol.clone(), symbol, unit: "" };
+        return Label {
+            what: symbol.clone(),
+            symbol,
+            unit: "",
+        };
     }
     let known = LABELS.iter().find(|(key, ..)| *key == column);
     if let Some(symbol) = Symbol::from_key(column) {
         let Description { meaning, unit, .. } = symbol.description();
-        let what = known.map_or_else(|| meaning.split([',', ';']).next().unwrap_or_default(), |(.., what)| what);
-        return Label { symbol: symbol_of(symbol), what: capitalised(what), unit };
+        let what = known.map_or_else(
+            || meaning.split([',', ';']).next().unwrap_or_default(),
+            |(.., what)| what,
+        );
+        return Label {
+            symbol: symbol_of(symbol),
+            what: capitalised(what),
+            unit,
+        };
     }
-    let described = SetRow::columns().into_iter().find(|known| known.name == column);
-    let plain = column.strip_suffix("_mean").unwrap_or(column).replace('_', " ");
+    let described = SetRow::columns()
+        .into_iter()
+        .find(|known| known.name == column);
+    let plain = column
+        .strip_suffix("_mean")
+        .unwrap_or(column)
+        .replace('_', " ");
     let symbol = known.map_or_else(|| plain.clone(), |(_, symbol, _)| (*symbol).to_owned());
-    let meaning = described.as_ref().map(|column| column.meaning).filter(|meaning| meaning.len() <= LONGEST);
+    let meaning = described
+        .as_ref()
+        .map(|column| column.meaning)
+        .filter(|meaning| meaning.len() <= LONGEST);
     let what = match (known, meaning) {
         (Some((.., what)), _) if !what.is_empty() => (*what).to_owned(),
         (_, Some(meaning)) => capitalised(meaning),
@@ -108,8 +170,16 @@ impl Label {
     pub fn axis(&self, unit: &str) -> String {
         let Self { symbol, what, .. } = self;
         let mut words = symbol.split(|letter: char| !letter.is_ascii_lowercase());
-        let is_word = words.any(|word| word.len() > 2) || what.split(' ').any(|word| word == symbol);
-        with_unit(&if is_word { what.clone() } else { format!("{what} {symbol}") }, unit)
+        let is_word =
+            words.any(|word| word.len() > 2) || what.split(' ').any(|word| word == symbol);
+        with_unit(
+            &if is_word {
+                what.clone()
+            } else {
+                format!("{what} {symbol}")
+            },
+            unit,
+        )
     }
 
     /// The same with the symbol alone.
@@ -119,19 +189,33 @@ impl Label {
 
     /// The symbol and a value, in the unit in which it is read best.
     pub fn setting(&self, value: f64) -> String {
-        let (factor, unit) = if value == 0.0 { (1.0, "") } else { self.scale(value.abs()) };
-        format!("{} = {} {unit}", self.symbol, typeset(factor * value)).trim_end().to_owned()
+        let (factor, unit) = if value == 0.0 {
+            (1.0, "")
+        } else {
+            self.scale(value.abs())
+        };
+        format!("{} = {} {unit}", self.symbol, typeset(factor * value))
+            .trim_end()
+            .to_owned()
     }
 }
 
 fn with_unit(label: &str, unit: &str) -> String {
-    if unit.is_empty() { label.to_owned() } else { format!("{label} ({unit})") }
+    if unit.is_empty() {
+        label.to_owned()
+    } else {
+        format!("{label} ({unit})")
+    }
 }
 
 /// The symbol of a parameter in the paper, or its key, with the subscripts that there are letters for.
 pub fn symbol_of(symbol: Symbol) -> String {
     let description = symbol.description();
-    let name = if description.symbol.is_empty() { description.key } else { description.symbol };
+    let name = if description.symbol.is_empty() {
+        description.key
+    } else {
+        description.symbol
+    };
     match name.split_once('_') {
         Some((letter, "s")) => format!("{letter}ₛ"),
         Some((letter, "r")) => format!("{letter}ᵣ"),
@@ -144,7 +228,9 @@ pub fn symbol_of(symbol: Symbol) -> String {
 
 pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 /// Three digits, without those that say nothing.
@@ -154,22 +240,36 @@ pub fn three_digits(value: f64) -> String {
     }
     // Through the decimal form, so that 29.000000000000004 is 29.
     let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+    if (1e-3..1e5).contains(&rounded.abs()) {
+        rounded.to_string()
+    } else {
+        format!("{rounded:e}")
+    }
 }
 
 /// The same as in print: with a power of ten that is one, and a minus that is no hyphen.
 pub fn typeset(value: f64) -> String {
     match three_digits(value).split_once('e') {
-        Some((mantissa, power)) => power_of_ten(mantissa.parse().unwrap_or(1.0), power.parse().unwrap_or(0)),
+        Some((mantissa, power)) => {
+            power_of_ten(mantissa.parse().unwrap_or(1.0), power.parse().unwrap_or(0))
+        }
         None => three_digits(value).replace('-', "−"),
     }
 }
 
 pub fn power_of_ten(mantissa: f64, power: i32) -> String {
     const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let raised = |character: char| character.to_digit(10).map_or('⁻', |digit| RAISED[digit as usize]);
+    let raised = |character: char| {
+        character
+            .to_digit(10)
+            .map_or('⁻', |digit| RAISED[digit as usize])
+    };
     let power: String = power.to_string().chars().map(raised).collect();
-    if mantissa == 1.0 { format!("10{power}") } else { format!("{mantissa}·10{power}") }
+    if mantissa == 1.0 {
+        format!("10{power}")
+    } else {
+        format!("{mantissa}·10{power}")
+    }
 }
 
 #[cfg(test)]
@@ -180,7 +280,10 @@ mod tests {
     fn what_is_labelled_is_a_column_and_every_number_has_words() {
         let columns = SetRow::columns();
         for (key, ..) in LABELS {
-            assert!(key == "friction_coefficient" || columns.iter().any(|column| column.name == key), "{key}");
+            assert!(
+                key == "friction_coefficient" || columns.iter().any(|column| column.name == key),
+                "{key}"
+            );
         }
         for column in columns {
             let Label { symbol, what, unit } = label(&column.name);
@@ -194,22 +297,57 @@ mod tests {
     #[test]
     fn times_and_lengths_are_told_in_the_unit_that_suits_the_largest() {
         let scaled = |column: &str, largest| label(column).scale(largest);
-        assert_eq!((scaled("tau_mean", 0.1), scaled("tau_mean", 13.0)), ((1e3, "ms"), (1.0, "s")));
-        assert_eq!((scaled("Delta", 1e-6), scaled("V0", 1e-6)), ((1e6, "µm"), (1.0, "m/s")));
+        assert_eq!(
+            (scaled("tau_mean", 0.1), scaled("tau_mean", 13.0)),
+            ((1e3, "ms"), (1.0, "s"))
+        );
+        assert_eq!(
+            (scaled("Delta", 1e-6), scaled("V0", 1e-6)),
+            ((1e6, "µm"), (1.0, "m/s"))
+        );
         assert_eq!(label("tau_sd / (2 * tau_mean)").symbol, "σ(τ) / (2 * ⟨τ⟩)");
-        let settings = [("Delta", 1e-6), ("Delta", 0.0), ("T", 0.034), ("V0", 1e-4), ("T_to", 0.01)];
+        let settings = [
+            ("Delta", 1e-6),
+            ("Delta", 0.0),
+            ("T", 0.034),
+            ("V0", 1e-4),
+            ("T_to", 0.01),
+        ];
         let settings = settings.map(|(column, value)| label(column).setting(value));
-        assert_eq!(settings, ["Δ = 1 µm", "Δ = 0", "T = 34 ms", "V₀ = 10⁻⁴ m/s", "Tₜₒ = 10 ms"]);
+        assert_eq!(
+            settings,
+            [
+                "Δ = 1 µm",
+                "Δ = 0",
+                "T = 34 ms",
+                "V₀ = 10⁻⁴ m/s",
+                "Tₜₒ = 10 ms"
+            ]
+        );
     }
 
     #[test]
     fn axes_have_words_a_symbol_and_a_unit_each_once() {
         let axis = |column: &str, largest| label(column).axis(label(column).scale(largest).1);
-        let found = [("tau_mean", 0.1), ("Delta", 1e-6), ("eta", 9.0), ("V0", 1e-4), ("slip_share", 1.0)]
-            .map(|(column, largest)| axis(column, largest));
-        let expected = ["Mean interval ⟨τ⟩ (ms)", "Amplitude Δ (µm)", "η = 2πΔ / (T V₀)", "Drive velocity V₀ (m/s)"];
+        let found = [
+            ("tau_mean", 0.1),
+            ("Delta", 1e-6),
+            ("eta", 9.0),
+            ("V0", 1e-4),
+            ("slip_share", 1.0),
+        ]
+        .map(|(column, largest)| axis(column, largest));
+        let expected = [
+            "Mean interval ⟨τ⟩ (ms)",
+            "Amplitude Δ (µm)",
+            "η = 2πΔ / (T V₀)",
+            "Drive velocity V₀ (m/s)",
+        ];
         assert_eq!(found[..4], expected);
-        assert_eq!(axis("resultant_length", 1.0), "Resultant length of the phase R");
+        assert_eq!(
+            axis("resultant_length", 1.0),
+            "Resultant length of the phase R"
+        );
         assert_eq!(found[4], "Share of time within slips");
         assert_eq!(axis("mean_friction", 300.0), "Mean friction ⟨Fₛ⟩ (N)");
         assert_eq!(label("Delta").short("µm"), "Δ (µm)");

@@ -43,7 +43,9 @@ pub use grid::Sweep;
 pub use job::{Identity, Job};
 pub use labels::{Label, capitalised, label, power_of_ten, symbol_of, three_digits, typeset};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
-pub use rounds::{Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged};
+pub use rounds::{
+    Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
+};
 pub use set::{AllButSeed, STATISTICS, SetRow, Statistic};
 pub use source::{Mistake, SweepError, nearest};
 pub use variation::{Change, varied};

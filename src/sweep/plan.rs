@@ -101,18 +101,40 @@ impl Extension {
     }
 
     pub fn in_round(sweep: &Sweep, earlier: &[Self], round: Option<Round>) -> Self {
-        let mut own = Self { sweep: sweep.clone(), part_cost: 0.0, kept: None, round };
-        let total: f64 = own_jobs(&own, earlier, &sweep.points()).map(|job| job.cost).sum();
-        let least = if own.round.is_some() { ROUND_PART_COST } else { 0.0 };
-        own.part_cost = PART_COST.max(total / MANY_PARTS).min(least.max(total / MIN_PARTS)) * (1.0 + ROUNDING);
+        let mut own = Self {
+            sweep: sweep.clone(),
+            part_cost: 0.0,
+            kept: None,
+            round,
+        };
+        let total: f64 = own_jobs(&own, earlier, &sweep.points())
+            .map(|job| job.cost)
+            .sum();
+        let least = if own.round.is_some() {
+            ROUND_PART_COST
+        } else {
+            0.0
+        };
+        own.part_cost = PART_COST
+            .max(total / MANY_PARTS)
+            .min(least.max(total / MIN_PARTS))
+            * (1.0 + ROUNDING);
         own
     }
 
     fn points(&self, among: &Range<u64>) -> Vec<Range<u64>> {
-        let Some(round) = &self.round else { return vec![among.clone()] };
-        let from = round.points.partition_point(|range| *range.end() < among.start);
-        let ranges = round.points[from..].iter().take_while(|range| *range.start() < among.end);
-        ranges.map(|range| among.start.max(*range.start())..among.end.min(range.end() + 1)).collect()
+        let Some(round) = &self.round else {
+            return vec![among.clone()];
+        };
+        let from = round
+            .points
+            .partition_point(|range| *range.end() < among.start);
+        let ranges = round.points[from..]
+            .iter()
+            .take_while(|range| *range.start() < among.end);
+        ranges
+            .map(|range| among.start.max(*range.start())..among.end.min(range.end() + 1))
+            .collect()
     }
 
     /// Whether it keeps a point of its grid.
@@ -129,9 +151,15 @@ fn own_jobs<'a>(
     among: &Range<u64>,
 ) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
     let is_kept = |extension: &Extension, job: &Job| {
-        extension.sweep.find(&job.parameters).is_some_and(|point| extension.keeps(point))
+        extension
+            .sweep
+            .find(&job.parameters)
+            .is_some_and(|point| extension.keeps(point))
     };
-    let jobs = own.points(among).into_iter().flat_map(|points| own.sweep.jobs_at(points));
+    let jobs = own
+        .points(among)
+        .into_iter()
+        .flat_map(|points| own.sweep.jobs_at(points));
     jobs.filter(move |job| !earlier.iter().any(|extension| is_kept(extension, job)))
 }
 
@@ -144,16 +172,28 @@ impl<'a> Plan<'a> {
     /// The parts of an extension, in order.
     pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
         let own = &self.extensions[extension];
-        let mut source = own_jobs(own, &self.extensions[..extension], &own.sweep.points()).peekable();
+        let mut source =
+            own_jobs(own, &self.extensions[..extension], &own.sweep.points()).peekable();
         let parts = (0..).map_while(move |index| {
             let (mut jobs, mut cost) = (Vec::new(), 0.0);
-            let fits = |jobs: &[Job], cost: f64| jobs.is_empty() || (jobs.len() < PART_JOBS && cost <= own.part_cost);
+            let fits = |jobs: &[Job], cost: f64| {
+                jobs.is_empty() || (jobs.len() < PART_JOBS && cost <= own.part_cost)
+            };
             while let Some(job) = source.next_if(|job| fits(&jobs, cost + job.cost)) {
                 cost += job.cost;
                 jobs.push(job);
             }
             let points = jobs.first()?.point..=jobs.last()?.point;
-            Some(Part { outline: Outline { extension, index, points, job_count: jobs.len(), cost }, jobs })
+            Some(Part {
+                outline: Outline {
+                    extension,
+                    index,
+                    points,
+                    job_count: jobs.len(),
+                    cost,
+                },
+                jobs,
+            })
         });
         parts.filter(|part| own.keeps(*part.points.start()))
     }
@@ -170,18 +210,30 @@ impl<'a> Plan<'a> {
 
     /// The part of an outline, whose points alone are walked through.
     pub fn part(self, outline: &Outline) -> Part {
-        let (own, earlier) = (&self.extensions[outline.extension], &self.extensions[..outline.extension]);
+        let (own, earlier) = (
+            &self.extensions[outline.extension],
+            &self.extensions[..outline.extension],
+        );
         let points = *outline.points.start()..outline.points.end() + 1;
-        Part { outline: outline.clone(), jobs: own_jobs(own, earlier, &points).collect() }
+        Part {
+            outline: outline.clone(),
+            jobs: own_jobs(own, earlier, &points).collect(),
+        }
     }
 
     /// Where in the grid those parts of an extension lie that are to be kept.
-    pub fn ranges(self, extension: usize, is_kept: impl Fn(&Part) -> bool) -> Vec<RangeInclusive<u64>> {
+    pub fn ranges(
+        self,
+        extension: usize,
+        is_kept: impl Fn(&Part) -> bool,
+    ) -> Vec<RangeInclusive<u64>> {
         let mut ranges: Vec<RangeInclusive<u64>> = Vec::new();
         let mut next = None;
         for part in self.parts_of(extension).filter(is_kept) {
             match ranges.last_mut() {
-                Some(range) if next == Some(part.index) => *range = *range.start()..=*part.points.end(),
+                Some(range) if next == Some(part.index) => {
+                    *range = *range.start()..=*part.points.end()
+                }
                 _ => ranges.push(part.points.clone()),
             }
             next = Some(part.index + 1);
@@ -192,15 +244,22 @@ impl<'a> Plan<'a> {
     /// Walks through the plan and adds up.
     pub fn totals(self) -> Totals {
         self.parts().fold(Totals::default(), |totals, part| {
-            let Recording { slips, max_time, .. } = *self.extensions[part.extension].sweep.recording();
+            let Recording {
+                slips, max_time, ..
+            } = *self.extensions[part.extension].sweep.recording();
             let jobs = part.jobs.iter().map(|job| &job.parameters);
             let in_time = |job| max_time.map_or(f64::INFINITY, |time| time / typical_interval(job));
             Totals {
                 jobs: totals.jobs + part.job_count as u64,
                 parts: totals.parts + 1,
                 cost: totals.cost + part.cost,
-                contacts: jobs.clone().map(|job| job.blocks * job.contacts_per_block).fold(totals.contacts, usize::max),
-                slips_of_part: totals.slips_of_part.max(jobs.map(|job| in_time(job).min(slips as f64)).sum()),
+                contacts: jobs
+                    .clone()
+                    .map(|job| job.blocks * job.contacts_per_block)
+                    .fold(totals.contacts, usize::max),
+                slips_of_part: totals
+                    .slips_of_part
+                    .max(jobs.map(|job| in_time(job).min(slips as f64)).sum()),
             }
         })
     }

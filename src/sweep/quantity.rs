@@ -34,7 +34,10 @@ impl Quantity {
     }
 
     pub fn all() -> impl Iterator<Item = Self> {
-        Symbol::ALL.into_iter().map(Self::Parameter).chain([Self::Eta, Self::Frequency])
+        Symbol::ALL
+            .into_iter()
+            .map(Self::Parameter)
+            .chain([Self::Eta, Self::Frequency])
     }
 
     pub fn from_key(key: &str) -> Option<Self> {
@@ -44,9 +47,9 @@ impl Quantity {
     /// That of a name in a condition.
     pub fn comparable(name: &str) -> Result<Self, String> {
         match Self::from_key(name) {
-            Some(Self::BREAK_ON) => {
-                Err("break_on is a word and cannot be compared; choose its values on an axis".into())
-            }
+            Some(Self::BREAK_ON) => Err(
+                "break_on is a word and cannot be compared; choose its values on an axis".into(),
+            ),
             Some(quantity) => Ok(quantity),
             None => {
                 let numbers = Self::all().filter(|quantity| *quantity != Self::BREAK_ON);
@@ -58,13 +61,18 @@ impl Quantity {
 
     /// Whether it fixes the period T, and so means nothing without modulation.
     pub const fn is_period(self) -> bool {
-        matches!(self, Self::Parameter(Symbol::T) | Self::Eta | Self::Frequency)
+        matches!(
+            self,
+            Self::Parameter(Symbol::T) | Self::Eta | Self::Frequency
+        )
     }
 
     /// The period T in s that a value of a quantity that fixes it leads to. Monotonic in the value.
     pub fn period(self, value: f64, parameters: &Parameters) -> f64 {
         match self {
-            Self::Eta => TAU * parameters.modulation_amplitude / (value * parameters.drive_velocity),
+            Self::Eta => {
+                TAU * parameters.modulation_amplitude / (value * parameters.drive_velocity)
+            }
             Self::Frequency => 1.0 / value,
             Self::Parameter(_) => value,
         }
@@ -88,7 +96,10 @@ impl Quantity {
     pub fn checked(self, value: Value) -> Option<Value> {
         match self {
             Self::Parameter(symbol) => symbol.checked(value),
-            Self::Eta | Self::Frequency => value.number().filter(|number| DERIVABLE.contains(number)).map(Value::Real),
+            Self::Eta | Self::Frequency => value
+                .number()
+                .filter(|number| DERIVABLE.contains(number))
+                .map(Value::Real),
         }
     }
 }
@@ -129,10 +140,17 @@ impl Point {
 
     /// Whether every quantity behind a derived period, and the period, is far from the ends of the doubles.
     pub fn period_is_derivable(&self) -> bool {
-        let Parameters { modulation_amplitude, drive_velocity, modulation_period, .. } = self.parameters;
+        let Parameters {
+            modulation_amplitude,
+            drive_velocity,
+            modulation_period,
+            ..
+        } = self.parameters;
         match (self.fixes_period, modulation_period) {
             (Some((Quantity::Eta, _)), Some(period)) => {
-                [modulation_amplitude, drive_velocity, period].iter().all(|value| DERIVABLE.contains(value))
+                [modulation_amplitude, drive_velocity, period]
+                    .iter()
+                    .all(|value| DERIVABLE.contains(value))
             }
             _ => true,
         }
@@ -144,9 +162,16 @@ impl Point {
         match (quantity, self.fixes_period) {
             (_, Some((fixing, value))) if fixing == quantity && self.is_modulated() => value,
             (Quantity::Eta, _) => self.parameters.eta(),
-            (Quantity::Frequency, _) => self.parameters.modulation_period.map_or(0.0, |period| 1.0 / period),
-            (Quantity::Parameter(Symbol::T), _) => self.parameters.modulation_period.unwrap_or(f64::INFINITY),
-            (Quantity::Parameter(symbol), _) => self.parameters.get(symbol).number().unwrap_or(f64::NAN),
+            (Quantity::Frequency, _) => self
+                .parameters
+                .modulation_period
+                .map_or(0.0, |period| 1.0 / period),
+            (Quantity::Parameter(Symbol::T), _) => {
+                self.parameters.modulation_period.unwrap_or(f64::INFINITY)
+            }
+            (Quantity::Parameter(symbol), _) => {
+                self.parameters.get(symbol).number().unwrap_or(f64::NAN)
+            }
         }
     }
 }

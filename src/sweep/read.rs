@@ -26,10 +26,20 @@ const MAX_NAME: usize = 100;
 
 impl Sweep {
     pub fn from_file(path: &Path) -> Result<Self, SweepError> {
-        let text = Disk.read(path).map_err(|error| error.source).and_then(|bytes| {
-            String::from_utf8(bytes).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
-        });
-        Self::parse(&text.map_err(|source| SweepError::Unreadable { path: path.to_owned(), source })?, path)
+        let text = Disk
+            .read(path)
+            .map_err(|error| error.source)
+            .and_then(|bytes| {
+                String::from_utf8(bytes)
+                    .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
+            });
+        Self::parse(
+            &text.map_err(|source| SweepError::Unreadable {
+                path: path.to_owned(),
+                source,
+            })?,
+            path,
+        )
     }
 
     /// Reads the text of a sweep file; the path is for messages only.
@@ -42,23 +52,52 @@ impl Sweep {
 /// Reads all of a file, as far as it goes.
 fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     let table = source.table()?;
-    let file = Section { source, title: "the file", at: 0, table: &table };
-    file.only(&["name", "where", "model", "axes", "record", "solver", "precision", "refine"]).ok();
+    let file = Section {
+        source,
+        title: "the file",
+        at: 0,
+        table: &table,
+    };
+    file.only(&[
+        "name",
+        "where",
+        "model",
+        "axes",
+        "record",
+        "solver",
+        "precision",
+        "refine",
+    ])
+    .ok();
     let name = read_name(&file);
     let mut places = Places::new(source);
-    let model = read_section(&file, "model", "[model]", |model| read_model(model, &mut places));
-    let wanted = read_section(&file, "refine", "[refine]", |refine| read_refinement(refine).map(Some));
-    let axes = read_section(&file, "axes", "[axes]", |axes| read_axes::read(axes, &mut places));
-    let precision = read_section(&file, "precision", "[precision]", |precision| read_precision(precision).map(Some));
-    let (key, title) =
-        if file.entry("refine").is_some() { ("refine", "[refine]") } else { ("precision", "[precision]") };
-    let seeds = read_section(&file, key, title, |section| read_seeds(section, &mut places).map(Some));
+    let model = read_section(&file, "model", "[model]", |model| {
+        read_model(model, &mut places)
+    });
+    let wanted = read_section(&file, "refine", "[refine]", |refine| {
+        read_refinement(refine).map(Some)
+    });
+    let axes = read_section(&file, "axes", "[axes]", |axes| {
+        read_axes::read(axes, &mut places)
+    });
+    let precision = read_section(&file, "precision", "[precision]", |precision| {
+        read_precision(precision).map(Some)
+    });
+    let (key, title) = if file.entry("refine").is_some() {
+        ("refine", "[refine]")
+    } else {
+        ("precision", "[precision]")
+    };
+    let seeds = read_section(&file, key, title, |section| {
+        read_seeds(section, &mut places).map(Some)
+    });
     if let (Some(_), Some(precision)) = (file.entry("refine"), file.entry("precision")) {
-        let problem =
-            "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
+        let problem = "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
         source.refuse(precision.at, problem);
     }
-    let conditions = file.entry("where").map_or(Ok(Vec::new()), |entry| read_conditions(&entry));
+    let conditions = file
+        .entry("where")
+        .map_or(Ok(Vec::new()), |entry| read_conditions(&entry));
     let recording = read_section(&file, "record", "[record]", read_recording);
     let solver = read_section(&file, "solver", "[solver]", read_solver);
     source.passed()?;
@@ -66,25 +105,55 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     let (wanted, precision) = (wanted?, precision?);
     let mut axes: Vec<Axis> = period.into_iter().chain(axes?).collect();
     let swept = || file.entry("axes").and_then(|entry| entry.section("[axes]"));
-    let refinement = wanted.as_ref().map(|wanted| wanted.over(&mut axes, swept())).transpose()?;
-    let rounds = |(seeds, asked, axis)| (Rounds { seeds, asked, precision, refinement }, axis);
+    let refinement = wanted
+        .as_ref()
+        .map(|wanted| wanted.over(&mut axes, swept()))
+        .transpose()?;
+    let rounds = |(seeds, asked, axis)| {
+        (
+            Rounds {
+                seeds,
+                asked,
+                precision,
+                refinement,
+            },
+            axis,
+        )
+    };
     let (rounds, seeds) = seeds?.map(rounds).unzip();
     let axes = axes.into_iter().chain(seeds).collect();
     let identity = Identity::new(solver, &recording);
     let (name, conditions, text) = (name?, conditions?, source.text.to_owned());
-    let mut sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity, rounds, controls: None };
+    let mut sweep = Sweep {
+        name,
+        text,
+        base,
+        axes,
+        conditions,
+        recording,
+        solver,
+        identity,
+        rounds,
+        controls: None,
+    };
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places)?;
     if let Some(Rounds { seeds, .. }) = &sweep.rounds {
         let sets = sweep.first_sets().len() as u64;
         if sets > MAX_SETS {
-            let problem =
-                format!("[axes]: {sets} sets; a sweep with rounds has at most {MAX_SETS}; take several sweeps");
+            let problem = format!(
+                "[axes]: {sets} sets; a sweep with rounds has at most {MAX_SETS}; take several sweeps"
+            );
             return Err(source.refuse(file.place_of("axes"), problem));
         }
         let least = sets * seeds.start();
-        if let Some(wanted) = wanted.as_ref().filter(|wanted| wanted.refinement.max_jobs < least) {
-            return Err(wanted.jobs.must_be(&format!("at least the {least} of the first round")));
+        if let Some(wanted) = wanted
+            .as_ref()
+            .filter(|wanted| wanted.refinement.max_jobs < least)
+        {
+            return Err(wanted
+                .jobs
+                .must_be(&format!("at least the {least} of the first round")));
         }
     }
     Ok(sweep)
@@ -99,14 +168,24 @@ fn read_section<'a, T: Default>(
 ) -> Result<T, Refused> {
     match file.entry(key) {
         None => Ok(T::default()),
-        Some(entry) => read(&entry.section(title).ok_or_else(|| entry.must_be(&format!("a table {title}")))?),
+        Some(entry) => read(
+            &entry
+                .section(title)
+                .ok_or_else(|| entry.must_be(&format!("a table {title}")))?,
+        ),
     }
 }
 
 fn read_name(file: &Section<'_>) -> Result<String, Refused> {
     // A name within a section is refused as misplaced; it is not missing, too.
-    let misplaced =
-        |table: Entry<'_>| Some(table.section("")?.entry("name")?.unknown(&format!("[{}]", table.key), &[]));
+    let misplaced = |table: Entry<'_>| {
+        Some(
+            table
+                .section("")?
+                .entry("name")?
+                .unknown(&format!("[{}]", table.key), &[]),
+        )
+    };
     if file.entry("name").is_none()
         && let Some(refused) = file.entries().into_iter().find_map(misplaced)
     {
@@ -115,28 +194,42 @@ fn read_name(file: &Section<'_>) -> Result<String, Refused> {
     let entry = file.required("name", "it becomes a folder, such as name = \"fig3\"")?;
     let allowed = |name: &&str| {
         let characters = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        (1..=MAX_NAME).contains(&name.len()) && name.chars().all(characters) && !name.starts_with('-')
+        (1..=MAX_NAME).contains(&name.len())
+            && name.chars().all(characters)
+            && !name.starts_with('-')
     };
     let name = entry.word().filter(allowed).map(str::to_owned);
     name.ok_or_else(|| {
-        entry.must_be(&format!("1 to {MAX_NAME} letters, digits, _ and - in quotes, not with - in front"))
+        entry.must_be(&format!(
+            "1 to {MAX_NAME} letters, digits, _ and - in quotes, not with - in front"
+        ))
     })
 }
 
 /// Reads the parameters, and η or the frequency as an axis of one value.
-fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameters, Option<Axis>), Refused> {
+fn read_model(
+    model: &Section<'_>,
+    places: &mut Places<'_>,
+) -> Result<(Parameters, Option<Axis>), Refused> {
     let keys: Vec<&str> = Quantity::all().map(Quantity::key).collect();
     let (mut parameters, mut period) = (Parameters::default(), None);
     all(model.entries().iter().map(|entry| {
-        let quantity = Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
+        let quantity =
+            Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
         places.set(quantity, entry.at, model.title);
         let value = read_axes::read_value(entry, quantity)?;
         match quantity {
             Quantity::Parameter(symbol) => {
-                parameters.put(symbol, value).ok_or_else(|| entry.must_be(&symbol.description().allowed()))?;
+                parameters
+                    .put(symbol, value)
+                    .ok_or_else(|| entry.must_be(&symbol.description().allowed()))?;
             }
             Quantity::Eta | Quantity::Frequency => {
-                period = Axis::table(vec![Column { quantity, values: vec![value] }]).ok();
+                period = Axis::table(vec![Column {
+                    quantity,
+                    values: vec![value],
+                }])
+                .ok();
             }
         }
         Ok(())
@@ -145,21 +238,31 @@ fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameter
 }
 
 fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Expression<Quantity>>, Refused> {
-    all(entry.list().unwrap_or_else(|| vec![*entry]).iter().map(|entry| {
-        let text = entry.word().ok_or_else(|| {
-            entry.must_be("a condition in quotes, or a list of them, such as where = \"frequency < 500\"")
-        })?;
-        Expression::condition(text, &Quantity::comparable).map_err(|error| entry.refuse(error.to_string()))
-    }))
+    all(entry
+        .list()
+        .unwrap_or_else(|| vec![*entry])
+        .iter()
+        .map(|entry| {
+            let text = entry.word().ok_or_else(|| {
+                entry.must_be(
+                    "a condition in quotes, or a list of them, such as where = \"frequency < 500\"",
+                )
+            })?;
+            Expression::condition(text, &Quantity::comparable)
+                .map_err(|error| entry.refuse(error.to_string()))
+        }))
 }
 
 fn read_recording(record: &Section<'_>) -> Result<Recording, Refused> {
     let keys = RecordingKey::ALL.map(RecordingKey::key);
     let mut recording = Recording::default();
     all(record.entries().iter().map(|entry| {
-        let key = RecordingKey::from_key(entry.key).ok_or_else(|| entry.unknown(record.title, &keys))?;
+        let key =
+            RecordingKey::from_key(entry.key).ok_or_else(|| entry.unknown(record.title, &keys))?;
         let value = entry.value().and_then(|value| key.checked(value));
-        value.and_then(|value| recording.put(key, value)).ok_or_else(|| entry.must_be(&key.description().allowed()))
+        value
+            .and_then(|value| recording.put(key, value))
+            .ok_or_else(|| entry.must_be(&key.description().allowed()))
     }))?;
     Ok(recording)
 }
@@ -175,18 +278,27 @@ fn read_solver(solver: &Section<'_>) -> Result<Solver, Refused> {
             let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
             let allowed = format!("a number from {min:e} to {max:e}, relative to fs/k");
             let fits = |tolerance| TOLERANCES.contains(&tolerance);
-            let tolerance = solver.entry("tolerance").map_or(Ok(tolerance), |entry| entry.number(&allowed, fits));
+            let tolerance = solver
+                .entry("tolerance")
+                .map_or(Ok(tolerance), |entry| entry.number(&allowed, fits));
             let resolve = solver.entry("resolve").map_or(Ok(resolve), |entry| {
                 let word = entry.word().and_then(Resolve::from_word);
                 word.ok_or_else(|| entry.must_be("\"auto\", \"grid\" or \"taylor\""))
             });
-            Ok(Solver::EventDriven { tolerance: tolerance?, resolve: resolve? })
+            Ok(Solver::EventDriven {
+                tolerance: tolerance?,
+                resolve: resolve?,
+            })
         }
         Some("fixed-step") => {
             solver.only(&["method", "dt"]).ok();
-            let time_step = solver.required("dt", "the fixed step in s, such as dt = 1e-6")?.positive("s")?;
+            let time_step = solver
+                .required("dt", "the fixed step in s, such as dt = 1e-6")?
+                .positive("s")?;
             Ok(Solver::FixedStep { time_step })
         }
-        _ => Err(solver.required("method", "")?.must_be("\"event-driven\" or \"fixed-step\"")),
+        _ => Err(solver
+            .required("method", "")?
+            .must_be("\"event-driven\" or \"fixed-step\"")),
     }
 }

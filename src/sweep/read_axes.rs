@@ -18,9 +18,9 @@ use super::samples::{Range, Sample};
 use super::source::{Entry, Refused, Section, all};
 use crate::model::Value;
 
-const RANGE_FORMS: &str = "{ linear = [low, high], points = n } or { log = [low, high], points = n }";
-const AXIS_FORMS: &str =
-    "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
+const RANGE_FORMS: &str =
+    "{ linear = [low, high], points = n } or { log = [low, high], points = n }";
+const AXIS_FORMS: &str = "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
 const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in a sample";
 
 type Keys = [&'static str];
@@ -30,11 +30,17 @@ pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec
     let axes = all(section.entries().iter().map(|entry| {
         let (title, read): (_, TableReader) = match entry.key {
             "zip" => ("[axes.zip]", read_zip),
-            "sobol" => ("[axes.sobol]", |table, places| read_sample(table, Sample::Sobol, places)),
-            "latin" => ("[axes.latin]", |table, places| read_sample(table, Sample::Latin, places)),
+            "sobol" => ("[axes.sobol]", |table, places| {
+                read_sample(table, Sample::Sobol, places)
+            }),
+            "latin" => ("[axes.latin]", |table, places| {
+                read_sample(table, Sample::Latin, places)
+            }),
             _ => return Ok(vec![read_single(entry, places)?]),
         };
-        all(tables(entry, title)?.iter().map(|table| read(table, places)))
+        all(tables(entry, title)?
+            .iter()
+            .map(|table| read(table, places)))
     }));
     Ok(axes?.into_iter().flatten().collect())
 }
@@ -43,15 +49,25 @@ pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec
 fn tables<'a>(entry: &Entry<'a>, title: &'static str) -> Result<Vec<Section<'a>>, Refused> {
     let entries = entry.list().unwrap_or_else(|| vec![*entry]);
     let table = |entry: &Entry<'a>| {
-        entry.section(title).ok_or_else(|| entry.must_be(&format!("a table {title} or several, [{title}]")))
+        entry
+            .section(title)
+            .ok_or_else(|| entry.must_be(&format!("a table {title} or several, [{title}]")))
     };
     all(entries.iter().map(table))
 }
 
 /// The quantity that an entry sets.
-fn known(entry: &Entry<'_>, title: &'static str, also: &Keys, places: &mut Places<'_>) -> Result<Quantity, Refused> {
+fn known(
+    entry: &Entry<'_>,
+    title: &'static str,
+    also: &Keys,
+    places: &mut Places<'_>,
+) -> Result<Quantity, Refused> {
     let quantity = Quantity::from_key(entry.key).ok_or_else(|| {
-        let allowed: Vec<&str> = Quantity::all().map(Quantity::key).chain(also.iter().copied()).collect();
+        let allowed: Vec<&str> = Quantity::all()
+            .map(Quantity::key)
+            .chain(also.iter().copied())
+            .collect();
         entry.unknown(title, &allowed)
     })?;
     places.set(quantity, entry.at, title);
@@ -60,11 +76,20 @@ fn known(entry: &Entry<'_>, title: &'static str, also: &Keys, places: &mut Place
 
 fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
     let quantity = known(entry, "[axes]", &["zip", "sobol", "latin"], places)?;
-    if let (Some((first, count)), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
-        return Ok(Axis::Counted { symbol, first, count });
+    if let (Some((first, count)), Quantity::Parameter(symbol)) =
+        (read_count(entry, quantity)?, quantity)
+    {
+        return Ok(Axis::Counted {
+            symbol,
+            first,
+            count,
+        });
     }
     let values = read_values(entry, quantity)?;
-    let column = Column { quantity, values: values.iter().map(|&(value, _)| value).collect() };
+    let column = Column {
+        quantity,
+        values: values.iter().map(|&(value, _)| value).collect(),
+    };
     Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
         let (value, at) = values[later];
         let (earlier, later) = (earlier + 1, later + 1);
@@ -84,59 +109,91 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
             return Err(entry.refuse("an axis needs at least one value"));
         }
         if list.len() as u64 > MAX_ROWS {
-            return Err(entry.refuse(format!("an axis has at most {MAX_ROWS} listed values; split it into two axes")));
+            return Err(entry.refuse(format!(
+                "an axis has at most {MAX_ROWS} listed values; split it into two axes"
+            )));
         }
-        return list.iter().map(|value| Ok((read_value(value, quantity)?, value.at))).collect();
+        return list
+            .iter()
+            .map(|value| Ok((read_value(value, quantity)?, value.at)))
+            .collect();
     }
     match read_count(entry, quantity)? {
         Some((_, count)) if count > MAX_ROWS => {
             let key = quantity.key();
-            return Err(entry.refuse(format!("a zip has at most {MAX_ROWS} rows; make {key} an axis of its own")));
+            return Err(entry.refuse(format!(
+                "a zip has at most {MAX_ROWS} rows; make {key} an axis of its own"
+            )));
         }
         Some((first, count)) => {
-            return Ok((first..first + count).map(|value| (Value::Count(value), entry.at)).collect());
+            return Ok((first..first + count)
+                .map(|value| (Value::Count(value), entry.at))
+                .collect());
         }
         None => {}
     }
     let (range, points) = read_spaced(entry, quantity)?;
-    Ok(range.spaced(points).map(|value| (ranged(quantity, value), entry.at)).collect())
+    Ok(range
+        .spaced(points)
+        .map(|value| (ranged(quantity, value), entry.at))
+        .collect())
 }
 
 /// Reads a range of an axis, and the number of its values.
 pub(super) fn read_spaced(entry: &Entry<'_>, quantity: Quantity) -> Result<(Range, u64), Refused> {
     let Some(table) = entry.section("an axis") else {
-        let setting =
-            if matches!(quantity, Quantity::Parameter(_)) { "; a single value belongs in [model]" } else { "" };
+        let setting = if matches!(quantity, Quantity::Parameter(_)) {
+            "; a single value belongs in [model]"
+        } else {
+            ""
+        };
         return Err(entry.must_be(&format!("{AXIS_FORMS}{setting}")));
     };
     let range = read_range(&table, quantity)?.ok_or_else(|| entry.must_be(AXIS_FORMS))?;
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.
-    let points = table.required("points", &format!("write {RANGE_FORMS}"))?.count(2, MAX_ROWS)?;
+    let points = table
+        .required("points", &format!("write {RANGE_FORMS}"))?
+        .count(2, MAX_ROWS)?;
     Ok((range, points))
 }
 
 /// The axis of a range with this many values; `None` if two of these are one.
 pub(super) fn spaced(range: &Range, points: u64, quantity: Quantity) -> Option<Axis> {
-    let values = range.spaced(points).map(|value| ranged(quantity, value)).collect();
+    let values = range
+        .spaced(points)
+        .map(|value| ranged(quantity, value))
+        .collect();
     Axis::table(vec![Column { quantity, values }]).ok()
 }
 
 /// Reads the first of counted values and their number; none if the entry has another form.
 fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)>, Refused> {
-    let Some(table) = entry.section("an axis") else { return Ok(None) };
-    let Some(count) = table.entry("count") else { return Ok(None) };
+    let Some(table) = entry.section("an axis") else {
+        return Ok(None);
+    };
+    let Some(count) = table.entry("count") else {
+        return Ok(None);
+    };
     table.only(&["count", "first"])?;
     if !quantity.is_count() {
-        return Err(entry.must_be("a list or a range: { count = n } fits whole numbers only, such as seed"));
+        return Err(
+            entry.must_be("a list or a range: { count = n } fits whole numbers only, such as seed")
+        );
     }
     // Far above any seed: the last value is checked below.
     let max = 1 << 53;
     let count = count.count(1, max)?;
-    let first = table.entry("first").map_or(Ok(0), |first| first.count(0, max))?;
+    let first = table
+        .entry("first")
+        .map_or(Ok(0), |first| first.count(0, max))?;
     for value in [first, first + count - 1] {
         if quantity.checked(Value::Count(value)).is_none() {
-            let problem = format!("{} = {value}: must be {}; use first and count", entry.key, quantity.allowed());
+            let problem = format!(
+                "{} = {value}: must be {}; use first and count",
+                entry.key,
+                quantity.allowed()
+            );
             return Err(entry.source.refuse(entry.at, problem));
         }
     }
@@ -171,30 +228,49 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
         return Err(entry.refuse("break_on is a word and has no range; list its values"));
     }
     let end = |entry: &Entry<'_>| {
-        let problem = format!("must be {} ({} of {})", quantity.allowed(), entry.key, quantity.key());
+        let problem = format!(
+            "must be {} ({} of {})",
+            quantity.allowed(),
+            entry.key,
+            quantity.key()
+        );
         let value = entry.value().and_then(|value| quantity.checked(value));
-        value.and_then(Value::number).ok_or_else(|| entry.refuse(problem))
+        value
+            .and_then(Value::number)
+            .ok_or_else(|| entry.refuse(problem))
     };
-    let range = Range { low: end(low)?, high: end(high)?, logarithmic, whole: quantity.is_count() };
+    let range = Range {
+        low: end(low)?,
+        high: end(high)?,
+        logarithmic,
+        whole: quantity.is_count(),
+    };
     if range.low >= range.high {
         return Err(entry.must_be("[low, high] with low < high"));
     }
     if logarithmic && range.low <= 0.0 {
-        return Err(entry.must_be("two numbers > 0: 0 has no logarithm; use linear, or list 0 beside a range in a zip"));
+        return Err(entry.must_be(
+            "two numbers > 0: 0 has no logarithm; use linear, or list 0 beside a range in a zip",
+        ));
     }
     Ok(Some(range))
 }
 
 /// A value within a range.
 fn ranged(quantity: Quantity, value: f64) -> Value {
-    quantity.checked(Value::Real(value)).expect("no quantity has a gap between two values that are allowed")
+    quantity
+        .checked(Value::Real(value))
+        .expect("no quantity has a gap between two values that are allowed")
 }
 
 fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
     let entries = table.entries();
     let columns = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &[], places)?;
-        let values = read_values(entry, quantity)?.into_iter().map(|(value, _)| value).collect();
+        let values = read_values(entry, quantity)?
+            .into_iter()
+            .map(|(value, _)| value)
+            .collect();
         Ok(Column { quantity, values })
     }))?;
     let [first, _, ..] = columns.as_slice() else {
@@ -202,35 +278,62 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
         return Err(table.source.refuse(table.at, problem));
     };
     let (key, expected) = (first.quantity.key(), first.values.len());
-    let lengths = entries.iter().zip(columns.iter().map(|column| column.values.len()));
+    let lengths = entries
+        .iter()
+        .zip(columns.iter().map(|column| column.values.len()));
     if let Some((entry, length)) = lengths.into_iter().find(|(_, length)| *length != expected) {
-        let problem = format!("has {length} values, {key} has {expected}: columns of a zip have equal length");
+        let problem = format!(
+            "has {length} values, {key} has {expected}: columns of a zip have equal length"
+        );
         return Err(entry.refuse(problem));
     }
     of_columns(table, columns)
 }
 
-fn read_sample(table: &Section<'_>, sample: Sample, places: &mut Places<'_>) -> Result<Axis, Refused> {
+fn read_sample(
+    table: &Section<'_>,
+    sample: Sample,
+    places: &mut Places<'_>,
+) -> Result<Axis, Refused> {
     const SETTINGS: [&str; 2] = ["points", "seed"];
     let points = table.required("points", "the number of points of the sample");
     let points = points.and_then(|points| points.count(1, sample.max_points()));
-    let seed = table.entry("seed").map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)));
-    let entries: Vec<Entry<'_>> = table.entries().into_iter().filter(|entry| !SETTINGS.contains(&entry.key)).collect();
+    let seed = table
+        .entry("seed")
+        .map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)));
+    let entries: Vec<Entry<'_>> = table
+        .entries()
+        .into_iter()
+        .filter(|entry| !SETTINGS.contains(&entry.key))
+        .collect();
     let ranges = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &SETTINGS, places)?;
-        let form = entry.section("a range of a sample").ok_or_else(|| entry.must_be(SAMPLE_FORMS))?;
+        let form = entry
+            .section("a range of a sample")
+            .ok_or_else(|| entry.must_be(SAMPLE_FORMS))?;
         form.only(&["linear", "log"])?;
-        Ok((quantity, read_range(&form, quantity)?.ok_or_else(|| entry.must_be(SAMPLE_FORMS))?))
+        Ok((
+            quantity,
+            read_range(&form, quantity)?.ok_or_else(|| entry.must_be(SAMPLE_FORMS))?,
+        ))
     }))?;
     if ranges.is_empty() {
-        let problem =
-            format!("{}: needs a range for at least one quantity, such as V0 = {{ log = [1e-5, 1e-4] }}", table.title);
+        let problem = format!(
+            "{}: needs a range for at least one quantity, such as V0 = {{ log = [1e-5, 1e-4] }}",
+            table.title
+        );
         return Err(table.source.refuse(table.at, problem));
     }
     let [points, seed] = [points?, seed?].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
     let columns = (0..).zip(ranges).map(|(dimension, (quantity, range))| {
         let coordinates = sample.coordinates(dimension, points, seed);
-        Column { quantity, values: coordinates.into_iter().map(|x| ranged(quantity, range.at(x))).collect() }
+        Column {
+            quantity,
+            values: coordinates
+                .into_iter()
+                .map(|x| ranged(quantity, range.at(x)))
+                .collect(),
+        }
     });
     of_columns(table, columns.collect())
 }

@@ -33,11 +33,22 @@ const HALF: f64 = 0.5;
 /// Reads `[precision]` without its seeds.
 pub(super) fn read_precision(section: &Section<'_>) -> Result<Precision, Refused> {
     section.only(&["of", "relative", "absolute", "seeds"]).ok();
-    let of = section.required("of", "the statistic that is to be precise, such as of = \"tau_mean\"");
-    let statistics =
-        of.and_then(|of| read_statistics(&of, |known| known.has_interval, "has no confidence interval; allowed are "));
+    let of = section.required(
+        "of",
+        "the statistic that is to be precise, such as of = \"tau_mean\"",
+    );
+    let statistics = of.and_then(|of| {
+        read_statistics(
+            &of,
+            |known| known.has_interval,
+            "has no confidence interval; allowed are ",
+        )
+    });
     let target = read_target(section, statistics.as_deref().unwrap_or_default());
-    Ok(Precision { statistics: statistics?, target: target? })
+    Ok(Precision {
+        statistics: statistics?,
+        target: target?,
+    })
 }
 
 /// Seeds of a set in the first round and at most, those in the first round as they were asked for, and the axis of all.
@@ -56,8 +67,18 @@ pub(super) fn read_seeds(section: &Section<'_>, places: &mut Places<'_>) -> Resu
     if most < asked {
         return Err(to.must_be(&format!("at least from, which is {asked}")));
     }
-    let first = table.entry("first").map_or(Ok(0), |first| first.count(0, u64::from(u32::MAX)))?;
-    Ok((asked.max(MIN_SEEDS.min(most))..=most, asked, Axis::Counted { symbol: Symbol::Seed, first, count: most }))
+    let first = table
+        .entry("first")
+        .map_or(Ok(0), |first| first.count(0, u64::from(u32::MAX)))?;
+    Ok((
+        asked.max(MIN_SEEDS.min(most))..=most,
+        asked,
+        Axis::Counted {
+            symbol: Symbol::Seed,
+            first,
+            count: most,
+        },
+    ))
 }
 
 /// Reads a statistic that is allowed, or a list of such; `problem` is what is wrong with others, before those that are.
@@ -66,19 +87,30 @@ fn read_statistics(
     is_allowed: fn(Statistic) -> bool,
     problem: &str,
 ) -> Result<Vec<Statistic>, Refused> {
-    let known: Vec<&str> = STATISTICS.iter().filter(|known| is_allowed(**known)).map(|known| known.key).collect();
+    let known: Vec<&str> = STATISTICS
+        .iter()
+        .filter(|known| is_allowed(**known))
+        .map(|known| known.key)
+        .collect();
     let entries = entry.list().unwrap_or_else(|| vec![*entry]);
     let statistics = all(entries.iter().map(|entry| {
-        let word = entry
-            .word()
-            .ok_or_else(|| entry.must_be(&format!("a statistic in quotes, or a list of them: {}", known.join(", "))))?;
+        let word = entry.word().ok_or_else(|| {
+            entry.must_be(&format!(
+                "a statistic in quotes, or a list of them: {}",
+                known.join(", ")
+            ))
+        })?;
         match Statistic::from_key(word) {
             Some(statistic) if is_allowed(statistic) => Ok(statistic),
             Some(_) => Err(entry.refuse(format!("{problem}{}", known.join(", ")))),
             None => Err(entry.refuse(format!("is no statistic of a set; {}", hint(word, &known)))),
         }
     }))?;
-    if statistics.is_empty() { Err(entry.refuse("at least one statistic")) } else { Ok(statistics) }
+    if statistics.is_empty() {
+        Err(entry.refuse("at least one statistic"))
+    } else {
+        Ok(statistics)
+    }
 }
 
 fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refused> {
@@ -92,20 +124,26 @@ fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refuse
             let allowed = "a number > 0 and < 1, as a share of the statistic";
             let share = entry.number(allowed, |share| share > 0.0 && share < 1.0)?;
             match of.iter().find(|statistic| statistic.is_angle()) {
-                Some(Statistic { key, .. }) => {
-                    Err(entry.refuse(format!("{key} is an angle and has no relative error; set absolute, in rad")))
-                }
+                Some(Statistic { key, .. }) => Err(entry.refuse(format!(
+                    "{key} is an angle and has no relative error; set absolute, in rad"
+                ))),
                 None => Ok(Target::Relative(share)),
             }
         }
         (None, Some(entry)) => {
-            let [Statistic { unit, .. }, rest @ ..] = of else { return Ok(Target::Absolute(0.0)) };
+            let [Statistic { unit, .. }, rest @ ..] = of else {
+                return Ok(Target::Absolute(0.0));
+            };
             if rest.iter().any(|other| other.unit != *unit) {
-                return Err(
-                    entry.refuse("the statistics in of have different units; set relative, or keep one of them")
-                );
+                return Err(entry.refuse(
+                    "the statistics in of have different units; set relative, or keep one of them",
+                ));
             }
-            Ok(Target::Absolute(entry.positive(if unit.is_empty() { "the unit of a pure number" } else { unit })?))
+            Ok(Target::Absolute(entry.positive(if unit.is_empty() {
+                "the unit of a pure number"
+            } else {
+                unit
+            })?))
         }
     }
 }
@@ -120,25 +158,53 @@ pub(super) struct Wanted<'a> {
 }
 
 pub(super) fn read_refinement<'a>(section: &Section<'a>) -> Result<Wanted<'a>, Refused> {
-    section.only(&["axis", "by", "value", "threshold", "to", "seeds", "jobs"]).ok();
-    let axis = section.required("axis", "the axis along which edges are looked for, such as axis = \"Delta\"");
+    section
+        .only(&["axis", "by", "value", "threshold", "to", "seeds", "jobs"])
+        .ok();
+    let axis = section.required(
+        "axis",
+        "the axis along which edges are looked for, such as axis = \"Delta\"",
+    );
     let quantity = axis.and_then(|entry| read_refinable(&entry));
-    let by = section.required("by", "what crosses the threshold, such as by = \"resultant_length\"");
+    let by = section.required(
+        "by",
+        "what crosses the threshold, such as by = \"resultant_length\"",
+    );
     let by = by.and_then(|entry| read_by(section, &entry));
-    let to_entry = section.required("to", "the largest width of the interval of an edge, such as to = 0.03");
+    let to_entry = section.required(
+        "to",
+        "the largest width of the interval of an edge, such as to = 0.03",
+    );
     let to = to_entry.and_then(|entry| entry.number("a finite number > 0", |to| to > 0.0));
     let jobs = section.required("jobs", "the most jobs of the sweep, such as jobs = 4000");
     let max_jobs = jobs.and_then(|entry| entry.count(1, MAX_JOBS));
     let ((by, periods, threshold), to, max_jobs) = (by?, to?, max_jobs?);
-    let refinement = Refinement { axis: 0, levels: 0, is_log: false, by, periods, threshold, to, max_jobs };
-    Ok(Wanted { quantity: quantity?, axis: axis?, to: to_entry?, jobs: jobs?, refinement })
+    let refinement = Refinement {
+        axis: 0,
+        levels: 0,
+        is_log: false,
+        by,
+        periods,
+        threshold,
+        to,
+        max_jobs,
+    };
+    Ok(Wanted {
+        quantity: quantity?,
+        axis: axis?,
+        to: to_entry?,
+        jobs: jobs?,
+        refinement,
+    })
 }
 
 fn read_refinable(entry: &Entry<'_>) -> Result<Quantity, Refused> {
     let keys: Vec<&str> = Quantity::all().map(Quantity::key).collect();
-    let word = entry.word().ok_or_else(|| entry.must_be("the name of one axis in quotes"))?;
-    let quantity =
-        Quantity::from_key(word).ok_or_else(|| entry.refuse(format!("is no axis; {}", hint(word, &keys))))?;
+    let word = entry
+        .word()
+        .ok_or_else(|| entry.must_be("the name of one axis in quotes"))?;
+    let quantity = Quantity::from_key(word)
+        .ok_or_else(|| entry.refuse(format!("is no axis; {}", hint(word, &keys))))?;
     match quantity {
         Quantity::BREAK_ON => Err(entry.refuse("is a word: there is nothing between its values")),
         quantity if quantity.is_count() => {
@@ -149,26 +215,54 @@ fn read_refinable(entry: &Entry<'_>) -> Result<Quantity, Refused> {
 }
 
 /// The statistics, the number of periods if their share is asked for, and the threshold.
-fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<(Vec<Statistic>, Option<u64>, f64), Refused> {
-    let threshold = section.entry("threshold").map(|entry| entry.number("a finite number", |_| true)).transpose();
+fn read_by(
+    section: &Section<'_>,
+    entry: &Entry<'_>,
+) -> Result<(Vec<Statistic>, Option<u64>, f64), Refused> {
+    let threshold = section
+        .entry("threshold")
+        .map(|entry| entry.number("a finite number", |_| true))
+        .transpose();
     if entry.word() == Some("periods") {
-        let value = section.required("value", "the n of tau = n T, of which the share of intervals is taken");
+        let value = section.required(
+            "value",
+            "the n of tau = n T, of which the share of intervals is taken",
+        );
         let value = value.and_then(|value| value.count(0, MAX_ROWS));
-        return Ok((Statistic::from_key("periods").into_iter().collect(), Some(value?), threshold?.unwrap_or(HALF)));
+        return Ok((
+            Statistic::from_key("periods").into_iter().collect(),
+            Some(value?),
+            threshold?.unwrap_or(HALF),
+        ));
     }
-    let statistics = read_statistics(entry, Statistic::can_cross, "crosses no threshold; allowed are periods, ")?;
+    let statistics = read_statistics(
+        entry,
+        Statistic::can_cross,
+        "crosses no threshold; allowed are periods, ",
+    )?;
     if let Some(value) = section.entry("value") {
         return Err(value.refuse("belongs to by = \"periods\"; remove it"));
     }
-    section.required("threshold", "the value that is crossed, such as threshold = 0.5")?;
+    section.required(
+        "threshold",
+        "the value that is crossed, such as threshold = 0.5",
+    )?;
     Ok((statistics, None, threshold?.unwrap_or_default()))
 }
 
 impl Wanted<'_> {
     /// Finds its axis among these, which the section has, and makes it as fine as is wanted.
-    pub fn over(&self, axes: &mut [Axis], section: Option<Section<'_>>) -> Result<Refinement, Refused> {
-        let axis = axes.iter().position(|axis| axis.quantities() == [self.quantity]);
-        let entry = section.and_then(|axes| axes.entry(self.quantity.key())).filter(|entry| entry.list().is_none());
+    pub fn over(
+        &self,
+        axes: &mut [Axis],
+        section: Option<Section<'_>>,
+    ) -> Result<Refinement, Refused> {
+        let axis = axes
+            .iter()
+            .position(|axis| axis.quantities() == [self.quantity]);
+        let entry = section
+            .and_then(|axes| axes.entry(self.quantity.key()))
+            .filter(|entry| entry.list().is_none());
         let Some((axis, entry)) = axis.zip(entry) else {
             let problem = "has no range of its own in [axes], and only there are values in between; write it there as \
                            { linear = [low, high], points = n }, or log";
@@ -186,17 +280,34 @@ impl Wanted<'_> {
         };
         let to = self.refinement.to;
         if to >= step(0) {
-            let what = if range.logarithmic { "as a share of the value" } else { "the step of the axis in [axes]" };
-            return Err(self.to.must_be(&format!("finer than {}, {what}", Shortest(step(0)))));
+            let what = if range.logarithmic {
+                "as a share of the value"
+            } else {
+                "the step of the axis in [axes]"
+            };
+            return Err(self
+                .to
+                .must_be(&format!("finer than {}, {what}", Shortest(step(0)))));
         }
         let levels = (1..u64::BITS).find(|&level| step(level) <= to * (1.0 + ROUNDING));
-        let fine = levels.and_then(|level| Some((level, (points - 1).checked_mul(1 << level)? + 1)));
+        let fine =
+            levels.and_then(|level| Some((level, (points - 1).checked_mul(1 << level)? + 1)));
         let made = |(levels, points)| Some((levels, spaced(&range, points, self.quantity)?));
-        let Some((levels, fine)) = fine.filter(|(_, points)| *points <= MAX_ROWS).and_then(made) else {
-            return Err(self.to.refuse(format!("makes more than {MAX_ROWS} values of the axis; take a coarser one")));
+        let Some((levels, fine)) = fine
+            .filter(|(_, points)| *points <= MAX_ROWS)
+            .and_then(made)
+        else {
+            return Err(self.to.refuse(format!(
+                "makes more than {MAX_ROWS} values of the axis; take a coarser one"
+            )));
         };
         axes[axis] = fine;
-        Ok(Refinement { axis, levels, is_log: range.logarithmic, ..self.refinement.clone() })
+        Ok(Refinement {
+            axis,
+            levels,
+            is_log: range.logarithmic,
+            ..self.refinement.clone()
+        })
     }
 }
 

@@ -123,12 +123,20 @@ pub fn merged(mut ranges: Vec<RangeInclusive<u64>>) -> Vec<RangeInclusive<u64>> 
 }
 
 /// As `first-last` pairs with spaces between them: hundreds of thousands may stand in the file of an extension.
-fn write_ranges<S: Serializer>(ranges: &[RangeInclusive<u64>], serializer: S) -> Result<S::Ok, S::Error> {
-    let words: Vec<String> = ranges.iter().map(|range| format!("{}-{}", range.start(), range.end())).collect();
+fn write_ranges<S: Serializer>(
+    ranges: &[RangeInclusive<u64>],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let words: Vec<String> = ranges
+        .iter()
+        .map(|range| format!("{}-{}", range.start(), range.end()))
+        .collect();
     serializer.serialize_str(&words.join(" "))
 }
 
-fn read_ranges<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<RangeInclusive<u64>>, D::Error> {
+fn read_ranges<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Vec<RangeInclusive<u64>>, D::Error> {
     let text = String::deserialize(deserializer)?;
     let range = |word: &str| {
         let (first, last) = word.split_once('-')?;

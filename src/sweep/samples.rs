@@ -39,7 +39,11 @@ impl Range {
             // Two terms: the difference of the ends may overflow.
             self.low * (1.0 - fraction) + self.high * fraction
         };
-        let rounded = if self.whole { value.round() } else { significant(value) };
+        let rounded = if self.whole {
+            value.round()
+        } else {
+            significant(value)
+        };
         rounded.clamp(self.low, self.high)
     }
 
@@ -73,7 +77,9 @@ impl Sample {
     /// The coordinates of all points in one dimension, each in [0, 1).
     pub fn coordinates(self, dimension: u32, points: u32, seed: u32) -> Vec<f64> {
         match self {
-            Self::Sobol => (0..points).map(|point| f64::from(sobol_burley::sample(point, dimension, seed))).collect(),
+            Self::Sobol => (0..points)
+                .map(|point| f64::from(sobol_burley::sample(point, dimension, seed)))
+                .collect(),
             Self::Latin => {
                 let mut generator = ChaCha8Rng::seed_from_u64(u64::from(seed));
                 generator.set_stream(u64::from(dimension));
@@ -86,7 +92,9 @@ impl Sample {
                 let inside = 1.0 / (f64::from(u32::MAX) + 1.0);
                 strata
                     .into_iter()
-                    .map(|stratum| (f64::from(stratum) + f64::from(generator.next_u32()) * inside) / count)
+                    .map(|stratum| {
+                        (f64::from(stratum) + f64::from(generator.next_u32()) * inside) / count
+                    })
                     .collect()
             }
         }
@@ -100,7 +108,12 @@ mod tests {
     #[test]
     fn the_ends_of_a_range_are_exact_and_its_steps_even() {
         for logarithmic in [false, true] {
-            let range = Range { low: 3e-7, high: 1e-4, logarithmic, whole: false };
+            let range = Range {
+                low: 3e-7,
+                high: 1e-4,
+                logarithmic,
+                whole: false,
+            };
             let values: Vec<f64> = range.spaced(7).collect();
             assert_eq!((values[0], values[6]), (3e-7, 1e-4));
             for pair in values.windows(3) {
@@ -114,9 +127,22 @@ mod tests {
             }
         }
         let ends = (1.234_567_890_123_456_7, 9.876_543_210_987_654);
-        let long = Range { low: ends.0, high: ends.1, logarithmic: true, whole: false };
-        assert_eq!((long.at(0.0), long.at(1.0), long.at(1e-15)), (ends.0, ends.1, ends.0));
-        let widest = Range { low: -f64::MAX, high: f64::MAX, logarithmic: false, whole: false };
+        let long = Range {
+            low: ends.0,
+            high: ends.1,
+            logarithmic: true,
+            whole: false,
+        };
+        assert_eq!(
+            (long.at(0.0), long.at(1.0), long.at(1e-15)),
+            (ends.0, ends.1, ends.0)
+        );
+        let widest = Range {
+            low: -f64::MAX,
+            high: f64::MAX,
+            logarithmic: false,
+            whole: false,
+        };
         assert_eq!(widest.at(0.5), 0.0);
     }
 
@@ -142,11 +168,19 @@ mod tests {
         // Known answers: points of a sample are parameters of jobs, and so part of every id.
         assert_eq!(
             Sample::Sobol.coordinates(1, 3, 7),
-            [0.592_596_173_286_438, 0.194_618_463_516_235_35, 0.365_000_367_164_611_8]
+            [
+                0.592_596_173_286_438,
+                0.194_618_463_516_235_35,
+                0.365_000_367_164_611_8
+            ]
         );
         assert_eq!(
             Sample::Latin.coordinates(1, 3, 7),
-            [0.035_778_330_406_174_064, 0.669_683_803_416_167_7, 0.655_623_660_888_522_9]
+            [
+                0.035_778_330_406_174_064,
+                0.669_683_803_416_167_7,
+                0.655_623_660_888_522_9
+            ]
         );
     }
 }

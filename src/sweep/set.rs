@@ -95,7 +95,9 @@ tables! { SetRow = "sets", "One row per parameter set, all seeds together"; }
 impl SetRow {
     /// The number in a column of this name; `None` if it has none.
     pub fn number(&self, column: &str) -> Option<f64> {
-        let place = Self::columns().iter().position(|known| known.name == column)?;
+        let place = Self::columns()
+            .iter()
+            .position(|known| known.name == column)?;
         let mut numbers = Vec::new();
         self.cells(&mut |cell| numbers.push(cell.number()));
         numbers.swap_remove(place)
@@ -136,16 +138,28 @@ pub struct Statistic {
 /// All that a sweep file may name, in the order of the table.
 pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
     let columns = SetRow::columns();
-    let has_interval = |key: &str| columns.iter().any(|column| column.name.strip_suffix("_low") == Some(key));
+    let has_interval = |key: &str| {
+        columns
+            .iter()
+            .any(|column| column.name.strip_suffix("_low") == Some(key))
+    };
     let statistic = |column: &Column| {
         // The ends of an interval have names of their own. What is never missing counts jobs or slips, but for flags;
         // parameters, and what is expected whatever happens, tell nothing of a set.
-        let Cow::Borrowed(key) = column.name else { return None };
+        let Cow::Borrowed(key) = column.name else {
+            return None;
+        };
         let is_measured = column.nullable || column.kind == Kind::Flag;
-        let is_given =
-            Symbol::from_key(key).is_some() || key.starts_with("expected_") || ["control", "frequency"].contains(&key);
+        let is_given = Symbol::from_key(key).is_some()
+            || key.starts_with("expected_")
+            || ["control", "frequency"].contains(&key);
         let Column { unit, kind, .. } = *column;
-        (is_measured && !is_given).then_some(Statistic { key, unit, kind, has_interval: has_interval(key) })
+        (is_measured && !is_given).then_some(Statistic {
+            key,
+            unit,
+            kind,
+            has_interval: has_interval(key),
+        })
     };
     columns.iter().filter_map(statistic).collect()
 });
@@ -159,9 +173,17 @@ impl Statistic {
     /// Whether the population has a value of it, with an error that leaving out seeds shows: quantiles jump, numbers of
     /// values, bounds and p-values change with their number, and angles have no order.
     pub fn can_cross(self) -> bool {
-        const OTHERS: &[&str] = &["share_below", "tau_05", "tau_25", "tau_50", "tau_75", "tau_95"];
-        let is_of_sample =
-            ["effective_", "tau_mean_", "rayleigh_", "load_"].iter().any(|begin| self.key.starts_with(begin));
+        const OTHERS: &[&str] = &[
+            "share_below",
+            "tau_05",
+            "tau_25",
+            "tau_50",
+            "tau_75",
+            "tau_95",
+        ];
+        let is_of_sample = ["effective_", "tau_mean_", "rayleigh_", "load_"]
+            .iter()
+            .any(|begin| self.key.starts_with(begin));
         self.kind == Kind::Real && !self.is_angle() && !is_of_sample && !OTHERS.contains(&self.key)
     }
 
@@ -171,7 +193,10 @@ impl Statistic {
     }
 
     pub fn from_key(key: &str) -> Option<Self> {
-        STATISTICS.iter().copied().find(|statistic| statistic.key == key)
+        STATISTICS
+            .iter()
+            .copied()
+            .find(|statistic| statistic.key == key)
     }
 }
 
@@ -181,16 +206,37 @@ mod tests {
 
     #[test]
     fn statistics_are_what_jobs_and_slips_tell_of_a_set() {
-        let of = |key: &str| Statistic::from_key(key).map(|known| (known.unit, known.kind, known.has_interval));
+        let of = |key: &str| {
+            Statistic::from_key(key).map(|known| (known.unit, known.kind, known.has_interval))
+        };
         assert_eq!(of("tau_mean"), Some(("s", Kind::Real, true)));
         assert_eq!(of("phase_mean"), Some(("rad", Kind::Real, true)));
         assert_eq!(of("slip_share"), Some(("", Kind::Real, false)));
-        for (class, kind) in [("has_phase", Kind::Flag), ("regime", Kind::Text), ("periods", Kind::Count)] {
+        for (class, kind) in [
+            ("has_phase", Kind::Flag),
+            ("regime", Kind::Text),
+            ("periods", Kind::Count),
+        ] {
             assert_eq!(of(class), Some(("", kind, false)), "{class}");
         }
-        for other in ["set_id", "V0", "T", "eta", "jobs", "slips", "tau_mean_low", "expected_resultant"] {
+        for other in [
+            "set_id",
+            "V0",
+            "T",
+            "eta",
+            "jobs",
+            "slips",
+            "tau_mean_low",
+            "expected_resultant",
+        ] {
             assert_eq!(of(other), None, "{other}");
         }
-        assert_eq!(STATISTICS.iter().filter(|statistic| statistic.has_interval).count(), 11);
+        assert_eq!(
+            STATISTICS
+                .iter()
+                .filter(|statistic| statistic.has_interval)
+                .count(),
+            11
+        );
     }
 }

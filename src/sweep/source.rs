@@ -19,8 +19,14 @@ use toml::de::{DeTable, DeValue};
 /// A sweep file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    #[error("{}: cannot be read: {source}; check the path and its permissions", shown(path))]
-    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error(
+        "{}: cannot be read: {source}; check the path and its permissions",
+        shown(path)
+    )]
+    Unreadable {
+        path: PathBuf,
+        source: std::io::Error,
+    },
     /// The file does not say what to run.
     #[error("{}", listed(path, mistakes))]
     Invalid {
@@ -46,13 +52,20 @@ const MAX_SHOWN: usize = 10;
 /// One mistake on its line, several below each other.
 fn listed(path: &Path, mistakes: &[Mistake]) -> String {
     let path = shown(path);
-    let shown = |Mistake { line, problem }: &Mistake| format!("{path}:{line}: {}", shown_text(problem));
+    let shown =
+        |Mistake { line, problem }: &Mistake| format!("{path}:{line}: {}", shown_text(problem));
     if let [mistake] = mistakes {
         return shown(mistake);
     }
     let heading = format!("{path}: has {} mistakes:", mistakes.len());
-    let more = mistakes.len().checked_sub(MAX_SHOWN).filter(|more| *more > 0).map(|more| format!("and {more} more"));
-    let lines = std::iter::once(heading).chain(mistakes.iter().take(MAX_SHOWN).map(shown)).chain(more);
+    let more = mistakes
+        .len()
+        .checked_sub(MAX_SHOWN)
+        .filter(|more| *more > 0)
+        .map(|more| format!("and {more} more"));
+    let lines = std::iter::once(heading)
+        .chain(mistakes.iter().take(MAX_SHOWN).map(shown))
+        .chain(more);
     lines.collect::<Vec<_>>().join("\n  ")
 }
 
@@ -75,7 +88,11 @@ pub(super) struct Source<'a> {
 
 impl<'a> Source<'a> {
     pub const fn new(path: &'a Path, text: &'a str) -> Self {
-        Self { path, text, mistakes: RefCell::new(Vec::new()) }
+        Self {
+            path,
+            text,
+            mistakes: RefCell::new(Vec::new()),
+        }
     }
 
     /// Reports a mistake at a byte of the text.
@@ -85,7 +102,11 @@ impl<'a> Source<'a> {
     }
 
     pub fn passed(&self) -> Result<(), Refused> {
-        if self.mistakes.borrow().is_empty() { Ok(()) } else { Err(Refused(())) }
+        if self.mistakes.borrow().is_empty() {
+            Ok(())
+        } else {
+            Err(Refused(()))
+        }
     }
 
     pub fn error(&self) -> SweepError {
@@ -93,29 +114,48 @@ impl<'a> Source<'a> {
         mistakes.sort_unstable();
         // A misspelt key is met twice where it stands for one that must be there.
         mistakes.dedup();
-        let placed = mistakes.into_iter().map(|(at, problem)| Mistake { line: self.line(at), problem });
-        SweepError::Invalid { path: self.path.to_owned(), mistakes: placed.collect() }
+        let placed = mistakes.into_iter().map(|(at, problem)| Mistake {
+            line: self.line(at),
+            problem,
+        });
+        SweepError::Invalid {
+            path: self.path.to_owned(),
+            mistakes: placed.collect(),
+        }
     }
 
     /// The line of a byte of the text, counted from 1.
     pub fn line(&self, at: usize) -> usize {
-        self.text.as_bytes().get(..at).unwrap_or_default().split(|byte| *byte == b'\n').count()
+        self.text
+            .as_bytes()
+            .get(..at)
+            .unwrap_or_default()
+            .split(|byte| *byte == b'\n')
+            .count()
     }
 
     pub fn table(&self) -> Result<DeTable<'a>, Refused> {
         // The errors of a parser that goes on after one mostly follow from it.
-        DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| {
-            let span = error.span().unwrap_or(self.text.len()..self.text.len());
-            // The end of the file lies on its last line, not below it.
-            let at = span.start.min(self.text.trim_end().len());
-            let written = match self.excerpt(span) {
-                nothing if nothing.is_empty() => {
-                    self.text.lines().nth(self.line(at) - 1).unwrap_or_default().to_owned()
-                }
-                written => written,
-            };
-            self.refuse(at, format!("{written}: {}; the file must be TOML 1.0", error.message()))
-        })
+        DeTable::parse(self.text)
+            .map(Spanned::into_inner)
+            .map_err(|error| {
+                let span = error.span().unwrap_or(self.text.len()..self.text.len());
+                // The end of the file lies on its last line, not below it.
+                let at = span.start.min(self.text.trim_end().len());
+                let written = match self.excerpt(span) {
+                    nothing if nothing.is_empty() => self
+                        .text
+                        .lines()
+                        .nth(self.line(at) - 1)
+                        .unwrap_or_default()
+                        .to_owned(),
+                    written => written,
+                };
+                self.refuse(
+                    at,
+                    format!("{written}: {}; the file must be TOML 1.0", error.message()),
+                )
+            })
     }
 
     /// The first line of a stretch of text, shortened.
@@ -146,7 +186,12 @@ impl<'a> Section<'a> {
         let mut entries: Vec<_> = self
             .table
             .iter()
-            .map(|(key, node)| Entry { source: self.source, key: key.get_ref(), at: key.span().start, node })
+            .map(|(key, node)| Entry {
+                source: self.source,
+                key: key.get_ref(),
+                at: key.span().start,
+                node,
+            })
             .collect();
         entries.sort_by_key(|entry| entry.at);
         entries
@@ -163,15 +208,27 @@ impl<'a> Section<'a> {
 
     /// An entry that must be there, unless a misspelt one was meant; `need` says what it is for.
     pub fn required(&self, key: &str, need: &str) -> Result<Entry<'a>, Refused> {
-        self.entry(key).ok_or_else(|| match self.entries().iter().find(|entry| nearest(entry.key, &[key]).is_some()) {
-            Some(misspelt) => misspelt.unknown(self.title, &[key]),
-            None => self.source.refuse(self.at, format!("{key} is missing in {}: {need}", self.title)),
+        self.entry(key).ok_or_else(|| {
+            match self
+                .entries()
+                .iter()
+                .find(|entry| nearest(entry.key, &[key]).is_some())
+            {
+                Some(misspelt) => misspelt.unknown(self.title, &[key]),
+                None => self.source.refuse(
+                    self.at,
+                    format!("{key} is missing in {}: {need}", self.title),
+                ),
+            }
         })
     }
 
     /// Refuses keys that are not allowed here.
     pub fn only(&self, allowed: &[&str]) -> Result<(), Refused> {
-        let unknown = self.entries().into_iter().filter(|entry| !allowed.contains(&entry.key));
+        let unknown = self
+            .entries()
+            .into_iter()
+            .filter(|entry| !allowed.contains(&entry.key));
         all(unknown.map(|entry| Err(entry.unknown(self.title, allowed)))).map(|_: Vec<()>| ())
     }
 }
@@ -194,7 +251,8 @@ impl<'a> Entry<'a> {
             DeValue::Table(_) => String::new(),
             _ => format!(" = {}", self.source.excerpt(self.node.span())),
         };
-        self.source.refuse(self.at, format!("{}{value}: {problem}", self.key))
+        self.source
+            .refuse(self.at, format!("{}{value}: {problem}", self.key))
     }
 
     pub fn must_be(&self, allowed: &str) -> Refused {
@@ -216,12 +274,26 @@ impl<'a> Entry<'a> {
     /// The values of a list, each at its own place.
     pub fn list(&self) -> Option<Vec<Self>> {
         let array = self.node.get_ref().as_array()?;
-        Some(array.iter().map(|node| Self { at: node.span().start, node, ..*self }).collect())
+        Some(
+            array
+                .iter()
+                .map(|node| Self {
+                    at: node.span().start,
+                    node,
+                    ..*self
+                })
+                .collect(),
+        )
     }
 
     pub fn section(&self, title: &'static str) -> Option<Section<'a>> {
         let table = self.node.get_ref().as_table()?;
-        Some(Section { source: self.source, title, at: self.at, table })
+        Some(Section {
+            source: self.source,
+            title,
+            at: self.at,
+            table,
+        })
     }
 
     pub fn word(&self) -> Option<&'a str> {
@@ -232,8 +304,17 @@ impl<'a> Entry<'a> {
     pub fn value(&self) -> Option<model::Value> {
         match self.node.get_ref() {
             DeValue::Integer(integer) => {
-                let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(Value::Count);
-                let real = || integer.as_str().parse().ok().filter(|_| integer.radix() == 10).map(Value::Real);
+                let count = u64::from_str_radix(integer.as_str(), integer.radix())
+                    .ok()
+                    .map(Value::Count);
+                let real = || {
+                    integer
+                        .as_str()
+                        .parse()
+                        .ok()
+                        .filter(|_| integer.radix() == 10)
+                        .map(Value::Real)
+                };
                 count.or_else(real)
             }
             DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
@@ -245,12 +326,17 @@ impl<'a> Entry<'a> {
 
     /// A finite number that `fits`, as the words `allowed` say.
     pub fn number(&self, allowed: &str, fits: impl Fn(f64) -> bool) -> Result<f64, Refused> {
-        let number = self.value().and_then(Value::number).filter(|number| number.is_finite() && fits(*number));
+        let number = self
+            .value()
+            .and_then(Value::number)
+            .filter(|number| number.is_finite() && fits(*number));
         number.ok_or_else(|| self.must_be(allowed))
     }
 
     pub fn positive(&self, unit: &str) -> Result<f64, Refused> {
-        self.number(&format!("a finite number > 0, in {unit}"), |number| number > 0.0)
+        self.number(&format!("a finite number > 0, in {unit}"), |number| {
+            number > 0.0
+        })
     }
 
     /// A whole number within bounds.
@@ -272,9 +358,13 @@ pub(super) fn hint(word: &str, known: &[&str]) -> String {
 
 /// The known word that was probably meant by an unknown one.
 pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
-    let distance = |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
+    let distance =
+        |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
     // Half of a short word, two letters of a long one.
     let max = (word.chars().count() / 2).min(2);
-    let near = known.iter().copied().filter(|candidate| distance(candidate) <= max);
+    let near = known
+        .iter()
+        .copied()
+        .filter(|candidate| distance(candidate) <= max);
     near.min_by_key(|candidate| distance(candidate))
 }

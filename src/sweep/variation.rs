@@ -17,15 +17,31 @@ const AXES: &str = "axes";
 const SECTIONS: [&str; 6] = ["model", AXES, "record", "solver", "precision", "refine"];
 const SOLVER: [&str; 4] = ["method", "tolerance", "resolve", "dt"];
 /// Keys that take each other's place.
-const RIVALS: [&[&str]; 3] = [&["T", "eta", "frequency"], &["relative", "absolute"], &["seed", "seeds"]];
+const RIVALS: [&[&str]; 3] = [
+    &["T", "eta", "frequency"],
+    &["relative", "absolute"],
+    &["seed", "seeds"],
+];
 /// What has no effect without modulation.
-const OF_MODULATION: [&str; 7] = ["T", "eta", "frequency", "ramp_time", "T_to", "Delta_to", "control"];
+const OF_MODULATION: [&str; 7] = [
+    "T",
+    "eta",
+    "frequency",
+    "ramp_time",
+    "T_to",
+    "Delta_to",
+    "control",
+];
 
 impl Change {
     /// A key with one value. The sweep file's reader refuses what is unknown, in the section of what it is nearest to.
     pub fn setting(key: &str, value: &str) -> Self {
         let recording = RecordingKey::ALL.map(RecordingKey::key);
-        let known: Vec<&str> = Quantity::all().map(Quantity::key).chain(recording).chain(SOLVER).collect();
+        let known: Vec<&str> = Quantity::all()
+            .map(Quantity::key)
+            .chain(recording)
+            .chain(SOLVER)
+            .collect();
         let section = match nearest(key, &known) {
             _ if matches!(key, "of" | "relative" | "absolute" | "seeds") => "precision",
             _ if matches!(key, "axis" | "by" | "value" | "threshold" | "to" | "jobs") => "refine",
@@ -33,7 +49,11 @@ impl Change {
             Some(known) if SOLVER.contains(&known) => "solver",
             _ => "model",
         };
-        Self { section, key: key.to_owned(), value: scalar(value) }
+        Self {
+            section,
+            key: key.to_owned(),
+            value: scalar(value),
+        }
     }
 
     /// A key with several values: `1e-5,1e-4`, `log:1e-5:1e-3:9`, `linear:0:1e-6:5`, `count:4`, or as a sweep file has them.
@@ -45,13 +65,29 @@ impl Change {
                 let [low, high, points] = [low, high, points].map(scalar);
                 format!("{{ {form} = [{low}, {high}], points = {points} }}")
             }
-            ["log" | "linear", ..] => return Err("log:LOW:HIGH:POINTS, or linear, with the number of points"),
+            ["log" | "linear", ..] => {
+                return Err("log:LOW:HIGH:POINTS, or linear, with the number of points");
+            }
             ["count", count] => format!("{{ count = {} }}", scalar(count)),
             ["count", ..] => return Err("count:N, with the number of values"),
-            _ => format!("[{}]", values.split(',').map(str::trim).map(scalar).collect::<Vec<_>>().join(", ")),
+            _ => format!(
+                "[{}]",
+                values
+                    .split(',')
+                    .map(str::trim)
+                    .map(scalar)
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ),
         };
-        value.parse::<Value>().map_err(|_| "VALUES, such as 1e-5,1e-4")?;
-        Ok(Self { section: AXES, key: key.to_owned(), value })
+        value
+            .parse::<Value>()
+            .map_err(|_| "VALUES, such as 1e-5,1e-4")?;
+        Ok(Self {
+            section: AXES,
+            key: key.to_owned(),
+            value,
+        })
     }
 }
 
@@ -72,16 +108,42 @@ fn scalar(text: &str) -> String {
 /// other way round; what fixes the period, a target or seeds takes the place of what else does; what has no effect at
 /// Delta = 0 goes with the modulation. A text that is no TOML stays as it is.
 pub fn varied(text: &str, changes: &[Change]) -> String {
-    let Ok(mut document) = text.parse::<DocumentMut>() else { return text.to_owned() };
-    let is_still = changes.iter().any(|change| change.key == "Delta" && matches!(change.value.parse(), Ok(0.0)));
-    let seeds_of = if document.contains_key("refine") { "refine" } else { "precision" };
-    let section_of = |change: &Change| if change.key == "seeds" { seeds_of } else { change.section };
+    let Ok(mut document) = text.parse::<DocumentMut>() else {
+        return text.to_owned();
+    };
+    let is_still = changes
+        .iter()
+        .any(|change| change.key == "Delta" && matches!(change.value.parse(), Ok(0.0)));
+    let seeds_of = if document.contains_key("refine") {
+        "refine"
+    } else {
+        "precision"
+    };
+    let section_of = |change: &Change| {
+        if change.key == "seeds" {
+            seeds_of
+        } else {
+            change.section
+        }
+    };
     for section in SECTIONS {
-        let Some(table) = document.get_mut(section).and_then(Item::as_table_like_mut) else { continue };
-        let stays = |key: &str| changes.iter().any(|change| section_of(change) == section && change.key == key);
+        let Some(table) = document.get_mut(section).and_then(Item::as_table_like_mut) else {
+            continue;
+        };
+        let stays = |key: &str| {
+            changes
+                .iter()
+                .any(|change| section_of(change) == section && change.key == key)
+        };
         let goes = |key: &str| {
-            let replaces = |new| new == key || RIVALS.iter().any(|keys| keys.contains(&new) && keys.contains(&key));
-            changes.iter().any(|change| replaces(&*change.key)) || is_still && OF_MODULATION.contains(&key)
+            let replaces = |new| {
+                new == key
+                    || RIVALS
+                        .iter()
+                        .any(|keys| keys.contains(&new) && keys.contains(&key))
+            };
+            changes.iter().any(|change| replaces(&*change.key))
+                || is_still && OF_MODULATION.contains(&key)
         };
         let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
         for key in keys.iter().filter(|key| goes(key) && !stays(key)) {
@@ -91,12 +153,20 @@ pub fn varied(text: &str, changes: &[Change]) -> String {
     for change @ Change { key, value, .. } in changes {
         let section = section_of(change);
         let table = document.entry(section).or_insert_with(toml_edit::table);
-        let Ok(mut value) = value.parse::<Value>() else { continue };
+        let Ok(mut value) = value.parse::<Value>() else {
+            continue;
+        };
         // The old comment may be about the old value.
         if table.is_table() {
-            value.decor_mut().set_suffix(if section == AXES { "  # --axis" } else { "  # --set" });
+            value.decor_mut().set_suffix(if section == AXES {
+                "  # --axis"
+            } else {
+                "  # --set"
+            });
         }
-        let Some(table) = table.as_table_like_mut() else { continue };
+        let Some(table) = table.as_table_like_mut() else {
+            continue;
+        };
         if let Some(place) = table.get_mut(key) {
             *place = Item::Value(value);
         } else {
@@ -137,60 +207,134 @@ mod tests {
              [record] # short\nslips = 7  # --set\n"
         );
         assert_eq!(varied(&text, &changes), text);
-        assert_eq!(Sweep::parse(&text, Path::new("mine.toml")).unwrap().jobs().count(), 2 * 5);
+        assert_eq!(
+            Sweep::parse(&text, Path::new("mine.toml"))
+                .unwrap()
+                .jobs()
+                .count(),
+            2 * 5
+        );
     }
 
     #[test]
     fn a_value_in_its_place_keeps_the_comment_above_it_and_no_other() {
-        let text =
-            varied(TEXT, &[Change::setting("Kd", "2e7"), axis("V0", "linear:1e-5:2e-5:3"), axis("seed", "count:4")]);
-        assert!(text.contains("# Stiff.\nKd = 20000000.0  # --set\nNs"), "{text}");
+        let text = varied(
+            TEXT,
+            &[
+                Change::setting("Kd", "2e7"),
+                axis("V0", "linear:1e-5:2e-5:3"),
+                axis("seed", "count:4"),
+            ],
+        );
         assert!(
-            text.contains("# Slow and fast.\nV0    = { linear = [1e-5, 2e-5], points = 3 }  # --axis\nDelta"),
+            text.contains("# Stiff.\nKd = 20000000.0  # --set\nNs"),
             "{text}"
         );
-        assert_eq!(Sweep::parse(&text, Path::new("mine.toml")).unwrap().jobs().count(), 3 * 4);
+        assert!(
+            text.contains(
+                "# Slow and fast.\nV0    = { linear = [1e-5, 2e-5], points = 3 }  # --axis\nDelta"
+            ),
+            "{text}"
+        );
+        assert_eq!(
+            Sweep::parse(&text, Path::new("mine.toml"))
+                .unwrap()
+                .jobs()
+                .count(),
+            3 * 4
+        );
     }
 
     #[test]
     fn what_has_no_effect_without_modulation_goes_with_it_unless_it_is_set() {
         let text = TEXT.replace("slips = 3\n", "slips = 3\ncontrol = true\n");
         let still = varied(&text, &[Change::setting("Delta", "0")]);
-        assert!(!still.contains("T ") && !still.contains("control"), "{still}");
-        assert_eq!(Sweep::parse(&still, Path::new("mine.toml")).unwrap().jobs().count(), 2);
-        let set = varied(&text, &[Change::setting("Delta", "0.0"), Change::setting("T", "1")]);
-        assert!(set.contains("T = 1  # --set") && set.contains("Delta = 0.0"), "{set}");
+        assert!(
+            !still.contains("T ") && !still.contains("control"),
+            "{still}"
+        );
+        assert_eq!(
+            Sweep::parse(&still, Path::new("mine.toml"))
+                .unwrap()
+                .jobs()
+                .count(),
+            2
+        );
+        let set = varied(
+            &text,
+            &[Change::setting("Delta", "0.0"), Change::setting("T", "1")],
+        );
+        assert!(
+            set.contains("T = 1  # --set") && set.contains("Delta = 0.0"),
+            "{set}"
+        );
         assert!(varied(&text, &[Change::setting("Delta", "1e-7")]).contains("control"));
     }
 
     #[test]
     fn a_target_and_seeds_take_the_place_of_what_was_there() {
         let parsed = |text: &str| Sweep::parse(text, Path::new("mine.toml")).unwrap();
-        let precise = [Change::setting("of", "tau_mean"), Change::setting("relative", "0.02")];
+        let precise = [
+            Change::setting("of", "tau_mean"),
+            Change::setting("relative", "0.02"),
+        ];
         let seeds = Change::setting("seeds", "{ from = 24, to = 48 }");
         let fixed = TEXT.replace("[record]", "seed = { count = 4 }\n[record]");
         let text = varied(&fixed, &[precise.as_slice(), &[seeds]].concat());
         assert!(!text.contains("seed = "), "{text}");
-        assert!(parsed(&text).rounds().unwrap().precision.is_some(), "{text}");
-        let text =
-            varied(&text, &[Change::setting("absolute", "1e-3"), Change::setting("seeds", "{ from = 30, to = 40 }")]);
-        assert!(!text.contains("relative") && text.contains("absolute = 0.001  # --set"), "{text}");
+        assert!(
+            parsed(&text).rounds().unwrap().precision.is_some(),
+            "{text}"
+        );
+        let text = varied(
+            &text,
+            &[
+                Change::setting("absolute", "1e-3"),
+                Change::setting("seeds", "{ from = 30, to = 40 }"),
+            ],
+        );
+        assert!(
+            !text.contains("relative") && text.contains("absolute = 0.001  # --set"),
+            "{text}"
+        );
         assert_eq!(parsed(&text).rounds().unwrap().seeds, 30..=40);
         let refined = "name = \"edge\"\n[refine]\nto = 0.1\nseeds = { from = 24, to = 48 }\n";
-        let text =
-            varied(refined, &[Change::setting("axis", "V0"), Change::setting("seeds", "{ from = 30, to = 40 }")]);
-        let expected = "[refine]\nto = 0.1\nseeds = { from = 30, to = 40 }  # --set\naxis = \"V0\"  # --set\n";
+        let text = varied(
+            refined,
+            &[
+                Change::setting("axis", "V0"),
+                Change::setting("seeds", "{ from = 30, to = 40 }"),
+            ],
+        );
+        let expected =
+            "[refine]\nto = 0.1\nseeds = { from = 30, to = 40 }  # --set\naxis = \"V0\"  # --set\n";
         assert!(text.ends_with(expected), "{text}");
     }
 
     #[test]
     fn every_form_of_an_axis_and_a_file_without_sections_are_read() {
         let text = "name = \"mine\"\nmodel = { Ns = 4, V0 = 1e-5 }\n";
-        for (values, count) in [("1e-5", 1), ("[1e-5, 1e-4]", 2), ("{ log = [1e-5, 1e-3], points = 3 }", 3)] {
-            let text =
-                varied(text, &[axis("V0", values), Change::setting("Ns", "9"), Change::setting("tolerance", "1e-5")]);
+        for (values, count) in [
+            ("1e-5", 1),
+            ("[1e-5, 1e-4]", 2),
+            ("{ log = [1e-5, 1e-3], points = 3 }", 3),
+        ] {
+            let text = varied(
+                text,
+                &[
+                    axis("V0", values),
+                    Change::setting("Ns", "9"),
+                    Change::setting("tolerance", "1e-5"),
+                ],
+            );
             let sweep = Sweep::parse(&text, Path::new("mine.toml")).unwrap();
-            assert_eq!((sweep.jobs().count(), sweep.jobs().next().unwrap().parameters.contacts_per_block), (count, 9));
+            assert_eq!(
+                (
+                    sweep.jobs().count(),
+                    sweep.jobs().next().unwrap().parameters.contacts_per_block
+                ),
+                (count, 9)
+            );
         }
         assert!(Change::axis("V0", "[1e-5").is_err());
         assert_eq!(Change::setting("break_on", "tension").value, "\"tension\"");

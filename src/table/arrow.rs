@@ -7,7 +7,9 @@
 use super::columns::{Column, Field as _, FromRow, Kind, Row, Value};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};
-use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_array::{
+    Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray,
+};
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use serde_json::{Map, Value as Json, json};
 use std::borrow::Cow;
@@ -32,7 +34,12 @@ fn data_type(kind: Kind) -> DataType {
 }
 
 fn field(column: &Column) -> Field {
-    Field::new(column.name.as_ref(), data_type(column.kind), column.nullable).with_metadata(HashMap::from([
+    Field::new(
+        column.name.as_ref(),
+        data_type(column.kind),
+        column.nullable,
+    )
+    .with_metadata(HashMap::from([
         (UNIT.to_owned(), column.unit.to_owned()),
         (DESCRIPTION.to_owned(), column.meaning.to_owned()),
     ]))
@@ -47,13 +54,26 @@ pub fn schema<R: Row>() -> SchemaRef {
 pub fn schema_of(fields: Vec<Field>) -> SchemaRef {
     let by_name = |key| by_name(fields.iter(), key);
     let attributes = json!({ "meaning": by_name(DESCRIPTION), "units": by_name(UNIT) });
-    Arc::new(Schema::new_with_metadata(fields, HashMap::from([(PANDAS_ATTRS.to_owned(), attributes.to_string())])))
+    Arc::new(Schema::new_with_metadata(
+        fields,
+        HashMap::from([(PANDAS_ATTRS.to_owned(), attributes.to_string())]),
+    ))
 }
 
 /// What the metadata of fields hold under a key, by the names of the fields.
 pub(super) fn by_name<'f>(fields: impl Iterator<Item = &'f Field>, key: &str) -> Json {
-    let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default().into();
-    fields.map(|field| (field.name().clone(), text(field))).collect::<Map<_, _>>().into()
+    let text = |field: &Field| {
+        field
+            .metadata()
+            .get(key)
+            .cloned()
+            .unwrap_or_default()
+            .into()
+    };
+    fields
+        .map(|field| (field.name().clone(), text(field)))
+        .collect::<Map<_, _>>()
+        .into()
 }
 
 /// The rows of a batch as texts, which read back as the same values; empty where a value is missing.
@@ -64,7 +84,12 @@ pub fn texts(rows: &RecordBatch) -> impl Iterator<Item = Vec<String>> {
         Value::Count(count) => count.cast_signed().to_string(),
         other => other.to_string(),
     };
-    (0..rows.num_rows()).map(move |row| rows.columns().iter().map(|array| text(array, row)).collect())
+    (0..rows.num_rows()).map(move |row| {
+        rows.columns()
+            .iter()
+            .map(|array| text(array, row))
+            .collect()
+    })
 }
 
 /// A row as JSON: an object with the names of the columns; null where a value is missing or not finite.
@@ -102,7 +127,11 @@ impl RowBuffer {
                 Kind::Text => Cells::Text(Vec::new()),
             })
         });
-        Self { schema: schema::<R>(), cells: cells.collect(), rows: 0 }
+        Self {
+            schema: schema::<R>(),
+            cells: cells.collect(),
+            rows: 0,
+        }
     }
 
     /// The same without the columns of these names.
@@ -113,7 +142,14 @@ impl RowBuffer {
                 *cells = None;
             }
         }
-        self.schema = schema_of(self.schema.fields().iter().map(|field| Field::clone(field)).filter(has).collect());
+        self.schema = schema_of(
+            self.schema
+                .fields()
+                .iter()
+                .map(|field| Field::clone(field))
+                .filter(has)
+                .collect(),
+        );
         self
     }
 
@@ -142,8 +178,14 @@ impl RowBuffer {
 
     /// Appends some rows of a batch of the same table.
     pub fn copy(&mut self, batch: &RecordBatch, rows: Range<usize>) -> Result<(), ArrowError> {
-        for (field, cells) in self.schema.fields().iter().zip(self.cells.iter_mut().flatten()) {
-            let array = column(batch, field.name(), field.data_type()).map_err(ArrowError::SchemaError)?;
+        for (field, cells) in self
+            .schema
+            .fields()
+            .iter()
+            .zip(self.cells.iter_mut().flatten())
+        {
+            let array =
+                column(batch, field.name(), field.data_type()).map_err(ArrowError::SchemaError)?;
             rows.clone().for_each(|row| cells.push(cell(array, row)));
         }
         self.rows += rows.len();
@@ -153,7 +195,10 @@ impl RowBuffer {
     /// Takes all rows out as one batch.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
-        RecordBatch::try_new(Arc::clone(&self.schema), self.cells.iter_mut().flatten().map(Cells::take).collect())
+        RecordBatch::try_new(
+            Arc::clone(&self.schema),
+            self.cells.iter_mut().flatten().map(Cells::take).collect(),
+        )
     }
 }
 
@@ -161,35 +206,63 @@ impl Cells {
     fn push(&mut self, cell: Value<'_>) {
         // What is of no kind is a missing value; a cell of another kind than its column does not exist.
         match self {
-            Self::Real(cells) => cells.push(if let Value::Real(real) = cell { Some(real) } else { None }),
+            Self::Real(cells) => cells.push(if let Value::Real(real) = cell {
+                Some(real)
+            } else {
+                None
+            }),
             Self::Count(cells) => cells.push(u64::from_value(cell).map(u64::cast_signed)),
             Self::Flag(cells) => cells.push(bool::from_value(cell)),
-            Self::Text(cells) => cells.push(if let Value::Text(text) = cell { Some(text.to_owned()) } else { None }),
+            Self::Text(cells) => cells.push(if let Value::Text(text) = cell {
+                Some(text.to_owned())
+            } else {
+                None
+            }),
         }
     }
 
     fn take(&mut self) -> ArrayRef {
         match self {
-            Self::Real(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Float64Array>()),
-            Self::Count(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Int64Array>()),
-            Self::Flag(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<BooleanArray>()),
-            Self::Text(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<StringArray>()),
+            Self::Real(cells) => {
+                Arc::new(std::mem::take(cells).into_iter().collect::<Float64Array>())
+            }
+            Self::Count(cells) => {
+                Arc::new(std::mem::take(cells).into_iter().collect::<Int64Array>())
+            }
+            Self::Flag(cells) => {
+                Arc::new(std::mem::take(cells).into_iter().collect::<BooleanArray>())
+            }
+            Self::Text(cells) => {
+                Arc::new(std::mem::take(cells).into_iter().collect::<StringArray>())
+            }
         }
     }
 }
 
 /// A column of a batch, by name and type.
-fn column<'a>(batch: &'a RecordBatch, name: &str, expected: &DataType) -> Result<&'a ArrayRef, String> {
-    let array = batch.column_by_name(name).ok_or_else(|| format!("there is no column {name}"))?;
+fn column<'a>(
+    batch: &'a RecordBatch,
+    name: &str,
+    expected: &DataType,
+) -> Result<&'a ArrayRef, String> {
+    let array = batch
+        .column_by_name(name)
+        .ok_or_else(|| format!("there is no column {name}"))?;
     let found = array.data_type();
-    if found == expected { Ok(array) } else { Err(format!("column {name} is {found}, not {expected}")) }
+    if found == expected {
+        Ok(array)
+    } else {
+        Err(format!("column {name} is {found}, not {expected}"))
+    }
 }
 
 fn cell(array: &ArrayRef, row: usize) -> Value<'_> {
     match array.data_type() {
         _ if array.is_null(row) => Value::Null,
         DataType::Float64 => Value::Real(array.as_primitive::<Float64Type>().value(row)),
-        DataType::Int64 => Value::Count(array.as_primitive::<Int64Type>().value(row).cast_unsigned()),
+        DataType::Int64 => {
+            Value::Count(array.as_primitive::<Int64Type>().value(row).cast_unsigned())
+        }
         DataType::Boolean => Value::Flag(array.as_boolean().value(row)),
         _ => Value::Text(array.as_string::<i32>().value(row)),
     }
@@ -207,7 +280,13 @@ pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
     let arrays = arrays.collect::<Result<Vec<Option<&ArrayRef>>, String>>()?;
     let row = |row: usize| {
         let mut columns = arrays.iter();
-        R::from_cells(&mut || columns.next().copied().flatten().map_or(Value::Null, |array| cell(array, row)))
+        R::from_cells(&mut || {
+            columns
+                .next()
+                .copied()
+                .flatten()
+                .map_or(Value::Null, |array| cell(array, row))
+        })
     };
     (0..batch.num_rows()).map(row).collect()
 }
@@ -241,7 +320,10 @@ mod tests {
             Arc::new(Float64Array::from(vec![None, Some(0.01)])),
             Arc::new(StringArray::from(vec!["magnitude", "magnitude"])),
         ];
-        assert_eq!(batch(), RecordBatch::try_new(schema::<Readings>(), expected).unwrap());
+        assert_eq!(
+            batch(),
+            RecordBatch::try_new(schema::<Readings>(), expected).unwrap()
+        );
     }
 
     #[test]
@@ -261,10 +343,22 @@ mod tests {
             buffer.take().unwrap()
         };
         let [(first, of_first), (second, of_second)] = readings();
-        let expected = [(first, of_first), (Reading { phase: None, ..second }, of_second)];
+        let expected = [
+            (first, of_first),
+            (
+                Reading {
+                    phase: None,
+                    ..second
+                },
+                of_second,
+            ),
+        ];
         assert_eq!(without("phase").num_columns(), 8);
         assert_eq!(rows::<Readings>(&without("phase")).unwrap(), expected);
-        assert_eq!(rows::<Readings>(&without("force")).unwrap_err(), "there is no column force");
+        assert_eq!(
+            rows::<Readings>(&without("force")).unwrap_err(),
+            "there is no column force"
+        );
     }
 
     #[test]
@@ -277,10 +371,22 @@ mod tests {
 
     #[test]
     fn a_batch_of_another_table_is_refused_by_column() {
-        let other = RecordBatch::try_from_iter([("force", Arc::new(Int64Array::from(vec![1])) as ArrayRef)]).unwrap();
+        let other = RecordBatch::try_from_iter([(
+            "force",
+            Arc::new(Int64Array::from(vec![1])) as ArrayRef,
+        )])
+        .unwrap();
         let error = RowBuffer::new::<Reading>().copy(&other, 0..1).unwrap_err();
-        assert!(error.to_string().contains("column force is Int64, not Float64"), "{error}");
-        assert_eq!(rows::<Reading>(&other).unwrap_err(), "column force is Int64, not Float64");
+        assert!(
+            error
+                .to_string()
+                .contains("column force is Int64, not Float64"),
+            "{error}"
+        );
+        assert_eq!(
+            rows::<Reading>(&other).unwrap_err(),
+            "column force is Int64, not Float64"
+        );
     }
 
     #[test]
@@ -291,15 +397,27 @@ mod tests {
             "T": null, "break_on": "magnitude"
         });
         assert_eq!(json(&first), expected);
-        let second = json(&(Reading { force: f64::NAN, ..second }, selected));
-        assert_eq!((&second["force"], &second["phase"], &second["T"]), (&Json::Null, &json!(0.25), &json!(0.01)));
+        let second = json(&(
+            Reading {
+                force: f64::NAN,
+                ..second
+            },
+            selected,
+        ));
+        assert_eq!(
+            (&second["force"], &second["phase"], &second["T"]),
+            (&Json::Null, &json!(0.25), &json!(0.01))
+        );
     }
 
     #[test]
     fn units_are_in_the_fields_and_where_pandas_looks() {
         let schema = schema::<Readings>();
         assert_eq!(schema.field(0).metadata()[UNIT], "N");
-        assert_eq!(schema.field(1).metadata()[DESCRIPTION], "phase of the onset");
+        assert_eq!(
+            schema.field(1).metadata()[DESCRIPTION],
+            "phase of the onset"
+        );
         let attributes: Json = serde_json::from_str(&schema.metadata()[PANDAS_ATTRS]).unwrap();
         assert_eq!(attributes["units"]["T"], "s");
         assert_eq!(attributes["meaning"]["force"], "shear force");

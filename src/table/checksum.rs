@@ -31,7 +31,9 @@ pub fn hexadecimal(hash: &[u8]) -> String {
 
 /// Where the hash stands in bytes that end a file.
 fn place(end: &[u8]) -> Option<usize> {
-    let mark = end.windows(ENCODED_KEY.len()).position(|bytes| bytes == ENCODED_KEY)?;
+    let mark = end
+        .windows(ENCODED_KEY.len())
+        .position(|bytes| bytes == ENCODED_KEY)?;
     let place = mark + ENCODED_KEY.len();
     (place + PLACEHOLDER.len() <= end.len()).then_some(place)
 }
@@ -49,9 +51,16 @@ pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<()> {
 /// Compares the bytes of a file with their checksum; what is wrong with them.
 pub fn check(bytes: &[u8]) -> Result<(), &'static str> {
     const CUT: &str = "it is cut off, or no Parquet file";
-    let (Some(rest), true) = (bytes.len().checked_sub(END), bytes.ends_with(MAGIC)) else { return Err(CUT) };
-    let length = bytes[rest..].first_chunk().map_or(0, |length| u32::from_le_bytes(*length));
-    let footer = rest.checked_sub(length as usize).filter(|begin| *begin >= MAGIC.len()).ok_or(CUT)?;
+    let (Some(rest), true) = (bytes.len().checked_sub(END), bytes.ends_with(MAGIC)) else {
+        return Err(CUT);
+    };
+    let length = bytes[rest..]
+        .first_chunk()
+        .map_or(0, |length| u32::from_le_bytes(*length));
+    let footer = rest
+        .checked_sub(length as usize)
+        .filter(|begin| *begin >= MAGIC.len())
+        .ok_or(CUT)?;
     let place = footer + place(&bytes[footer..]).ok_or("it has no checksum")?;
     let (before, rest) = bytes.split_at(place);
     let (written, after) = rest.split_at(PLACEHOLDER.len());
@@ -86,11 +95,16 @@ pub fn to_json<T: Serialize>(value: &T) -> serde_json::Result<String> {
 
 /// The value of such a text.
 pub fn from_json<T: Serialize + DeserializeOwned>(text: &str) -> Result<T, String> {
-    let mut object: Map<String, Value> = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    let mut object: Map<String, Value> =
+        serde_json::from_str(text).map_err(|error| error.to_string())?;
     object.remove("sha256").ok_or("it has no checksum")?;
     let value = serde_json::from_value(Value::Object(object)).map_err(|error| error.to_string())?;
     let expected = to_json(&value).map_err(|error| error.to_string())?;
-    if text == expected { Ok(value) } else { Err("it is not as the program wrote it".to_owned()) }
+    if text == expected {
+        Ok(value)
+    } else {
+        Err("it is not as the program wrote it".to_owned())
+    }
 }
 
 #[cfg(test)]
@@ -106,7 +120,8 @@ mod tests {
     fn every_changed_bit_and_every_cut_is_found() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.parquet");
-        let mut writer = TableWriter::<Reading>::new(Disk.create(&path).unwrap(), &Footer::default()).unwrap();
+        let mut writer =
+            TableWriter::<Reading>::new(Disk.create(&path).unwrap(), &Footer::default()).unwrap();
         for (reading, _) in &readings() {
             writer.push(reading).unwrap();
         }
@@ -133,7 +148,10 @@ mod tests {
             let mut changed = text.clone().into_bytes();
             changed[bit / 8] ^= 1 << (bit % 8);
             if let Ok(changed) = String::from_utf8(changed) {
-                assert!(from_json::<BTreeMap<String, Vec<u32>>>(&changed).is_err(), "{changed}");
+                assert!(
+                    from_json::<BTreeMap<String, Vec<u32>>>(&changed).is_err(),
+                    "{changed}"
+                );
             }
         }
     }

@@ -56,8 +56,11 @@ pub(crate) mod tests {
     pub(crate) fn readings() -> [Readings; 2] {
         use crate::model::Parameters;
 
-        let modulated =
-            Parameters { modulation_amplitude: 1e-6, modulation_period: Some(0.01), ..Parameters::default() };
+        let modulated = Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(0.01),
+            ..Parameters::default()
+        };
         let reading = |force, phase, position, rule| Reading {
             force,
             phase,
@@ -67,8 +70,14 @@ pub(crate) mod tests {
             rule,
         };
         [
-            (reading(1.5, None, 1, None), Selected::new(Parameters::default())),
-            (reading(-2.5, Some(0.25), 2, Some(BreakOn::Tension)), Selected::new(modulated)),
+            (
+                reading(1.5, None, 1, None),
+                Selected::new(Parameters::default()),
+            ),
+            (
+                reading(-2.5, Some(0.25), 2, Some(BreakOn::Tension)),
+                Selected::new(modulated),
+            ),
         ]
     }
 
@@ -79,9 +88,18 @@ pub(crate) mod tests {
             let column = columns.iter().find(|column| column.name == name).unwrap();
             (column.unit, column.meaning, column.kind, column.nullable)
         };
-        assert_eq!(described("phase"), ("rad", "phase of the onset", Kind::Real, true));
-        assert_eq!(described("number"), ("", "number of the reading", Kind::Count, false));
-        assert_eq!(described("T"), ("s", Symbol::T.description().meaning, Kind::Real, true));
+        assert_eq!(
+            described("phase"),
+            ("rad", "phase of the onset", Kind::Real, true)
+        );
+        assert_eq!(
+            described("number"),
+            ("", "number of the reading", Kind::Count, false)
+        );
+        assert_eq!(
+            described("T"),
+            ("s", Symbol::T.description().meaning, Kind::Real, true)
+        );
         assert_eq!(described("break_on").2, Kind::Text);
     }
 
@@ -90,7 +108,12 @@ pub(crate) mod tests {
         let error = Reading::from_cells(&mut || Value::Null).unwrap_err();
         assert!(error.contains("column force cannot hold Null"), "{error}");
         let period = |value: f64| {
-            let mut cells = [Value::Real(1e-6), Value::Real(value), Value::Text("magnitude")].into_iter();
+            let mut cells = [
+                Value::Real(1e-6),
+                Value::Real(value),
+                Value::Text("magnitude"),
+            ]
+            .into_iter();
             Selected::<PeriodAndRule>::from_cells(&mut || cells.next().unwrap())
         };
         assert!(period(-1.0).unwrap_err().contains("T = -1"));
@@ -99,7 +122,13 @@ pub(crate) mod tests {
     #[test]
     fn the_documentation_has_a_line_for_each_column() {
         let text = markdown::<Readings>();
-        assert!(text.starts_with("## readings\n\nOne row per reading.\n"), "{text}");
-        assert!(text.contains("| `phase` | rad? | phase of the onset |\n"), "{text}");
+        assert!(
+            text.starts_with("## readings\n\nOne row per reading.\n"),
+            "{text}"
+        );
+        assert!(
+            text.contains("| `phase` | rad? | phase of the onset |\n"),
+            "{text}"
+        );
     }
 }

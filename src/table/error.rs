@@ -36,7 +36,11 @@ pub struct ResultsError {
 
 impl ResultsError {
     pub(crate) fn new(kind: ErrorKind, path: &Path, problem: impl fmt::Display) -> Self {
-        Self { kind, path: path.to_owned(), problem: problem.to_string() }
+        Self {
+            kind,
+            path: path.to_owned(),
+            problem: problem.to_string(),
+        }
     }
 
     /// What was asked for does not fit.
@@ -56,12 +60,22 @@ impl ResultsError {
 
     /// For `map_err`: why a file of the directory cannot be read. What has its name and is no file is damage.
     pub fn of_reading(error: StorageError) -> Self {
-        if error.is_no_file() { Self::damaged(&error.path, error.source) } else { error.into() }
+        if error.is_no_file() {
+            Self::damaged(&error.path, error.source)
+        } else {
+            error.into()
+        }
     }
 
     /// For `map_err`: why a file cannot be written.
     pub(super) fn unwritten(path: &Path) -> impl FnOnce(ParquetError) -> Self {
-        move |error| Self::new(ErrorKind::Disk(io::ErrorKind::Other), path, format!("cannot be written: {error}"))
+        move |error| {
+            Self::new(
+                ErrorKind::Disk(io::ErrorKind::Other),
+                path,
+                format!("cannot be written: {error}"),
+            )
+        }
     }
 
     /// Of a file that must be there: its path and what is wrong with it, as far as that is known.
@@ -79,7 +93,11 @@ impl ResultsError {
 
 impl fmt::Display for ResultsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { kind, path, problem } = self;
+        let Self {
+            kind,
+            path,
+            problem,
+        } = self;
         let path = shown(path);
         match kind {
             ErrorKind::Damaged => write!(
@@ -96,6 +114,10 @@ impl Error for ResultsError {}
 
 impl From<StorageError> for ResultsError {
     fn from(error: StorageError) -> Self {
-        Self::new(ErrorKind::Disk(error.kind()), &error.path, format!("cannot {}: {}", error.action, error.source))
+        Self::new(
+            ErrorKind::Disk(error.kind()),
+            &error.path,
+            format!("cannot {}: {}", error.action, error.source),
+        )
     }
 }

@@ -47,8 +47,17 @@ pub struct Footer(BTreeMap<String, String>);
 impl Default for Footer {
     /// Program, model version and scheme of random numbers.
     fn default() -> Self {
-        let texts = [("program", PROGRAM), ("model_version", &MODEL_VERSION.to_string()), ("rng_scheme", RNG_SCHEME)];
-        Self(texts.into_iter().map(|(key, text)| (key.to_owned(), text.to_owned())).collect())
+        let texts = [
+            ("program", PROGRAM),
+            ("model_version", &MODEL_VERSION.to_string()),
+            ("rng_scheme", RNG_SCHEME),
+        ];
+        Self(
+            texts
+                .into_iter()
+                .map(|(key, text)| (key.to_owned(), text.to_owned()))
+                .collect(),
+        )
     }
 }
 
@@ -76,8 +85,18 @@ impl Footer {
             .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_max_row_group_row_count(Some(GROUP_ROWS))
-            .set_key_value_metadata(Some(footer.0.into_iter().map(|(key, text)| KeyValue::new(key, text)).collect()));
-        for field in schema.fields().iter().filter(|field| field.data_type() == &DataType::Float64) {
+            .set_key_value_metadata(Some(
+                footer
+                    .0
+                    .into_iter()
+                    .map(|(key, text)| KeyValue::new(key, text))
+                    .collect(),
+            ));
+        for field in schema
+            .fields()
+            .iter()
+            .filter(|field| field.data_type() == &DataType::Float64)
+        {
             let path = ColumnPath::from(field.name().as_str());
             properties = properties
                 .set_column_dictionary_enabled(path.clone(), false)
@@ -97,7 +116,9 @@ fn by_name(schema: &Schema, key: &str) -> String {
 
 /// Whether a footer is that of a file with these columns.
 pub fn has_columns(footer: &BTreeMap<String, String>, schema: &Schema) -> bool {
-    footer.get(UNITS).is_some_and(|units| *units == by_name(schema, UNIT))
+    footer
+        .get(UNITS)
+        .is_some_and(|units| *units == by_name(schema, UNIT))
 }
 
 /// Writes one file of a table. A file that was not finished is unreadable.
@@ -117,25 +138,43 @@ impl<R: Row> TableWriter<R> {
     }
 
     /// The same without the columns of these names.
-    pub fn without(left_out: &[Cow<'static, str>], file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
+    pub fn without(
+        left_out: &[Cow<'static, str>],
+        file: StoredFile,
+        footer: &Footer,
+    ) -> Result<Self, ResultsError> {
         let buffer = RowBuffer::new::<R>().without(left_out);
         let writer = footer
             .properties(buffer.schema())
-            .and_then(|properties| ArrowWriter::try_new(Vec::new(), Arc::clone(buffer.schema()), Some(properties)))
+            .and_then(|properties| {
+                ArrowWriter::try_new(Vec::new(), Arc::clone(buffer.schema()), Some(properties))
+            })
             .map_err(ResultsError::unwritten(file.path()))?;
-        Ok(Self { row: PhantomData, buffer, writer, file, hasher: Sha256::new() })
+        Ok(Self {
+            row: PhantomData,
+            buffer,
+            writer,
+            file,
+            hasher: Sha256::new(),
+        })
     }
 
     pub fn push(&mut self, row: &R) -> Result<(), ResultsError> {
         self.buffer.push(row);
-        if self.buffer.len() == GROUP_ROWS { self.flush() } else { Ok(()) }
+        if self.buffer.len() == GROUP_ROWS {
+            self.flush()
+        } else {
+            Ok(())
+        }
     }
 
     /// Appends rows that were read from a file of the same table.
     pub fn copy(&mut self, batch: &Batch, mut rows: Range<usize>) -> Result<(), ResultsError> {
         while !rows.is_empty() {
             let next = rows.end.min(rows.start + GROUP_ROWS - self.buffer.len());
-            self.buffer.copy(&batch.rows, rows.start..next).map_err(ResultsError::damage_at(&batch.path))?;
+            self.buffer
+                .copy(&batch.rows, rows.start..next)
+                .map_err(ResultsError::damage_at(&batch.path))?;
             rows.start = next;
             if self.buffer.len() == GROUP_ROWS {
                 self.flush()?;
@@ -146,8 +185,14 @@ impl<R: Row> TableWriter<R> {
 
     /// Writes the buffered rows as a row group.
     fn flush(&mut self) -> Result<(), ResultsError> {
-        let written = self.buffer.take().map_err(ParquetError::from).and_then(|batch| self.writer.write(&batch));
-        let written = written.and_then(|()| self.writer.flush()).and_then(|()| Ok(self.writer.sync()?));
+        let written = self
+            .buffer
+            .take()
+            .map_err(ParquetError::from)
+            .and_then(|batch| self.writer.write(&batch));
+        let written = written
+            .and_then(|()| self.writer.flush())
+            .and_then(|()| Ok(self.writer.sync()?));
         written.map_err(ResultsError::unwritten(self.file.path()))?;
         let bytes = std::mem::take(self.writer.inner_mut());
         self.hasher.update(&bytes);
@@ -162,8 +207,11 @@ impl<R: Row> TableWriter<R> {
         }
         let mut file = self.file;
         let footer = self.writer.into_inner().and_then(|mut footer| {
-            let missing = || ParquetError::General("the footer has no place for a checksum".to_owned());
-            checksum::close(self.hasher, &mut footer).ok_or_else(missing).map(|()| footer)
+            let missing =
+                || ParquetError::General("the footer has no place for a checksum".to_owned());
+            checksum::close(self.hasher, &mut footer)
+                .ok_or_else(missing)
+                .map(|()| footer)
         });
         let footer = footer.map_err(ResultsError::unwritten(file.path()))?;
         file.write(&footer)?;
@@ -192,11 +240,22 @@ fn load(storage: &dyn Storage, path: &Path) -> Result<Bytes, ResultsError> {
 }
 
 /// The texts under keys in the footer of a file.
-pub fn footer(storage: &dyn Storage, path: &Path) -> Result<BTreeMap<String, String>, ResultsError> {
+pub fn footer(
+    storage: &dyn Storage,
+    path: &Path,
+) -> Result<BTreeMap<String, String>, ResultsError> {
     let bytes = load(storage, path)?;
-    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(ResultsError::damage_at(path))?;
-    let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
-    Ok(entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default())).collect())
+    let metadata = ParquetMetaDataReader::new()
+        .parse_and_finish(&bytes)
+        .map_err(ResultsError::damage_at(path))?;
+    let entries = metadata
+        .file_metadata()
+        .key_value_metadata()
+        .into_iter()
+        .flatten();
+    Ok(entries
+        .map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default()))
+        .collect())
 }
 
 /// How many rows a file must have.
@@ -214,7 +273,9 @@ impl RowCount {
         if rows == least || (may_exceed && rows > least) {
             Ok(())
         } else {
-            Err(format!("it has {rows} rows, where the jobs of its part have {least}"))
+            Err(format!(
+                "it has {rows} rows, where the jobs of its part have {least}"
+            ))
         }
     }
 }
@@ -228,11 +289,17 @@ pub struct Dataset<'a> {
 
 impl<'a> Dataset<'a> {
     pub fn new(storage: &'a dyn Storage, files: Vec<PathBuf>) -> Self {
-        Self { storage, files: files.into_iter().map(|path| (path, None)).collect() }
+        Self {
+            storage,
+            files: files.into_iter().map(|path| (path, None)).collect(),
+        }
     }
 
     /// Files of which it is known how many rows they must have; one with others is damaged.
-    pub const fn of_known_rows(storage: &'a dyn Storage, files: Vec<(PathBuf, Option<RowCount>)>) -> Self {
+    pub const fn of_known_rows(
+        storage: &'a dyn Storage,
+        files: Vec<(PathBuf, Option<RowCount>)>,
+    ) -> Self {
         Self { storage, files }
     }
 
@@ -246,24 +313,39 @@ impl<'a> Dataset<'a> {
     }
 
     /// The same, as rows of one type.
-    pub fn rows<R: FromRow>(self) -> impl Iterator<Item = Result<Vec<R>, ResultsError>> + use<'a, R> {
-        self.read(R::columns().into_iter().map(|column| column.name).collect()).map(|batch| batch?.rows_of())
+    pub fn rows<R: FromRow>(
+        self,
+    ) -> impl Iterator<Item = Result<Vec<R>, ResultsError>> + use<'a, R> {
+        self.read(R::columns().into_iter().map(|column| column.name).collect())
+            .map(|batch| batch?.rows_of())
     }
 
     /// The same, of the columns with these names alone, of which there is at least one; in the order of the file.
-    pub fn columns(self, names: &[String]) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
+    pub fn columns(
+        self,
+        names: &[String],
+    ) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
         self.read(names.iter().cloned().map(Cow::Owned).collect())
     }
 
     /// Of columns with these names; of all if there are none.
-    fn read(self, columns: Vec<Cow<'static, str>>) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
+    fn read(
+        self,
+        columns: Vec<Cow<'static, str>>,
+    ) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
         let Self { storage, files } = self;
         let batches = files.into_iter().flat_map(move |(path, expected)| {
             let opened = open(storage, &path, expected, &columns);
-            let (reader, error) = opened.map_or_else(|error| (None, Some(Err(error))), |reader| (Some(reader), None));
+            let (reader, error) = opened.map_or_else(
+                |error| (None, Some(Err(error))),
+                |reader| (Some(reader), None),
+            );
             let path: Arc<Path> = path.into();
             let batch = move |rows: Result<RecordBatch, ArrowError>| {
-                Ok(Batch { path: Arc::clone(&path), rows: rows.map_err(ResultsError::damage_at(&path))? })
+                Ok(Batch {
+                    path: Arc::clone(&path),
+                    rows: rows.map_err(ResultsError::damage_at(&path))?,
+                })
             };
             reader.into_iter().flatten().map(batch).chain(error)
         });
@@ -280,13 +362,21 @@ fn open(
 ) -> Result<ParquetRecordBatchReader, ResultsError> {
     let bytes = load(storage, path)?;
     let reader = || {
-        let mut builder = ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
+        let mut builder =
+            ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
         if let Some(expected) = expected {
-            let rows = builder.metadata().file_metadata().num_rows().cast_unsigned();
+            let rows = builder
+                .metadata()
+                .file_metadata()
+                .num_rows()
+                .cast_unsigned();
             expected.check(rows).map_err(ParquetError::General)?;
         }
         if !columns.is_empty() {
-            let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().map(AsRef::as_ref));
+            let mask = ProjectionMask::columns(
+                builder.parquet_schema(),
+                columns.iter().map(AsRef::as_ref),
+            );
             builder = builder.with_projection(mask);
         }
         builder.build()
@@ -338,13 +428,21 @@ mod tests {
 
     fn dataset(folder: &Path) -> Dataset<'static> {
         let names = Disk.list(folder).unwrap();
-        Dataset::new(&Disk, names.into_iter().map(|name| folder.join(name)).collect())
+        Dataset::new(
+            &Disk,
+            names.into_iter().map(|name| folder.join(name)).collect(),
+        )
     }
 
     fn numbers(folder: &Path) -> Result<Vec<u64>, ResultsError> {
         let mut numbers = Vec::new();
         for batch in dataset(folder).batches() {
-            numbers.extend(batch?.rows_of()?.into_iter().map(|number: Number| number.value));
+            numbers.extend(
+                batch?
+                    .rows_of()?
+                    .into_iter()
+                    .map(|number: Number| number.value),
+            );
         }
         Ok(numbers)
     }
@@ -356,18 +454,27 @@ mod tests {
         write(&folder.path().join("a.parquet"), 0..5);
         write(&folder.path().join("c.parquet"), 0..0);
         assert_eq!(numbers(folder.path()).unwrap(), (0..9).collect::<Vec<_>>());
-        let rows = dataset(folder.path()).rows().collect::<Result<Vec<Vec<Number>>, _>>();
-        assert_eq!(rows.unwrap().concat(), (0..9).map(Number::of).collect::<Vec<_>>());
+        let rows = dataset(folder.path())
+            .rows()
+            .collect::<Result<Vec<Vec<Number>>, _>>();
+        assert_eq!(
+            rows.unwrap().concat(),
+            (0..9).map(Number::of).collect::<Vec<_>>()
+        );
     }
 
     #[test]
     fn bytes_do_not_depend_on_how_rows_came_in() {
         let folder = tempfile::tempdir().unwrap();
-        let (whole, copied) = (folder.path().join("whole.parquet"), folder.path().join("copied.parquet"));
+        let (whole, copied) = (
+            folder.path().join("whole.parquet"),
+            folder.path().join("copied.parquet"),
+        );
         let rows = GROUP_ROWS as u64 + 1000;
         write(&whole, 0..rows);
         let footer = Footer::default().with("note", "test");
-        let mut writer = TableWriter::<Number>::new(Disk.create(&copied).unwrap(), &footer).unwrap();
+        let mut writer =
+            TableWriter::<Number>::new(Disk.create(&copied).unwrap(), &footer).unwrap();
         for batch in Dataset::new(&Disk, vec![whole.clone()]).batches() {
             let batch = batch.unwrap();
             let middle = batch.rows.num_rows() / 3;
@@ -376,7 +483,9 @@ mod tests {
         }
         writer.finish().unwrap();
         assert!(fs::read(&whole).unwrap() == fs::read(&copied).unwrap());
-        let groups = SerializedFileReader::new(File::open(&whole).unwrap()).unwrap().num_row_groups();
+        let groups = SerializedFileReader::new(File::open(&whole).unwrap())
+            .unwrap()
+            .num_row_groups();
         assert_eq!(groups, 2);
     }
 
@@ -390,7 +499,16 @@ mod tests {
         let entries = metadata.key_value_metadata().unwrap();
         let keys: Vec<_> = entries.iter().map(|entry| entry.key.as_str()).collect();
         // The Arrow schema is appended by the format's library.
-        let expected = ["meaning", "model_version", "note", "program", "rng_scheme", "seal", "units", "ARROW:schema"];
+        let expected = [
+            "meaning",
+            "model_version",
+            "note",
+            "program",
+            "rng_scheme",
+            "seal",
+            "units",
+            "ARROW:schema",
+        ];
         assert_eq!(keys, expected);
         assert!(entries[6].value.as_ref().unwrap().contains(r#""root":"m""#));
     }
@@ -405,14 +523,20 @@ mod tests {
         for cut in (0..bytes.len()).step_by(step) {
             fs::write(&path, &bytes[..cut]).unwrap();
             let error = numbers(folder.path()).unwrap_err();
-            assert!(error.to_string().contains("a.parquet: damaged"), "cut at {cut}: {error}");
+            assert!(
+                error.to_string().contains("a.parquet: damaged"),
+                "cut at {cut}: {error}"
+            );
         }
         for changed in (0..bytes.len()).step_by(7) {
             let mut changed_bytes = bytes.clone();
             changed_bytes[changed] ^= 0x55;
             fs::write(&path, &changed_bytes).unwrap();
             let error = numbers(folder.path()).unwrap_err();
-            assert!(error.to_string().contains("a.parquet"), "changed at {changed}: {error}");
+            assert!(
+                error.to_string().contains("a.parquet"),
+                "changed at {changed}: {error}"
+            );
         }
     }
 
@@ -428,9 +552,16 @@ mod tests {
     #[test]
     fn an_error_of_the_disk_is_no_damage() {
         let path = Path::new("a.parquet");
-        let is_of_disk = |error: ResultsError| matches!(error.kind, ErrorKind::Disk(_)) && error.path == path;
+        let is_of_disk =
+            |error: ResultsError| matches!(error.kind, ErrorKind::Disk(_)) && error.path == path;
         assert!(is_of_disk(footer(&Unreadable, path).unwrap_err()));
-        assert!(is_of_disk(Dataset::new(&Unreadable, vec![path.to_owned()]).batches().next().unwrap().unwrap_err()));
+        assert!(is_of_disk(
+            Dataset::new(&Unreadable, vec![path.to_owned()])
+                .batches()
+                .next()
+                .unwrap()
+                .unwrap_err()
+        ));
     }
 
     #[test]
@@ -440,11 +571,20 @@ mod tests {
         write(&path, 0..5);
         let read = |least, may_exceed| {
             let expected = Some(RowCount { least, may_exceed });
-            Dataset::of_known_rows(&Disk, vec![(path.clone(), expected)]).batches().next().unwrap().map(|_| ())
+            Dataset::of_known_rows(&Disk, vec![(path.clone(), expected)])
+                .batches()
+                .next()
+                .unwrap()
+                .map(|_| ())
         };
         assert!(read(5, false).is_ok() && read(5, true).is_ok() && read(4, true).is_ok());
         for error in [read(4, false), read(6, false), read(6, true)].map(Result::unwrap_err) {
-            assert!(error.to_string().contains("it has 5 rows, where the jobs of its part have"), "{error}");
+            assert!(
+                error
+                    .to_string()
+                    .contains("it has 5 rows, where the jobs of its part have"),
+                "{error}"
+            );
         }
     }
 }

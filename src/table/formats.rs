@@ -48,17 +48,28 @@ fn of_csv(error: impl Into<csv::Error>) -> ParquetError {
 }
 
 impl RowWriter {
-    pub fn new(file: StoredFile, format: Format, schema: &SchemaRef, footer: &Footer) -> Result<Self, ResultsError> {
+    pub fn new(
+        file: StoredFile,
+        format: Format,
+        schema: &SchemaRef,
+        footer: &Footer,
+    ) -> Result<Self, ResultsError> {
         let path = file.path().to_owned();
         let encoder = || -> Result<Encoder, ParquetError> {
             Ok(match format {
                 Format::Parquet => {
                     let properties = footer.properties(schema)?;
-                    Encoder::Parquet(Box::new(ArrowWriter::try_new(file, Arc::clone(schema), Some(properties))?))
+                    Encoder::Parquet(Box::new(ArrowWriter::try_new(
+                        file,
+                        Arc::clone(schema),
+                        Some(properties),
+                    )?))
                 }
                 Format::Csv => {
                     let mut writer = csv::Writer::from_writer(file);
-                    writer.write_record(schema.fields().iter().map(|field| field.name())).map_err(of_csv)?;
+                    writer
+                        .write_record(schema.fields().iter().map(|field| field.name()))
+                        .map_err(of_csv)?;
                     Encoder::Csv(Box::new(writer))
                 }
                 Format::Arrow => Encoder::Arrow(Box::new(FileWriter::try_new(file, schema)?)),
@@ -71,7 +82,9 @@ impl RowWriter {
     pub fn write(&mut self, rows: &RecordBatch) -> Result<(), ResultsError> {
         let written = match &mut self.encoder {
             Encoder::Parquet(writer) => writer.write(rows),
-            Encoder::Csv(writer) => arrow::texts(rows).try_for_each(|texts| writer.write_record(texts)).map_err(of_csv),
+            Encoder::Csv(writer) => arrow::texts(rows)
+                .try_for_each(|texts| writer.write_record(texts))
+                .map_err(of_csv),
             Encoder::Arrow(writer) => writer.write(rows).map_err(ParquetError::from),
         };
         written.map_err(ResultsError::unwritten(&self.path))
@@ -81,10 +94,13 @@ impl RowWriter {
     pub fn finish(self) -> Result<(), ResultsError> {
         let file = match self.encoder {
             Encoder::Parquet(writer) => writer.into_inner(),
-            Encoder::Csv(writer) => writer.into_inner().map_err(|error| of_csv(error.into_error())),
-            Encoder::Arrow(mut writer) => {
-                writer.finish().and_then(|()| writer.into_inner()).map_err(ParquetError::from)
-            }
+            Encoder::Csv(writer) => writer
+                .into_inner()
+                .map_err(|error| of_csv(error.into_error())),
+            Encoder::Arrow(mut writer) => writer
+                .finish()
+                .and_then(|()| writer.into_inner())
+                .map_err(ParquetError::from),
         };
         Ok(file.map_err(ResultsError::unwritten(&self.path))?.sync()?)
     }

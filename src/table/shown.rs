@@ -21,9 +21,16 @@ impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for chunk in self.0.utf8_chunks() {
             for c in chunk.valid().chars() {
-                if is_plain(c) { write!(f, "{c}")? } else { write!(f, "{}", c.escape_default())? }
+                if is_plain(c) {
+                    write!(f, "{c}")?
+                } else {
+                    write!(f, "{}", c.escape_default())?
+                }
             }
-            chunk.invalid().iter().try_for_each(|byte| write!(f, "\\x{byte:02x}"))?;
+            chunk
+                .invalid()
+                .iter()
+                .try_for_each(|byte| write!(f, "\\x{byte:02x}"))?;
         }
         Ok(())
     }

@@ -33,7 +33,10 @@ pub struct StoredFile {
 impl StoredFile {
     /// The file of this path, whose bytes go there.
     pub fn new(path: &Path, sink: impl Sink + 'static) -> Self {
-        Self { path: path.to_owned(), sink: Box::new(sink) }
+        Self {
+            path: path.to_owned(),
+            sink: Box::new(sink),
+        }
     }
 
     pub fn path(&self) -> &Path {
@@ -42,12 +45,16 @@ impl StoredFile {
 
     /// Appends bytes, all of them.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError> {
-        self.sink.write_all(bytes).map_err(StorageError::at("write", &self.path))
+        self.sink
+            .write_all(bytes)
+            .map_err(StorageError::at("write", &self.path))
     }
 
     /// Returns when all that was written is on the disk.
     pub fn sync(&mut self) -> Result<(), StorageError> {
-        self.sink.sync().map_err(StorageError::at("write", &self.path))
+        self.sink
+            .sync()
+            .map_err(StorageError::at("write", &self.path))
     }
 }
 
@@ -103,16 +110,29 @@ pub trait Storage: Sync {
     /// When a file, or a name in a folder, was written last, by the clock of its file system.
     fn modified(&self, path: &Path) -> Result<SystemTime, StorageError> {
         // A network file system tells the truth about what is opened.
-        let opened = self.open(path).or_else(|error| open_folder(path).map_err(|_| error))?;
-        opened.metadata().and_then(|metadata| metadata.modified()).map_err(StorageError::at("look up", path))
+        let opened = self
+            .open(path)
+            .or_else(|error| open_folder(path).map_err(|_| error))?;
+        opened
+            .metadata()
+            .and_then(|metadata| metadata.modified())
+            .map_err(StorageError::at("look up", path))
     }
 
     /// The number of bytes of a file.
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
         let metadata = self.open(file)?.metadata();
-        let is_file =
-            |metadata: Metadata| if metadata.is_file() { Ok(metadata) } else { Err(NoFile::Irregular.into()) };
-        Ok(metadata.and_then(is_file).map_err(StorageError::at("read", file))?.len())
+        let is_file = |metadata: Metadata| {
+            if metadata.is_file() {
+                Ok(metadata)
+            } else {
+                Err(NoFile::Irregular.into())
+            }
+        };
+        Ok(metadata
+            .and_then(is_file)
+            .map_err(StorageError::at("read", file))?
+            .len())
     }
 
     /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.
@@ -139,14 +159,18 @@ pub trait Storage: Sync {
         if !self.exists(from)? {
             return Ok(());
         }
-        to.parent().map_or(Ok(()), |folder| self.ensure_folder(folder))?;
+        to.parent()
+            .map_or(Ok(()), |folder| self.ensure_folder(folder))?;
         let (mut free, mut number) = (to.to_owned(), 0);
         while self.exists(&free)? {
             number += 1;
             free = to.with_added_extension(number.to_string());
         }
         self.rename(from, &free)?;
-        [free.parent(), from.parent()].into_iter().flatten().try_for_each(|folder| self.sync_folder(folder))
+        [free.parent(), from.parent()]
+            .into_iter()
+            .flatten()
+            .try_for_each(|folder| self.sync_folder(folder))
     }
 
     /// Tries for a lock until it is free or the time is over.
@@ -183,7 +207,11 @@ pub struct StorageError {
 impl StorageError {
     /// For `map_err`: the failed action and its path.
     pub fn at(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
-        move |source| Self { action, path: path.to_owned(), source }
+        move |source| Self {
+            action,
+            path: path.to_owned(),
+            source,
+        }
     }
 
     /// The kind of the operating system's reason.
@@ -193,12 +221,17 @@ impl StorageError {
 
     /// Whether there is no file of this name.
     pub fn is_missing(&self) -> bool {
-        matches!(self.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
+        matches!(
+            self.kind(),
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+        )
     }
 
     /// Whether something has this name that the program cannot have written: it is not that the disk fails.
     pub fn is_no_file(&self) -> bool {
-        self.source.get_ref().is_some_and(<dyn Error + Send + Sync>::is::<NoFile>)
+        self.source
+            .get_ref()
+            .is_some_and(<dyn Error + Send + Sync>::is::<NoFile>)
     }
 }
 
@@ -219,7 +252,13 @@ impl From<NoFile> for io::Error {
 
 /// Opens a regular file. A FIFO would make the program wait, and opening a device may have effects.
 fn open_regular(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
-    let check = |metadata: Metadata| if metadata.is_file() { Ok(()) } else { Err(io::Error::from(NoFile::Irregular)) };
+    let check = |metadata: Metadata| {
+        if metadata.is_file() {
+            Ok(())
+        } else {
+            Err(io::Error::from(NoFile::Irregular))
+        }
+    };
     match fs::metadata(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => (),
         metadata => check(metadata?)?,
@@ -256,15 +295,18 @@ impl Storage for Disk {
     fn create_folder(&self, folder: &Path) -> Result<(), StorageError> {
         match fs::create_dir(folder) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists && folder.is_dir() => Ok(()),
-            Err(_) if folder.is_symlink() => {
-                Err(StorageError::at("create", folder)(io::Error::other("it is a link that leads nowhere")))
-            }
+            Err(_) if folder.is_symlink() => Err(StorageError::at("create", folder)(
+                io::Error::other("it is a link that leads nowhere"),
+            )),
             created => created.map_err(StorageError::at("create", folder)),
         }
     }
 
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
-        Ok(StoredFile::new(file, File::create(file).map_err(StorageError::at("create", file))?))
+        Ok(StoredFile::new(
+            file,
+            File::create(file).map_err(StorageError::at("create", file))?,
+        ))
     }
 
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
@@ -277,14 +319,22 @@ impl Storage for Disk {
             File::create_new(to)?.write_all(&bytes)
         };
         let is_there = |error: &io::Error| error.kind() == io::ErrorKind::AlreadyExists;
-        match fs::hard_link(from, to).or_else(|error| if is_there(&error) { Err(error) } else { copied() }) {
+        match fs::hard_link(from, to).or_else(|error| {
+            if is_there(&error) {
+                Err(error)
+            } else {
+                copied()
+            }
+        }) {
             Err(error) if is_there(&error) => Ok(false),
             made => made.map(|()| true).map_err(StorageError::at("create", to)),
         }
     }
 
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        open_folder(folder).and_then(|folder| folder.sync_all()).map_err(StorageError::at("sync", folder))
+        open_folder(folder)
+            .and_then(|folder| folder.sync_all())
+            .map_err(StorageError::at("sync", folder))
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
@@ -292,7 +342,9 @@ impl Storage for Disk {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
             entries => entries.map_err(StorageError::at("list", folder))?,
         };
-        let names = entries.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>();
+        let names = entries
+            .map(|entry| Ok(entry?.file_name()))
+            .collect::<io::Result<Vec<_>>>();
         let mut names = names.map_err(StorageError::at("list", folder))?;
         names.sort();
         Ok(names)
@@ -322,14 +374,18 @@ impl Storage for Disk {
     }
 
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        let handle = open_regular(File::options().create(true).truncate(false).write(true), file);
+        let handle = open_regular(
+            File::options().create(true).truncate(false).write(true),
+            file,
+        );
         let handle = handle.map_err(StorageError::at("lock", file))?;
         match handle.try_lock() {
             Ok(()) => Ok(Lock::Ours(Box::new(handle))),
             Err(TryLockError::WouldBlock) => Ok(Lock::Taken),
             // Network file systems that are mounted without locks.
             Err(TryLockError::Error(error))
-                if error.kind() == io::ErrorKind::Unsupported || error.raw_os_error() == Some(libc::ENOLCK) =>
+                if error.kind() == io::ErrorKind::Unsupported
+                    || error.raw_os_error() == Some(libc::ENOLCK) =>
             {
                 Ok(Lock::Unknown)
             }
@@ -359,7 +415,14 @@ mod tests {
         use rustix::fs::{CWD, FileType, Mode, mknodat};
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
-        mknodat(CWD, path("fifo"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        mknodat(
+            CWD,
+            path("fifo"),
+            FileType::Fifo,
+            Mode::RUSR | Mode::WUSR,
+            0,
+        )
+        .unwrap();
         let _socket = std::os::unix::net::UnixListener::bind(path("socket")).unwrap();
         fs::create_dir(path("folder")).unwrap();
         std::os::unix::fs::symlink("/dev/zero", path("device")).unwrap();
@@ -370,11 +433,17 @@ mod tests {
                 Disk.lock(&path(name)).map(drop),
             ];
             for error in looked_at.map(Result::unwrap_err) {
-                assert!(error.is_no_file() && error.to_string().contains(name), "{error}");
+                assert!(
+                    error.is_no_file() && error.to_string().contains(name),
+                    "{error}"
+                );
             }
         }
         assert!(Disk.sync_folder(&path("fifo")).unwrap_err().is_missing());
-        File::create(path("long")).unwrap().set_len(1 << 40).unwrap();
+        File::create(path("long"))
+            .unwrap()
+            .set_len(1 << 40)
+            .unwrap();
         assert!(Disk.read(&path("long")).unwrap_err().is_no_file());
         assert!(Disk.read(&path("missing")).unwrap_err().is_missing());
     }

@@ -19,13 +19,21 @@ fn controls_run_once_for_the_other_values_and_are_no_sets_of_their_own() {
     folder.ends(0, "verify out");
     let after = folder.ends(0, "reduce out --json").stdout;
     let of = |text: &str, key: &str| json(text)[key].as_u64();
-    assert_eq!((of(&after, "jobs"), of(&before, "jobs")), (Some(18), Some(12)));
+    assert_eq!(
+        (of(&after, "jobs"), of(&before, "jobs")),
+        (Some(18), Some(12))
+    );
     for key in ["sets", "slips", "points"] {
         assert_eq!(of(&after, key), of(&before, key), "{key}");
     }
     // What the drive alone explains is there, with a seed of the control for each of the set.
     let rows = folder.file("out/reduced/sets.parquet");
-    for column in ["resultant_drive", "resultant_excess_low", "locking_index_drive", "locking_index_excess_high"] {
+    for column in [
+        "resultant_drive",
+        "resultant_excess_low",
+        "locking_index_drive",
+        "locking_index_excess_high",
+    ] {
         assert_eq!(rows.reals(column).len(), 4, "{column}");
     }
     // In one run from the beginning the statistics are the same.

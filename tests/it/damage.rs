@@ -29,7 +29,12 @@ struct Damage {
 }
 
 const fn damage(name: &'static str, file: &'static str, jobs: usize, to: fn(&Path)) -> Damage {
-    Damage { name, to, file, jobs }
+    Damage {
+        name,
+        to,
+        file,
+        jobs,
+    }
 }
 
 fn in_all_tables(change: impl Fn(&str)) {
@@ -76,82 +81,227 @@ fn other(root: &Path) -> PathBuf {
 }
 
 const PARTS: &[Damage] = &[
-    damage("a jobs file cut in half", "tables/jobs/part-000-000001.parquet", 1, |root| {
-        change(&path(root, "jobs", SECOND), |bytes| bytes.truncate(bytes.len() / 2));
-    }),
-    damage("a slips file without its last byte", "tables/slips/part-000-000001.parquet", 1, |root| {
-        change(&path(root, "slips", SECOND), |bytes| bytes.truncate(bytes.len() - 1));
-    }),
-    damage("an empty precursors file", "tables/precursors/part-000-000001.parquet", 1, |root| {
-        fs::write(path(root, "precursors", SECOND), "").unwrap();
-    }),
-    damage("a bit of the data", "tables/slips/part-000-000000.parquet", 1, |root| {
-        flip(&path(root, "slips", FIRST), |length| length / 3);
-    }),
-    damage("a bit of the footer", "tables/jobs/part-001-000000.parquet", 1, |root| {
-        flip(&path(root, "jobs", EXTENSION), |length| length - 300);
-    }),
-    damage("a bit of the first bytes", "tables/slips/part-000-000001.parquet", 1, |root| {
-        flip(&path(root, "slips", SECOND), |_| 1);
-    }),
-    damage("a bit of the last bytes", "tables/jobs/part-000-000001.parquet", 1, |root| {
-        flip(&path(root, "jobs", SECOND), |length| length - 1);
-    }),
-    damage("a bit of the length of the footer", "tables/jobs/part-000-000001.parquet", 1, |root| {
-        flip(&path(root, "jobs", SECOND), |length| length - 7);
-    }),
-    damage("bytes at the end", "tables/slips/part-000-000001.parquet", 1, |root| {
-        change(&path(root, "slips", SECOND), |bytes| bytes.extend([0; 100]));
-    }),
-    damage("a hole of zeros", "tables/jobs/part-000-000000.parquet", 1, |root| {
-        change(&path(root, "jobs", FIRST), |bytes| bytes[4096..8192].fill(0));
-    }),
-    damage("another text in the file's place", "tables/slips/part-001-000000.parquet", 1, |root| {
-        fs::write(path(root, "slips", EXTENSION), "Permission denied\n").unwrap();
-    }),
-    damage("a missing slips file", "tables/slips/part-000-000001.parquet", 1, |root| {
-        fs::remove_file(path(root, "slips", SECOND)).unwrap();
-    }),
-    damage("a missing precursors file", "tables/precursors/part-001-000000.parquet", 1, |root| {
-        fs::remove_file(path(root, "precursors", EXTENSION)).unwrap();
-    }),
-    damage("all tables but the jobs missing", "tables/slips/part-000-000000.parquet", 3, |root| {
-        for table in ["slips", "precursors"] {
-            fs::remove_dir_all(root.join("tables").join(table)).unwrap();
-        }
-    }),
-    damage("a missing table", "tables/precursors/part-000-000000.parquet", 3, |root| {
-        fs::remove_dir_all(root.join("tables/precursors")).unwrap();
-    }),
-    damage("a copy under another name", "tables/slips/part-000-000001 (copy).parquet", 0, |root| {
-        fs::copy(path(root, "slips", SECOND), path(root, "slips", "part-000-000001 (copy).parquet")).unwrap();
-    }),
-    damage("a copy under a number past the plan", "tables/jobs/part-000-000002.parquet", 0, |root| {
-        fs::copy(path(root, "jobs", SECOND), path(root, "jobs", "part-000-000002.parquet")).unwrap();
-    }),
-    damage("a part of an extension that there is not", "tables/jobs/part-002-000000.parquet", 0, |root| {
-        fs::copy(path(root, "jobs", SECOND), path(root, "jobs", "part-002-000000.parquet")).unwrap();
-    }),
-    damage("names of two parts swapped", "tables/jobs/part-000-000000.parquet", 2, |root| {
-        in_all_tables(|table| swap(&path(root, table, FIRST), &path(root, table, SECOND)));
-    }),
-    damage("names of two slips files swapped", "tables/slips/part-000-000001.parquet", 2, |root| {
-        swap(&path(root, "slips", FIRST), &path(root, "slips", SECOND));
-    }),
-    damage("names of parts of two extensions swapped", "tables/slips/part-001-000000.parquet", 2, |root| {
-        swap(&path(root, "slips", EXTENSION), &path(root, "slips", SECOND));
-    }),
-    damage("a file in the folder of another table", "tables/slips/part-000-000001.parquet", 1, |root| {
-        fs::copy(path(root, "jobs", SECOND), path(root, "slips", SECOND)).unwrap();
-    }),
-    damage("a file moved to the folder of another table", "tables/precursors/part-000-000001.parquet", 1, |root| {
-        fs::rename(path(root, "slips", SECOND), path(root, "precursors", SECOND)).unwrap();
-    }),
-    damage("a part of another sweep", "tables/slips/part-000-000001.parquet", 1, |root| {
-        in_all_tables(|table| {
-            fs::copy(path(&other(root), table, FIRST), path(root, table, SECOND)).unwrap();
-        });
-    }),
+    damage(
+        "a jobs file cut in half",
+        "tables/jobs/part-000-000001.parquet",
+        1,
+        |root| {
+            change(&path(root, "jobs", SECOND), |bytes| {
+                bytes.truncate(bytes.len() / 2)
+            });
+        },
+    ),
+    damage(
+        "a slips file without its last byte",
+        "tables/slips/part-000-000001.parquet",
+        1,
+        |root| {
+            change(&path(root, "slips", SECOND), |bytes| {
+                bytes.truncate(bytes.len() - 1)
+            });
+        },
+    ),
+    damage(
+        "an empty precursors file",
+        "tables/precursors/part-000-000001.parquet",
+        1,
+        |root| {
+            fs::write(path(root, "precursors", SECOND), "").unwrap();
+        },
+    ),
+    damage(
+        "a bit of the data",
+        "tables/slips/part-000-000000.parquet",
+        1,
+        |root| {
+            flip(&path(root, "slips", FIRST), |length| length / 3);
+        },
+    ),
+    damage(
+        "a bit of the footer",
+        "tables/jobs/part-001-000000.parquet",
+        1,
+        |root| {
+            flip(&path(root, "jobs", EXTENSION), |length| length - 300);
+        },
+    ),
+    damage(
+        "a bit of the first bytes",
+        "tables/slips/part-000-000001.parquet",
+        1,
+        |root| {
+            flip(&path(root, "slips", SECOND), |_| 1);
+        },
+    ),
+    damage(
+        "a bit of the last bytes",
+        "tables/jobs/part-000-000001.parquet",
+        1,
+        |root| {
+            flip(&path(root, "jobs", SECOND), |length| length - 1);
+        },
+    ),
+    damage(
+        "a bit of the length of the footer",
+        "tables/jobs/part-000-000001.parquet",
+        1,
+        |root| {
+            flip(&path(root, "jobs", SECOND), |length| length - 7);
+        },
+    ),
+    damage(
+        "bytes at the end",
+        "tables/slips/part-000-000001.parquet",
+        1,
+        |root| {
+            change(&path(root, "slips", SECOND), |bytes| bytes.extend([0; 100]));
+        },
+    ),
+    damage(
+        "a hole of zeros",
+        "tables/jobs/part-000-000000.parquet",
+        1,
+        |root| {
+            change(&path(root, "jobs", FIRST), |bytes| {
+                bytes[4096..8192].fill(0)
+            });
+        },
+    ),
+    damage(
+        "another text in the file's place",
+        "tables/slips/part-001-000000.parquet",
+        1,
+        |root| {
+            fs::write(path(root, "slips", EXTENSION), "Permission denied\n").unwrap();
+        },
+    ),
+    damage(
+        "a missing slips file",
+        "tables/slips/part-000-000001.parquet",
+        1,
+        |root| {
+            fs::remove_file(path(root, "slips", SECOND)).unwrap();
+        },
+    ),
+    damage(
+        "a missing precursors file",
+        "tables/precursors/part-001-000000.parquet",
+        1,
+        |root| {
+            fs::remove_file(path(root, "precursors", EXTENSION)).unwrap();
+        },
+    ),
+    damage(
+        "all tables but the jobs missing",
+        "tables/slips/part-000-000000.parquet",
+        3,
+        |root| {
+            for table in ["slips", "precursors"] {
+                fs::remove_dir_all(root.join("tables").join(table)).unwrap();
+            }
+        },
+    ),
+    damage(
+        "a missing table",
+        "tables/precursors/part-000-000000.parquet",
+        3,
+        |root| {
+            fs::remove_dir_all(root.join("tables/precursors")).unwrap();
+        },
+    ),
+    damage(
+        "a copy under another name",
+        "tables/slips/part-000-000001 (copy).parquet",
+        0,
+        |root| {
+            fs::copy(
+                path(root, "slips", SECOND),
+                path(root, "slips", "part-000-000001 (copy).parquet"),
+            )
+            .unwrap();
+        },
+    ),
+    damage(
+        "a copy under a number past the plan",
+        "tables/jobs/part-000-000002.parquet",
+        0,
+        |root| {
+            fs::copy(
+                path(root, "jobs", SECOND),
+                path(root, "jobs", "part-000-000002.parquet"),
+            )
+            .unwrap();
+        },
+    ),
+    damage(
+        "a part of an extension that there is not",
+        "tables/jobs/part-002-000000.parquet",
+        0,
+        |root| {
+            fs::copy(
+                path(root, "jobs", SECOND),
+                path(root, "jobs", "part-002-000000.parquet"),
+            )
+            .unwrap();
+        },
+    ),
+    damage(
+        "names of two parts swapped",
+        "tables/jobs/part-000-000000.parquet",
+        2,
+        |root| {
+            in_all_tables(|table| swap(&path(root, table, FIRST), &path(root, table, SECOND)));
+        },
+    ),
+    damage(
+        "names of two slips files swapped",
+        "tables/slips/part-000-000001.parquet",
+        2,
+        |root| {
+            swap(&path(root, "slips", FIRST), &path(root, "slips", SECOND));
+        },
+    ),
+    damage(
+        "names of parts of two extensions swapped",
+        "tables/slips/part-001-000000.parquet",
+        2,
+        |root| {
+            swap(
+                &path(root, "slips", EXTENSION),
+                &path(root, "slips", SECOND),
+            );
+        },
+    ),
+    damage(
+        "a file in the folder of another table",
+        "tables/slips/part-000-000001.parquet",
+        1,
+        |root| {
+            fs::copy(path(root, "jobs", SECOND), path(root, "slips", SECOND)).unwrap();
+        },
+    ),
+    damage(
+        "a file moved to the folder of another table",
+        "tables/precursors/part-000-000001.parquet",
+        1,
+        |root| {
+            fs::rename(
+                path(root, "slips", SECOND),
+                path(root, "precursors", SECOND),
+            )
+            .unwrap();
+        },
+    ),
+    damage(
+        "a part of another sweep",
+        "tables/slips/part-000-000001.parquet",
+        1,
+        |root| {
+            in_all_tables(|table| {
+                fs::copy(path(&other(root), table, FIRST), path(root, table, SECOND)).unwrap();
+            });
+        },
+    ),
     damage("a stray file", "tables/jobs/notes.txt", 0, |root| {
         fs::write(path(root, "jobs", "notes.txt"), "to do").unwrap();
     }),
@@ -159,56 +309,130 @@ const PARTS: &[Damage] = &[
         fs::create_dir(path(root, "slips", "old")).unwrap();
         fs::copy(path(root, "slips", SECOND), path(root, "slips/old", SECOND)).unwrap();
     }),
-    damage("a folder in a file's place", "tables/jobs/part-000-000001.parquet", 1, |root| {
-        fs::remove_file(path(root, "jobs", SECOND)).unwrap();
-        fs::create_dir(path(root, "jobs", SECOND)).unwrap();
-    }),
+    damage(
+        "a folder in a file's place",
+        "tables/jobs/part-000-000001.parquet",
+        1,
+        |root| {
+            fs::remove_file(path(root, "jobs", SECOND)).unwrap();
+            fs::create_dir(path(root, "jobs", SECOND)).unwrap();
+        },
+    ),
     damage("a table that is none", "tables/backup", 0, |root| {
         fs::create_dir(root.join("tables/backup")).unwrap();
         fs::copy(path(root, "jobs", SECOND), path(root, "backup", SECOND)).unwrap();
     }),
-    damage("an extension cut in half", "run/extension-000.json", 0, |root| {
-        change(&root.join("run/extension-000.json"), |bytes| bytes.truncate(bytes.len() / 2));
-    }),
-    damage("a bit of an extension's texts", "run/extension-000.json", 0, |root| {
-        let path = root.join("run/extension-000.json");
-        let text = fs::read_to_string(&path).unwrap();
-        fs::write(path, text.replace("count = 2", "count = 4")).unwrap();
-    }),
-    damage("a missing first extension", "run/extension-000.json", 0, |root| {
-        fs::remove_file(root.join("run/extension-000.json")).unwrap();
-    }),
-    damage("the extension of another directory", "run/extension-000.json", 0, |root| {
-        fs::copy(other(root).join("run/extension-000.json"), root.join("run/extension-000.json")).unwrap();
-    }),
-    damage("an extension of random bytes", "run/extension-001.json", 0, |root| {
-        fs::write(root.join("run/extension-001.json"), [0xff, 0xfe, 0x00]).unwrap();
-    }),
-    damage("a missing last extension", "run/extension-001.json", 0, |root| {
-        fs::remove_file(root.join("run/extension-001.json")).unwrap();
-    }),
-    damage("all extensions missing", "run/extension-000.json", 0, |root| {
-        for number in [0, 1] {
-            fs::remove_file(root.join(format!("run/extension-00{number}.json"))).unwrap();
-        }
-    }),
-    damage("files of two extensions swapped", "run/extension-000.json", 0, |root| {
-        swap(&root.join("run/extension-000.json"), &root.join("run/extension-001.json"));
-    }),
+    damage(
+        "an extension cut in half",
+        "run/extension-000.json",
+        0,
+        |root| {
+            change(&root.join("run/extension-000.json"), |bytes| {
+                bytes.truncate(bytes.len() / 2)
+            });
+        },
+    ),
+    damage(
+        "a bit of an extension's texts",
+        "run/extension-000.json",
+        0,
+        |root| {
+            let path = root.join("run/extension-000.json");
+            let text = fs::read_to_string(&path).unwrap();
+            fs::write(path, text.replace("count = 2", "count = 4")).unwrap();
+        },
+    ),
+    damage(
+        "a missing first extension",
+        "run/extension-000.json",
+        0,
+        |root| {
+            fs::remove_file(root.join("run/extension-000.json")).unwrap();
+        },
+    ),
+    damage(
+        "the extension of another directory",
+        "run/extension-000.json",
+        0,
+        |root| {
+            fs::copy(
+                other(root).join("run/extension-000.json"),
+                root.join("run/extension-000.json"),
+            )
+            .unwrap();
+        },
+    ),
+    damage(
+        "an extension of random bytes",
+        "run/extension-001.json",
+        0,
+        |root| {
+            fs::write(root.join("run/extension-001.json"), [0xff, 0xfe, 0x00]).unwrap();
+        },
+    ),
+    damage(
+        "a missing last extension",
+        "run/extension-001.json",
+        0,
+        |root| {
+            fs::remove_file(root.join("run/extension-001.json")).unwrap();
+        },
+    ),
+    damage(
+        "all extensions missing",
+        "run/extension-000.json",
+        0,
+        |root| {
+            for number in [0, 1] {
+                fs::remove_file(root.join(format!("run/extension-00{number}.json"))).unwrap();
+            }
+        },
+    ),
+    damage(
+        "files of two extensions swapped",
+        "run/extension-000.json",
+        0,
+        |root| {
+            swap(
+                &root.join("run/extension-000.json"),
+                &root.join("run/extension-001.json"),
+            );
+        },
+    ),
     #[cfg(unix)]
-    damage("a FIFO in a file's place", "tables/slips/part-000-000001.parquet", 1, |root| {
-        fifo(&path(root, "slips", SECOND));
-    }),
+    damage(
+        "a FIFO in a file's place",
+        "tables/slips/part-000-000001.parquet",
+        1,
+        |root| {
+            fifo(&path(root, "slips", SECOND));
+        },
+    ),
     #[cfg(unix)]
-    damage("a FIFO in an extension's place", "run/extension-000.json", 0, |root| {
-        fifo(&root.join("run/extension-000.json"));
-    }),
-    damage("a folder in an extension's place", "run/extension-000.json", 0, |root| {
-        fs::remove_file(root.join("run/extension-000.json")).unwrap();
-        fs::create_dir_all(root.join("run/extension-000.json/full")).unwrap();
-    }),
+    damage(
+        "a FIFO in an extension's place",
+        "run/extension-000.json",
+        0,
+        |root| {
+            fifo(&root.join("run/extension-000.json"));
+        },
+    ),
+    damage(
+        "a folder in an extension's place",
+        "run/extension-000.json",
+        0,
+        |root| {
+            fs::remove_file(root.join("run/extension-000.json")).unwrap();
+            fs::create_dir_all(root.join("run/extension-000.json/full")).unwrap();
+        },
+    ),
     #[cfg(unix)]
-    damage("a FIFO among reduced data", "reduced/sets.parquet", 0, |root| fifo(&root.join("reduced/sets.parquet"))),
+    damage(
+        "a FIFO among reduced data",
+        "reduced/sets.parquet",
+        0,
+        |root| fifo(&root.join("reduced/sets.parquet")),
+    ),
     damage("a bit of reduced data", "reduced/sets.parquet", 0, |root| {
         flip(&root.join("reduced/sets.parquet"), |length| length / 2);
     }),
@@ -254,29 +478,62 @@ fn folder() -> Folder {
 
 /// Damages a copy of a directory, and repairs it by what is printed.
 fn damage_and_repair(folder: &Folder, whole: &str, damage: &Damage) {
-    let Damage { name, to, file, jobs } = damage;
+    let Damage {
+        name,
+        to,
+        file,
+        jobs,
+    } = damage;
     let directory = folder.path("r");
     copy_all(&folder.path(whole), &directory);
     to(&directory);
     let before = folder.contents("r");
-    let Ended { code, stdout: text, stderr } = folder.run("verify r");
-    assert!(code == Some(4) && text.contains(&format!("r/{file}")), "{name}: {code:?} {text}{stderr}");
+    let Ended {
+        code,
+        stdout: text,
+        stderr,
+    } = folder.run("verify r");
+    assert!(
+        code == Some(4) && text.contains(&format!("r/{file}")),
+        "{name}: {code:?} {text}{stderr}"
+    );
     let report = json(&folder.ends(4, "verify r --json").stdout);
-    assert!(folder.contents("r") == before, "{name}: looking changed something");
+    assert!(
+        folder.contents("r") == before,
+        "{name}: looking changed something"
+    );
     let problems = report["problems"].as_array().unwrap();
-    let found: usize = problems.iter().map(|problem| problem["jobs"].as_array().unwrap().len()).sum();
+    let found: usize = problems
+        .iter()
+        .map(|problem| problem["jobs"].as_array().unwrap().len())
+        .sum();
     assert_eq!(found, *jobs, "{name}: {text}");
-    let commands: Vec<&str> = report["commands"].as_array().unwrap().iter().map(|c| c.as_str().unwrap()).collect();
+    let commands: Vec<&str> = report["commands"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| c.as_str().unwrap())
+        .collect();
     assert!(!commands.is_empty(), "{name}");
     for command in &commands {
         assert!(text.contains(command), "{name}: {command} is not in {text}");
         // A repair leaves parts to be run.
         let ended = folder.run(command.strip_prefix("stickslip ").unwrap());
-        assert!(matches!(ended.code, Some(0 | 3)), "{name}: {command}: {ended:?}");
+        assert!(
+            matches!(ended.code, Some(0 | 3)),
+            "{name}: {command}: {ended:?}"
+        );
     }
     let after = folder.ends(0, "verify r").stdout;
-    assert!(tables(folder, "r") == tables(folder, whole), "{name}: {commands:?}\n{text}\n{after}");
-    let run = json(&folder.ends(0, "run b.toml --out r --no-reduce --json").stdout);
+    assert!(
+        tables(folder, "r") == tables(folder, whole),
+        "{name}: {commands:?}\n{text}\n{after}"
+    );
+    let run = json(
+        &folder
+            .ends(0, "run b.toml --out r --no-reduce --json")
+            .stdout,
+    );
     assert_eq!(run["jobs_run"].as_u64(), Some(0), "{name}");
     fs::remove_dir_all(directory).unwrap();
 }
@@ -298,8 +555,15 @@ fn a_part_that_is_gone_is_named_and_run_again() {
             fs::remove_file(path(&folder.path("parts"), table, EXTENSION)).unwrap();
         }
         let text = folder.ends(3, "verify parts").stdout;
-        assert!(text.contains("1 part, 1 job: part-001-000000") && text.contains("  stickslip run parts\n"), "{text}");
-        assert_eq!(json(&folder.ends(0, "run parts --json").stdout)["jobs_run"], 1);
+        assert!(
+            text.contains("1 part, 1 job: part-001-000000")
+                && text.contains("  stickslip run parts\n"),
+            "{text}"
+        );
+        assert_eq!(
+            json(&folder.ends(0, "run parts --json").stdout)["jobs_run"],
+            1
+        );
         assert!(tables(&folder, "parts") == whole);
     }
 }
@@ -311,15 +575,32 @@ fn a_missing_slips_file_ends_every_command_that_reads_it_with_code_4_and_run_mak
     for table in ["slips", "precursors"] {
         let missing = path(&folder.path("parts"), table, FIRST);
         fs::remove_file(&missing).unwrap();
-        let commands: &[&str] = if table == "slips" { &["reduce parts", "report parts -o x.html"] } else { &[] };
+        let commands: &[&str] = if table == "slips" {
+            &["reduce parts", "report parts -o x.html"]
+        } else {
+            &[]
+        };
         for command in commands {
             let ended = folder.ends(4, command);
-            let expected =
-                format!("parts/tables/{table}/{FIRST}: damaged: it is missing, though the jobs of its part are");
-            assert!(ended.stderr.contains(&expected), "{command}: {}", ended.stderr);
+            let expected = format!(
+                "parts/tables/{table}/{FIRST}: damaged: it is missing, though the jobs of its part are"
+            );
+            assert!(
+                ended.stderr.contains(&expected),
+                "{command}: {}",
+                ended.stderr
+            );
         }
-        assert_eq!(json(&folder.ends(0, "status parts --json").stdout)["jobs_missing"], 1, "{table}");
-        assert_eq!(json(&folder.ends(0, "run parts --json").stdout)["jobs_run"], 1, "{table}");
+        assert_eq!(
+            json(&folder.ends(0, "status parts --json").stdout)["jobs_missing"],
+            1,
+            "{table}"
+        );
+        assert_eq!(
+            json(&folder.ends(0, "run parts --json").stdout)["jobs_run"],
+            1,
+            "{table}"
+        );
         assert!(tables(&folder, "parts") == whole, "{table}");
     }
 }
@@ -331,15 +612,30 @@ fn what_is_not_yet_done_is_no_damage() {
     folder.ends(0, "run a.toml --out r --shard 2/2 --no-reduce");
     // As a run leaves it that is killed between two files of a part.
     folder.ends(0, "run a.toml --out other --no-reduce");
-    fs::copy(path(&folder.path("other"), "slips", FIRST), path(&folder.path("r"), "slips", FIRST)).unwrap();
+    fs::copy(
+        path(&folder.path("other"), "slips", FIRST),
+        path(&folder.path("r"), "slips", FIRST),
+    )
+    .unwrap();
     let text = folder.ends(3, "verify r").stdout;
-    assert!(text.contains("not there  1 part, 1 job: part-000-000000\ndamaged    nothing\n"), "{text}");
+    assert!(
+        text.contains("not there  1 part, 1 job: part-000-000000\ndamaged    nothing\n"),
+        "{text}"
+    );
     let report = json(&folder.ends(3, "verify r --json").stdout);
-    assert_eq!((report["parts"].as_u64(), report["jobs"].as_u64()), (Some(1), Some(1)));
+    assert_eq!(
+        (report["parts"].as_u64(), report["jobs"].as_u64()),
+        (Some(1), Some(1))
+    );
     assert_eq!(report["missing"][0], "part-000-000000", "{report}");
     // Readers see that file, so it must be whole nevertheless.
-    flip(&path(&folder.path("r"), "slips", FIRST), |length| length / 2);
+    flip(&path(&folder.path("r"), "slips", FIRST), |length| {
+        length / 2
+    });
     let text = folder.ends(4, "verify r").stdout;
-    assert!(text.contains(&format!("r/tables/slips/{FIRST}: ")), "{text}");
+    assert!(
+        text.contains(&format!("r/tables/slips/{FIRST}: ")),
+        "{text}"
+    );
     folder.ends(2, "verify missing");
 }

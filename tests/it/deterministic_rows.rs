@@ -3,7 +3,9 @@
 //! Reference values were computed independently of this program; each test allows the rounding of their last digit.
 
 use stickslip::model::equation::{StiffnessMatrix, largest_frequency, stability_limit};
-use stickslip::model::theory::{load_maximum_phase, minimum_phase, minimum_phase_asymptote, total_strength};
+use stickslip::model::theory::{
+    load_maximum_phase, minimum_phase, minimum_phase_asymptote, total_strength,
+};
 use stickslip::model::{Change, Parameters};
 use stickslip::observe::{ContactLog, Profile};
 use stickslip::solver::{Limits, Solver, simulate};
@@ -28,14 +30,21 @@ fn rigid_block_friction(parameters: &Parameters, velocity: f64) -> f64 {
 /// Asserts agreement to half a unit of the reference's last digit.
 #[track_caller]
 fn agrees(value: f64, reference: f64, last_digit: f64) {
-    assert!((value - reference).abs() <= 0.5001 * last_digit, "{value} against {reference}");
+    assert!(
+        (value - reference).abs() <= 0.5001 * last_digit,
+        "{value} against {reference}"
+    );
 }
 
 #[test]
 fn total_strength_is_that_of_fig_1() {
     let parameters = Parameters::default();
     agrees(total_strength(&parameters), 1918.0, 1.0);
-    agrees(total_strength(&parameters) / parameters.normal_force, 0.4795, 1e-4);
+    agrees(
+        total_strength(&parameters) / parameters.normal_force,
+        0.4795,
+        1e-4,
+    );
 }
 
 #[test]
@@ -48,8 +57,12 @@ fn displacement_decays_as_eq_1_and_its_discrete_form() {
 #[test]
 fn end_stiffness_of_the_intact_chain() {
     let parameters = Parameters::default();
-    let StiffnessMatrix { diagonal, coupling, .. } = StiffnessMatrix::intact(&parameters);
-    let end = diagonal.iter().rev().fold(f64::INFINITY, |pivot, entry| entry - coupling * coupling / pivot);
+    let StiffnessMatrix {
+        diagonal, coupling, ..
+    } = StiffnessMatrix::intact(&parameters);
+    let end = diagonal.iter().rev().fold(f64::INFINITY, |pivot, entry| {
+        entry - coupling * coupling / pivot
+    });
     agrees(end - parameters.drive_stiffness, 8.821_66e8, 1e3);
 }
 
@@ -67,7 +80,11 @@ fn frequencies_of_the_intact_and_of_the_free_slider() {
 
 #[test]
 fn rigid_block_friction_with_identical_contacts() {
-    agrees(rigid_block_friction(&Parameters::default(), 1e-4), 339.5, 0.1);
+    agrees(
+        rigid_block_friction(&Parameters::default(), 1e-4),
+        339.5,
+        0.1,
+    );
 }
 
 #[test]
@@ -92,44 +109,89 @@ fn minimum_phase_solves_eq_2_and_tends_to_its_asymptote() {
     }
     assert_eq!(minimum_phase(0.99), None);
     assert_eq!(load_maximum_phase(0.99), None);
-    agrees(load_maximum_phase(2.0).unwrap(), std::f64::consts::FRAC_PI_6, 1e-12);
+    agrees(
+        load_maximum_phase(2.0).unwrap(),
+        std::f64::consts::FRAC_PI_6,
+        1e-12,
+    );
 }
 
 #[test]
 fn identical_contacts_first_break_together_at_the_quasi_static_load() {
-    let parameters = Parameters { threshold_deviation: 0.0, ..Parameters::default() };
+    let parameters = Parameters {
+        threshold_deviation: 0.0,
+        ..Parameters::default()
+    };
     let mut log = ContactLog::default();
-    let limits = Limits { end_time: 0.0632, events: u64::MAX, interrupt: None };
+    let limits = Limits {
+        end_time: 0.0632,
+        events: u64::MAX,
+        interrupt: None,
+    };
     simulate(&parameters, Solver::default(), limits, &mut log).unwrap();
-    let breaks: Vec<_> = log.events.iter().filter(|event| event.change == Change::Break).collect();
+    let breaks: Vec<_> = log
+        .events
+        .iter()
+        .filter(|event| event.change == Change::Break)
+        .collect();
     let first = breaks[0];
     // Quasi-static reference: 241.713 N at 0.0631684 s; inertia delays it by less than a step of 1e-6 s.
     agrees(first.time, 0.063_17, 1e-5);
-    let force = parameters.drive_stiffness * (parameters.drive_velocity * first.time - first.displacement);
+    let force =
+        parameters.drive_stiffness * (parameters.drive_velocity * first.time - first.displacement);
     agrees(force, 241.7, 0.1);
-    let together = breaks.iter().filter(|event| event.time == first.time && event.block == 0).count();
+    let together = breaks
+        .iter()
+        .filter(|event| event.time == first.time && event.block == 0)
+        .count();
     assert_eq!(together, parameters.contacts_per_block);
 }
 
 #[test]
 fn displacements_before_the_first_break_decay_as_eq_1_in_both_solvers() {
-    let parameters = Parameters { threshold_deviation: 0.0, ..Parameters::default() }.validated().unwrap();
+    let parameters = Parameters {
+        threshold_deviation: 0.0,
+        ..Parameters::default()
+    }
+    .validated()
+    .unwrap();
     let exact = 2.0 * libm::asinh(0.5 * (1e8_f64 / 6.9e9).sqrt());
-    for solver in [Solver::event_driven(1e-8), Solver::FixedStep { time_step: 1e-6 }] {
+    for solver in [
+        Solver::event_driven(1e-8),
+        Solver::FixedStep { time_step: 1e-6 },
+    ] {
         let mut profile = Profile::new(&parameters);
-        let limits = Limits { end_time: 0.063, events: 1_000_000, interrupt: None };
+        let limits = Limits {
+            end_time: 0.063,
+            events: 1_000_000,
+            interrupt: None,
+        };
         let summary = simulate(&parameters, solver, limits, &mut profile).unwrap();
         assert!(summary.breaks == 0 && profile.rows.len() == 70);
-        let (first, x): (_, Vec<f64>) = (profile.rows[0], profile.rows.iter().map(|row| row.displacement).collect());
-        assert!(first.block == 1 && (first.time - 0.063).abs() < 2e-6 && (first.position - 0.15 / 70.0).abs() < 1e-15);
+        let (first, x): (_, Vec<f64>) = (
+            profile.rows[0],
+            profile.rows.iter().map(|row| row.displacement).collect(),
+        );
+        assert!(
+            first.block == 1
+                && (first.time - 0.063).abs() < 2e-6
+                && (first.position - 0.15 / 70.0).abs() < 1e-15
+        );
         // Up to block 40, what the free end reflects is e^(-60 κ) = 7e-4 of the displacement, and 2e-5 of the exponent.
         let decay = libm::log(x[0] / x[39]) / 39.0;
-        assert!((decay / exact - 1.0).abs() < 1e-3, "{decay} against {exact} with {solver:?}");
+        assert!(
+            (decay / exact - 1.0).abs() < 1e-3,
+            "{decay} against {exact} with {solver:?}"
+        );
         // The free end mirrors the rest. Damping m γ v against K_s x holds the slider back by 2e-4 a decay length.
         for (j, x_j) in x.iter().enumerate() {
             let mirrored = |j: usize| libm::cosh(exact * (69.5 - j as f64));
             let expected = x[0] * mirrored(j) / mirrored(0);
-            assert!((x_j / expected - 1.0).abs() < 3e-3, "block {}: {x_j} against {expected}", j + 1);
+            assert!(
+                (x_j / expected - 1.0).abs() < 3e-3,
+                "block {}: {x_j} against {expected}",
+                j + 1
+            );
         }
     }
 }

@@ -46,7 +46,11 @@ impl Observer for Breaks {
     fn contact(&mut self, event: &ContactEvent) {
         if event.change == Change::Break {
             let life = (event.block, event.contact, event.generation);
-            self.in_order.push(Found { life, time: event.time, displacement: event.displacement });
+            self.in_order.push(Found {
+                life,
+                time: event.time,
+                displacement: event.displacement,
+            });
         }
     }
 
@@ -87,7 +91,11 @@ impl Random {
     }
 
     /// A whole number from 1 up to another, uniform in the logarithm.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small and positive")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "small and positive"
+    )]
     fn count(&mut self, largest: f64) -> usize {
         self.between(1.0, largest + 1.0) as usize
     }
@@ -109,18 +117,38 @@ fn draw(number: u64) -> Draw {
     let mut random = Random(number);
     let r = &mut random;
     let sizes = [1, 2, 3, 7, 8, 9, 16, 17, 64, 65, 70, 128, 130];
-    let blocks = if r.chance(0.6) { r.one_of(&sizes) } else { r.count(130.0) };
-    let contacts = if r.chance(0.4) { r.one_of(&[1, 2, 8, 9, 17, 20, 60]) } else { r.count(60.0) };
-    let mut parameters =
-        Parameters { blocks, contacts_per_block: contacts, seed: r.next() >> 40, ..Parameters::default() };
+    let blocks = if r.chance(0.6) {
+        r.one_of(&sizes)
+    } else {
+        r.count(130.0)
+    };
+    let contacts = if r.chance(0.4) {
+        r.one_of(&[1, 2, 8, 9, 17, 20, 60])
+    } else {
+        r.count(60.0)
+    };
+    let mut parameters = Parameters {
+        blocks,
+        contacts_per_block: contacts,
+        seed: r.next() >> 40,
+        ..Parameters::default()
+    };
     parameters.drive_velocity = r.between(1e-7, 1e-2);
-    parameters.reattachment_time = if r.chance(0.3) { 0.005 } else { r.between(1e-6, 1.0) };
+    parameters.reattachment_time = if r.chance(0.3) {
+        0.005
+    } else {
+        r.between(1e-6, 1.0)
+    };
     parameters.damping_rate = match r.next() % 4 {
         0 => 6462.0,
         1 => r.one_of(&[0.0, 1.0, 1e5, 1e6]),
         _ => r.between(1.0, 1e6),
     };
-    parameters.slider_stiffness *= if r.chance(0.5) { 1.0 } else { r.between(1e-2, 10.0) };
+    parameters.slider_stiffness *= if r.chance(0.5) {
+        1.0
+    } else {
+        r.between(1e-2, 10.0)
+    };
     let spread = match r.next() % 4 {
         0 => 0.0,
         1 => 0.005,
@@ -131,13 +159,23 @@ fn draw(number: u64) -> Draw {
     }
     let (amplitude, period) = (r.between(1e-9, 3e-6), r.between(1e-4, 0.1));
     let (is_modulated, is_ramped) = (r.chance(0.7), r.chance(0.3));
-    let (turning_period, turning_amplitude) =
-        (r.between(1e-4, 0.1), if r.chance(0.3) { 0.0 } else { r.between(1e-9, 3e-6) });
+    let (turning_period, turning_amplitude) = (
+        r.between(1e-4, 0.1),
+        if r.chance(0.3) {
+            0.0
+        } else {
+            r.between(1e-9, 3e-6)
+        },
+    );
 
     if is_modulated {
         parameters.modulation_period = Some(period);
     }
-    let shortest = if is_modulated && is_ramped { period.min(turning_period) } else { period };
+    let shortest = if is_modulated && is_ramped {
+        period.min(turning_period)
+    } else {
+        period
+    };
     let mut step = (0.2 / largest_frequency(&parameters)).min(0.1 * parameters.reattachment_time);
     if parameters.damping_rate > 0.0 {
         step = step.min(0.2 / parameters.damping_rate);
@@ -149,8 +187,12 @@ fn draw(number: u64) -> Draw {
     // Where a fixed step would take too long to the first break, displacements are scaled down: the model is linear but
     // for the thresholds.
     let stiffness = parameters.block_contact_stiffness();
-    let chain = (stiffness * parameters.coupling_stiffness()).sqrt().min(stiffness * blocks as f64) + stiffness;
-    let pulled = parameters.drive_velocity * parameters.drive_stiffness / (parameters.drive_stiffness + chain);
+    let chain = (stiffness * parameters.coupling_stiffness())
+        .sqrt()
+        .min(stiffness * blocks as f64)
+        + stiffness;
+    let pulled = parameters.drive_velocity * parameters.drive_stiffness
+        / (parameters.drive_stiffness + chain);
     let scale = (pulled * longest * r.between(0.1, 0.6) / parameters.contact_reach()).min(1.0);
     parameters.mean_threshold *= scale;
     parameters.threshold_deviation = spread * parameters.mean_threshold;
@@ -163,7 +205,12 @@ fn draw(number: u64) -> Draw {
         }
     }
     let breaks = 3 + r.count(400.0);
-    Draw { parameters: parameters.validated().expect("a draw is valid"), step, longest, breaks }
+    Draw {
+        parameters: parameters.validated().expect("a draw is valid"),
+        step,
+        longest,
+        breaks,
+    }
 }
 
 /// Breaks and slips up to a time in s.
@@ -175,18 +222,41 @@ struct Run {
 
 impl Run {
     /// Up to `end` s, or a number of breaks.
-    fn new(parameters: &Parameters, solver: Solver, end: f64, wanted: usize) -> Result<Self, String> {
-        let recording = Recording { slips: u64::MAX, discard: 0, ..Recording::default() };
-        let mut breaks = Breaks { wanted, in_order: Vec::new() };
+    fn new(
+        parameters: &Parameters,
+        solver: Solver,
+        end: f64,
+        wanted: usize,
+    ) -> Result<Self, String> {
+        let recording = Recording {
+            slips: u64::MAX,
+            discard: 0,
+            ..Recording::default()
+        };
+        let mut breaks = Breaks {
+            wanted,
+            in_order: Vec::new(),
+        };
         let mut slips = SlipObserver::new(parameters, &recording);
-        let limits = Limits { end_time: end, events: 200_000, interrupt: None };
-        let mut both = Observers { lead: &mut breaks, others: vec![&mut slips] };
-        let summary =
-            simulate(parameters, solver, limits, &mut both).map_err(|error| format!("{solver:?}: {error}"))?;
+        let limits = Limits {
+            end_time: end,
+            events: 200_000,
+            interrupt: None,
+        };
+        let mut both = Observers {
+            lead: &mut breaks,
+            others: vec![&mut slips],
+        };
+        let summary = simulate(parameters, solver, limits, &mut both)
+            .map_err(|error| format!("{solver:?}: {error}"))?;
         if !breaks.in_order.is_sorted_by_key(|found| found.time) {
             return Err(format!("{solver:?}: breaks are not in order"));
         }
-        Ok(Self { breaks: breaks.in_order, slips: slips.into_rows().0, end: summary.end_time })
+        Ok(Self {
+            breaks: breaks.in_order,
+            slips: slips.into_rows().0,
+            end: summary.end_time,
+        })
     }
 }
 
@@ -195,7 +265,9 @@ fn spread(reference: &[Found], others: &[Lives]) -> Vec<f64> {
     let mut largest = 0.0_f64;
     let at = |found: &Found| {
         for other in others {
-            let difference = other.get(&found.life).map_or(f64::INFINITY, |other| (other.time - found.time).abs());
+            let difference = other
+                .get(&found.life)
+                .map_or(f64::INFINITY, |other| (other.time - found.time).abs());
             largest = largest.max(difference);
         }
         largest
@@ -220,7 +292,9 @@ fn compare(reference: &Run, allowed: &[f64], run: &Run) -> Result<(usize, f64), 
         let found = times.get(&life).map(|found| found.time);
         let difference = found.map_or(f64::INFINITY, |found| (found - time).abs());
         if difference > allowed {
-            return Err(format!("break {compared}, {life:?}: {found:?} instead of {time} s, within {allowed:.2e} s"));
+            return Err(format!(
+                "break {compared}, {life:?}: {found:?} instead of {time} s, within {allowed:.2e} s"
+            ));
         }
         worst = worst.max(difference / allowed);
         compared += 1;
@@ -229,8 +303,14 @@ fn compare(reference: &Run, allowed: &[f64], run: &Run) -> Result<(usize, f64), 
     // Nothing else breaks meanwhile, unless the reference has it soon after.
     let known = by_life(&reference.breaks);
     for &Found { life, time, .. } in run.breaks.iter().take_while(|found| found.time < until) {
-        if known.get(&life).is_none_or(|other| other.time > time + 2.0 * COARSE * time) {
-            return Err(format!("{life:?} breaks at {time} s, in the reference at {:?}", known.get(&life)));
+        if known
+            .get(&life)
+            .is_none_or(|other| other.time > time + 2.0 * COARSE * time)
+        {
+            return Err(format!(
+                "{life:?} breaks at {time} s, in the reference at {:?}",
+                known.get(&life)
+            ));
         }
     }
     Ok((compared, worst))
@@ -248,8 +328,12 @@ struct Shown {
     problems: Vec<String>,
 }
 
-const SOLVERS: [(f64, Resolve); 4] =
-    [(1e-3, Resolve::Grid), (1e-6, Resolve::Grid), (1e-3, Resolve::Taylor), (1e-6, Resolve::Taylor)];
+const SOLVERS: [(f64, Resolve); 4] = [
+    (1e-3, Resolve::Grid),
+    (1e-6, Resolve::Grid),
+    (1e-3, Resolve::Taylor),
+    (1e-6, Resolve::Taylor),
+];
 /// A solver's displacements may be off by this many tolerances.
 const TOLERANCES: f64 = 3.0;
 /// What a perturbation does to the time of a break is known to within this factor, by four examples.
@@ -260,56 +344,105 @@ const REMEMBERED: f64 = 130.0;
 const HALVINGS: usize = 6;
 
 const fn reference_solver() -> Solver {
-    Solver::EventDriven { tolerance: EXACT, resolve: Resolve::Taylor }
+    Solver::EventDriven {
+        tolerance: EXACT,
+        resolve: Resolve::Taylor,
+    }
 }
 
 /// For each break of the reference, the largest change of its time so far, in s, if displacements are off by a part
 /// `size` of the contact reach: with thresholds so much higher or lower, together or each.
 fn sensitivity(parameters: &Parameters, reference: &Run, size: f64) -> Result<Vec<f64>, String> {
     let (mean, deviation) = (parameters.mean_threshold, parameters.threshold_deviation);
-    let perturbed: Result<Vec<Lives>, String> = [(1.0 + size, 0.0), (1.0 - size, 0.0), (1.0, size), (1.0, -size)]
-        .into_iter()
-        .map(|(scale, wider)| {
-            let changed = Parameters {
-                mean_threshold: scale * mean,
-                threshold_deviation: scale * (deviation + wider * mean).abs(),
-                ..parameters.clone()
-            };
-            Ok(by_life(&Run::new(&changed, reference_solver(), 1.02 * reference.end, usize::MAX)?.breaks))
-        })
-        .collect();
+    let perturbed: Result<Vec<Lives>, String> = [
+        (1.0 + size, 0.0),
+        (1.0 - size, 0.0),
+        (1.0, size),
+        (1.0, -size),
+    ]
+    .into_iter()
+    .map(|(scale, wider)| {
+        let changed = Parameters {
+            mean_threshold: scale * mean,
+            threshold_deviation: scale * (deviation + wider * mean).abs(),
+            ..parameters.clone()
+        };
+        Ok(by_life(
+            &Run::new(
+                &changed,
+                reference_solver(),
+                1.02 * reference.end,
+                usize::MAX,
+            )?
+            .breaks,
+        ))
+    })
+    .collect();
     Ok(spread(&reference.breaks, &perturbed?))
 }
 
 /// How many tolerances the grid's displacements may be off by: more where little is forgotten.
 fn grid_share(parameters: &Parameters, end: f64) -> f64 {
-    let memory = if parameters.damping_rate > 0.0 { end.min(2.0 / parameters.damping_rate) } else { end };
+    let memory = if parameters.damping_rate > 0.0 {
+        end.min(2.0 / parameters.damping_rate)
+    } else {
+        end
+    };
     TOLERANCES * (largest_frequency(parameters) * memory / REMEMBERED).max(1.0)
 }
 
 fn check(number: u64) -> Result<Shown, String> {
-    let Draw { parameters, step, longest, breaks: wanted } = draw(number);
+    let Draw {
+        parameters,
+        step,
+        longest,
+        breaks: wanted,
+    } = draw(number);
     let reference = Run::new(&parameters, reference_solver(), longest, wanted)?;
-    let mut shown = Shown { breaks: reference.breaks.len(), slips: reference.slips.len(), ..Shown::default() };
+    let mut shown = Shown {
+        breaks: reference.breaks.len(),
+        slips: reference.slips.len(),
+        ..Shown::default()
+    };
     for (tolerance, resolve) in SOLVERS {
-        let found = Run::new(&parameters, Solver::EventDriven { tolerance, resolve }, reference.end, usize::MAX)?;
+        let found = Run::new(
+            &parameters,
+            Solver::EventDriven { tolerance, resolve },
+            reference.end,
+            usize::MAX,
+        )?;
         // The events of a step of the grid are told at the last of them.
         let (share, late) = match resolve {
-            Resolve::Grid => (grid_share(&parameters, reference.end), 2.5 / largest_frequency(&parameters)),
+            Resolve::Grid => (
+                grid_share(&parameters, reference.end),
+                2.5 / largest_frequency(&parameters),
+            ),
             _ => (TOLERANCES, 0.0),
         };
         let size = (share * tolerance).min(0.1);
         let changes = sensitivity(&parameters, &reference, size)?;
         // And rounding.
-        let allowed: Vec<f64> = changes.iter().map(|change| FACTOR * change + 1e-12).collect();
+        let allowed: Vec<f64> = changes
+            .iter()
+            .map(|change| FACTOR * change + 1e-12)
+            .collect();
         match compare(&reference, &allowed, &found) {
             Ok((compared, worst)) => {
                 shown.compared.push((compared, worst));
-                shown
-                    .problems
-                    .extend(compare_slips(&parameters, &reference, &found, &allowed[..compared], [late, size]).err());
+                shown.problems.extend(
+                    compare_slips(
+                        &parameters,
+                        &reference,
+                        &found,
+                        &allowed[..compared],
+                        [late, size],
+                    )
+                    .err(),
+                );
             }
-            Err(problem) => shown.problems.push(format!("{resolve:?} {tolerance:e}: {problem}")),
+            Err(problem) => shown
+                .problems
+                .push(format!("{resolve:?} {tolerance:e}: {problem}")),
         }
     }
     match check_fixed_step(&parameters, &reference, step)? {
@@ -328,15 +461,30 @@ enum Decided {
 }
 
 /// Compares the reference with a fixed step, which is halved where it disagrees.
-fn check_fixed_step(parameters: &Parameters, reference: &Run, mut step: f64) -> Result<Decided, String> {
-    let run = |time_step: f64| Run::new(parameters, Solver::FixedStep { time_step }, reference.end, usize::MAX);
+fn check_fixed_step(
+    parameters: &Parameters,
+    reference: &Run,
+    mut step: f64,
+) -> Result<Decided, String> {
+    let run = |time_step: f64| {
+        Run::new(
+            parameters,
+            Solver::FixedStep { time_step },
+            reference.end,
+            usize::MAX,
+        )
+    };
     let changes = sensitivity(parameters, reference, 1e-6)?;
     let mut coarse = run(2.0 * step)?;
     let mut problem = String::new();
     for _ in 0..=HALVINGS {
         let fine = run(step)?;
-        let late: HashMap<Life, f64> =
-            fine.breaks.iter().map(|found| found.life).zip(spread(&fine.breaks, &[by_life(&coarse.breaks)])).collect();
+        let late: HashMap<Life, f64> = fine
+            .breaks
+            .iter()
+            .map(|found| found.life)
+            .zip(spread(&fine.breaks, &[by_life(&coarse.breaks)]))
+            .collect();
         let mut largest = 0.0_f64;
         let bound = |(found, change): (&Found, &f64)| {
             largest = largest.max(late.get(&found.life).copied().unwrap_or(f64::INFINITY));
@@ -352,7 +500,9 @@ fn check_fixed_step(parameters: &Parameters, reference: &Run, mut step: f64) -> 
     // Both steps may meet the same wrong cycle of a modulation: what do their errors of displacement do?
     let known = by_life(&reference.breaks);
     let off = |found: &&Found| {
-        known.get(&found.life).is_some_and(|other| (found.time - other.time).abs() < 1e-3 * found.time)
+        known
+            .get(&found.life)
+            .is_some_and(|other| (found.time - other.time).abs() < 1e-3 * found.time)
     };
     let largest = coarse
         .breaks
@@ -361,8 +511,10 @@ fn check_fixed_step(parameters: &Parameters, reference: &Run, mut step: f64) -> 
         .map(|found| (found.displacement - known[&found.life].displacement).abs())
         .fold(0.0, f64::max);
     let size = (4.0 * largest / parameters.contact_reach()).clamp(1e-6, 0.1);
-    let allowed: Vec<f64> =
-        sensitivity(parameters, reference, size)?.iter().map(|change| FACTOR * change + 4.0 * step).collect();
+    let allowed: Vec<f64> = sensitivity(parameters, reference, size)?
+        .iter()
+        .map(|change| FACTOR * change + 4.0 * step)
+        .collect();
     Ok(match compare(reference, &allowed, &coarse) {
         Ok(_) => Decided::Open,
         Err(_) => Decided::Differs(format!("fixed step {step:e}: {problem}")),
@@ -378,24 +530,42 @@ fn compare_slips(
     allowed: &[f64],
     [late, size]: [f64; 2],
 ) -> Result<(), String> {
-    let Some((last, off)) = reference.breaks[..allowed.len()].last().zip(allowed.last()) else { return Ok(()) };
+    let Some((last, off)) = reference.breaks[..allowed.len()].last().zip(allowed.last()) else {
+        return Ok(());
+    };
     let until = last.time - 2.0 * off;
     // Errors decide whether a gap as long as the crossing time parts two slips.
     let gap = parameters.wave_crossing_time();
     let is_unsure = |pair: &&[Found]| (pair[1].time - pair[0].time - gap).abs() <= 2.0 * off + late;
-    let until = reference.breaks.windows(2).find(is_unsure).map_or(until, |pair| until.min(pair[0].time - gap));
+    let until = reference
+        .breaks
+        .windows(2)
+        .find(is_unsure)
+        .map_or(until, |pair| until.min(pair[0].time - gap));
     let over = |slip: &&Slip| slip.nucleation + slip.duration < until;
     for (number, slip) in reference.slips.iter().filter(over).enumerate() {
-        let Some(other) = found.slips.get(number) else { return Err(format!("slip {number} is missing")) };
-        let differences = [other.nucleation - slip.nucleation, other.duration - slip.duration];
+        let Some(other) = found.slips.get(number) else {
+            return Err(format!("slip {number} is missing"));
+        };
+        let differences = [
+            other.nucleation - slip.nucleation,
+            other.duration - slip.duration,
+        ];
         // Of two maxima alike, errors decide which is the larger.
         let lifted = parameters.drive_stiffness * size * parameters.contact_reach();
         let is_onset = (other.onset - slip.onset).abs() <= 2.0 * off + late
             || (other.peak_force - slip.peak_force).abs() <= 2.0 * lifted;
         if !is_onset {
-            return Err(format!("onset of slip {number}: {} s instead of {} s", other.onset, slip.onset));
+            return Err(format!(
+                "onset of slip {number}: {} s instead of {} s",
+                other.onset, slip.onset
+            ));
         }
-        if differences.iter().any(|difference| difference.abs() > 2.0 * off) || other.size != slip.size {
+        if differences
+            .iter()
+            .any(|difference| difference.abs() > 2.0 * off)
+            || other.size != slip.size
+        {
             return Err(format!("slip {number}: {other:?} instead of {slip:?}"));
         }
     }
@@ -404,8 +574,15 @@ fn compare_slips(
 
 #[test]
 fn random_parameters_break_the_same_contacts_in_every_solver() {
-    let number = |name: &str| std::env::var(name).ok().and_then(|value| value.parse::<u64>().ok());
-    let (first, draws) = (number("DIFFERENTIAL_FIRST").unwrap_or(0), number("PROPTEST_CASES").unwrap_or(500));
+    let number = |name: &str| {
+        std::env::var(name)
+            .ok()
+            .and_then(|value| value.parse::<u64>().ok())
+    };
+    let (first, draws) = (
+        number("DIFFERENTIAL_FIRST").unwrap_or(0),
+        number("PROPTEST_CASES").unwrap_or(500),
+    );
     let (next, shown) = (AtomicU64::new(first), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, Into::into) {
@@ -433,13 +610,23 @@ fn random_parameters_break_the_same_contacts_in_every_solver() {
                 slips += of_draw.slips;
                 open += u64::from(of_draw.is_open);
                 for problem in &of_draw.problems {
-                    writeln!(problems, "draw {number}: {problem}\n    {:?}", draw(number).parameters).unwrap();
+                    writeln!(
+                        problems,
+                        "draw {number}: {problem}\n    {:?}",
+                        draw(number).parameters
+                    )
+                    .unwrap();
                 }
                 for (total, (compared, worst)) in totals.iter_mut().zip(&of_draw.compared) {
                     *total = (total.0 + compared, total.1.max(*worst));
                 }
             }
-            Err(error) => writeln!(problems, "draw {number}: {error}\n    {:?}", draw(number).parameters).unwrap(),
+            Err(error) => writeln!(
+                problems,
+                "draw {number}: {error}\n    {:?}",
+                draw(number).parameters
+            )
+            .unwrap(),
         }
     }
     println!(
@@ -448,7 +635,13 @@ fn random_parameters_break_the_same_contacts_in_every_solver() {
     assert!(problems.is_empty(), "\n{problems}");
     // Not all is vague: a third of the breaks at the loosest.
     for (compared, _) in totals {
-        assert!(4 * compared > breaks, "{compared} of {breaks} breaks compared");
+        assert!(
+            4 * compared > breaks,
+            "{compared} of {breaks} breaks compared"
+        );
     }
-    assert!(10 * open <= draws, "the fixed step decides nothing in {open} of {draws} draws");
+    assert!(
+        10 * open <= draws,
+        "the fixed step decides nothing in {open} of {draws} draws"
+    );
 }

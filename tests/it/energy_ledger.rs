@@ -5,20 +5,31 @@ use stickslip::model::Parameters;
 use stickslip::observe::{ContactLog, Recording, measure};
 use stickslip::solver::{Limits, Resolve, SimulationError, Solver, simulate, simulate_audited};
 
-const LIMITS: Limits<'static> = Limits { end_time: 0.25, events: 1_000_000, interrupt: None };
+const LIMITS: Limits<'static> = Limits {
+    end_time: 0.25,
+    events: 1_000_000,
+    interrupt: None,
+};
 
 fn residual(parameters: &Parameters, solver: Solver) -> f64 {
     let (summary, ledger) =
-        simulate_audited(parameters, solver, LIMITS, &mut ContactLog::default()).expect("the simulation must not fail");
+        simulate_audited(parameters, solver, LIMITS, &mut ContactLog::default())
+            .expect("the simulation must not fail");
     assert!(summary.breaks > 3000, "no slip to audit");
-    assert!(ledger.work > 0.0 && ledger.damping > 0.0 && ledger.broken > 0.0 && ledger.elastic > 0.0, "{ledger:?}");
+    assert!(
+        ledger.work > 0.0 && ledger.damping > 0.0 && ledger.broken > 0.0 && ledger.elastic > 0.0,
+        "{ledger:?}"
+    );
     assert!(ledger.left_out.abs() < 1e-4 * ledger.damping, "{ledger:?}");
     ledger.residual().abs()
 }
 
 fn drives() -> [Parameters; 3] {
-    let modulated =
-        Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };
+    let modulated = Parameters {
+        modulation_amplitude: 1e-6,
+        modulation_period: Some(1.0 / 58.0),
+        ..Parameters::default()
+    };
     let ramped = Parameters {
         turning_period: Some(1.0 / 80.0),
         turning_amplitude: Some(5e-7),
@@ -32,7 +43,13 @@ fn drives() -> [Parameters; 3] {
 fn the_event_driven_ledger_balances_within_its_tolerance() {
     for parameters in drives() {
         // Far better than the tolerance of one displacement: seen 1e-7, 1e-8, 3e-10, 2e-13, 1e-13.
-        for (tolerance, allowed) in [(1e-3, 1e-5), (1e-4, 1e-6), (1e-6, 1e-8), (1e-8, 1e-11), (1e-10, 1e-11)] {
+        for (tolerance, allowed) in [
+            (1e-3, 1e-5),
+            (1e-4, 1e-6),
+            (1e-6, 1e-8),
+            (1e-8, 1e-11),
+            (1e-10, 1e-11),
+        ] {
             let residual = residual(&parameters, Solver::event_driven(tolerance));
             assert!(residual < allowed, "{tolerance:e}: {residual:e}");
         }
@@ -45,7 +62,10 @@ fn the_fixed_step_ledger_balances_in_the_order_of_its_step() {
         // Contacts break up to a step late, past their thresholds: seen 6e-3 at 4e-6 s and proportional to the step.
         for time_step in [4e-6, 2e-6, 1e-6] {
             let residual = residual(&parameters, Solver::FixedStep { time_step });
-            assert!((500.0..2500.0).contains(&(residual / time_step)), "{time_step:e}: {residual:e}");
+            assert!(
+                (500.0..2500.0).contains(&(residual / time_step)),
+                "{time_step:e}: {residual:e}"
+            );
         }
     }
 }
@@ -53,11 +73,15 @@ fn the_fixed_step_ledger_balances_in_the_order_of_its_step() {
 #[test]
 fn an_audit_does_not_change_the_simulation() {
     for parameters in drives() {
-        let taylor = Solver::EventDriven { tolerance: 1e-3, resolve: Resolve::Taylor };
+        let taylor = Solver::EventDriven {
+            tolerance: 1e-3,
+            resolve: Resolve::Taylor,
+        };
         for solver in [taylor, Solver::FixedStep { time_step: 2e-6 }] {
             let (mut plain, mut audited) = (ContactLog::default(), ContactLog::default());
             let summary = simulate(&parameters, solver, LIMITS, &mut plain).unwrap();
-            let (audited_summary, _) = simulate_audited(&parameters, solver, LIMITS, &mut audited).unwrap();
+            let (audited_summary, _) =
+                simulate_audited(&parameters, solver, LIMITS, &mut audited).unwrap();
             assert_eq!(summary, audited_summary);
             assert_eq!(plain.events, audited.events);
         }
@@ -68,25 +92,50 @@ fn an_audit_does_not_change_the_simulation() {
 fn a_ledger_takes_taylor_steps_and_none_is_kept_along_the_grid() {
     for parameters in drives() {
         let ledger = |resolve| {
-            let solver = Solver::EventDriven { tolerance: 1e-3, resolve };
+            let solver = Solver::EventDriven {
+                tolerance: 1e-3,
+                resolve,
+            };
             simulate_audited(&parameters, solver, LIMITS, &mut ContactLog::default())
         };
         let (summary, _) = ledger(Resolve::Auto).unwrap();
         assert_eq!(summary.grid_steps, 0);
         assert_eq!(ledger(Resolve::Auto), ledger(Resolve::Taylor));
-        assert_eq!(ledger(Resolve::Grid).unwrap_err(), SimulationError::LedgerOnGrid);
+        assert_eq!(
+            ledger(Resolve::Grid).unwrap_err(),
+            SimulationError::LedgerOnGrid
+        );
     }
 }
 
 /// What is stored in the springs varies by a few per cent of the work of ten slips.
 #[test]
 fn the_work_of_the_drive_over_many_slips_goes_into_damping_and_broken_contacts() {
-    let recording = Recording { slips: 30, discard: 3, energies: true, ..Recording::default() };
+    let recording = Recording {
+        slips: 30,
+        discard: 3,
+        energies: true,
+        ..Recording::default()
+    };
     for (modulation_amplitude, modulation_period) in [(0.0, None), (1e-6, Some(1.0 / 58.0))] {
-        let parameters = Parameters { modulation_amplitude, modulation_period, ..Parameters::default() };
-        let measured = measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap();
+        let parameters = Parameters {
+            modulation_amplitude,
+            modulation_period,
+            ..Parameters::default()
+        };
+        let measured = measure(
+            &parameters,
+            &recording,
+            Solver::default(),
+            &AtomicBool::new(false),
+        )
+        .unwrap();
         let total = |energy: &dyn Fn(&stickslip::observe::Slip) -> Option<f64>| -> f64 {
-            measured.slips.iter().map(|slip| energy(slip).unwrap()).sum()
+            measured
+                .slips
+                .iter()
+                .map(|slip| energy(slip).unwrap())
+                .sum()
         };
         let work = total(&|slip| slip.energies.work);
         let losses = total(&|slip| slip.energies.damping) + total(&|slip| slip.energies.broken);
@@ -95,13 +144,25 @@ fn the_work_of_the_drive_over_many_slips_goes_into_damping_and_broken_contacts()
         let time: f64 = measured.slips.iter().filter_map(|slip| slip.interval).sum();
         let friction = measured.averages.unwrap().friction;
         let expected = friction * parameters.drive_velocity * time;
-        assert!(modulation_amplitude > 0.0 || (work / expected - 1.0).abs() < 0.02, "{work} J against {expected} J");
+        assert!(
+            modulation_amplitude > 0.0 || (work / expected - 1.0).abs() < 0.02,
+            "{work} J against {expected} J"
+        );
     }
     let measured = measure(
         &Parameters::default(),
-        &Recording { slips: 2, ..Recording::default() },
+        &Recording {
+            slips: 2,
+            ..Recording::default()
+        },
         Solver::default(),
         &AtomicBool::new(false),
     );
-    assert!(measured.unwrap().slips.iter().all(|slip| slip.energies.work.is_none()));
+    assert!(
+        measured
+            .unwrap()
+            .slips
+            .iter()
+            .all(|slip| slip.energies.work.is_none())
+    );
 }

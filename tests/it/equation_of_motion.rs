@@ -28,10 +28,22 @@ fn acceleration(
     velocity: &[f64],
     contacts: &[ContactSums],
 ) -> Vec<f64> {
-    let (x, mass, coupling) = (displacement, parameters.block_mass(), parameters.coupling_stiffness());
+    let (x, mass, coupling) = (
+        displacement,
+        parameters.block_mass(),
+        parameters.coupling_stiffness(),
+    );
     let of_block = |j: usize| {
-        let before = if j > 0 { coupling * (x[j - 1] - x[j]) } else { shear_force(drive, time, x[0]) };
-        let after = if j + 1 < x.len() { coupling * (x[j + 1] - x[j]) } else { 0.0 };
+        let before = if j > 0 {
+            coupling * (x[j - 1] - x[j])
+        } else {
+            shear_force(drive, time, x[0])
+        };
+        let after = if j + 1 < x.len() {
+            coupling * (x[j + 1] - x[j])
+        } else {
+            0.0
+        };
         let held = contacts[j].stiffness * x[j] - contacts[j].pull;
         (before + after - held) / mass - parameters.damping_rate * velocity[j]
     };
@@ -59,15 +71,28 @@ impl Observer for Contacts {
 }
 
 /// Displacements in m after `steps` classical Runge-Kutta steps of `step` s from rest.
-fn integrated(parameters: &Parameters, contacts: &[ContactSums], step: f64, steps: u32) -> Vec<f64> {
+fn integrated(
+    parameters: &Parameters,
+    contacts: &[ContactSums],
+    step: f64,
+    steps: u32,
+) -> Vec<f64> {
     let (drive, blocks) = (Drive::new(parameters), parameters.blocks);
     // State: displacements, then velocities.
     let rate = |time: f64, state: &[f64]| -> Vec<f64> {
         let (x, v) = state.split_at(blocks);
-        [v.to_vec(), acceleration(parameters, &drive, time, x, v, contacts)].concat()
+        [
+            v.to_vec(),
+            acceleration(parameters, &drive, time, x, v, contacts),
+        ]
+        .concat()
     };
     let moved = |state: &[f64], rate: &[f64], step: f64| -> Vec<f64> {
-        state.iter().zip(rate).map(|(value, rate)| value + step * rate).collect()
+        state
+            .iter()
+            .zip(rate)
+            .map(|(value, rate)| value + step * rate)
+            .collect()
     };
     let mut state = vec![0.0; 2 * blocks];
     for number in 0..steps {
@@ -98,19 +123,33 @@ fn both_solvers_follow_the_equation_of_motion_up_to_the_first_break() {
         let (step, steps) = (1e-6, 1500);
         let end_time = step * f64::from(steps);
         let followed = |solver| {
-            let mut contacts = Contacts { sums: vec![ContactSums::default(); blocks], ..Contacts::default() };
-            let limits = Limits { end_time, events: 1_000_000, interrupt: None };
+            let mut contacts = Contacts {
+                sums: vec![ContactSums::default(); blocks],
+                ..Contacts::default()
+            };
+            let limits = Limits {
+                end_time,
+                events: 1_000_000,
+                interrupt: None,
+            };
             let summary = simulate(&parameters, solver, limits, &mut contacts).unwrap();
-            assert!(contacts.breaks == 0 && (summary.end_time / end_time - 1.0).abs() < 1e-12, "{summary:?}");
+            assert!(
+                contacts.breaks == 0 && (summary.end_time / end_time - 1.0).abs() < 1e-12,
+                "{summary:?}"
+            );
             contacts
         };
         let exact = followed(Solver::event_driven(1e-12));
         let reference = integrated(&parameters, &exact.sums, step, steps);
         // Runge-Kutta leaves some (ω_max h)^4 of the fastest modes; a fixed step some (ω h)² of the modulation.
-        for (solver, tolerance) in [(exact, 1e-6), (followed(Solver::FixedStep { time_step: 1e-7 }), 1e-4)] {
+        for (solver, tolerance) in [
+            (exact, 1e-6),
+            (followed(Solver::FixedStep { time_step: 1e-7 }), 1e-4),
+        ] {
             let scale = reference[0].abs();
             assert!(scale > 1e-9, "the slider hardly moved: {scale} m");
-            for (block, (found, expected)) in solver.displacement.iter().zip(&reference).enumerate() {
+            for (block, (found, expected)) in solver.displacement.iter().zip(&reference).enumerate()
+            {
                 let error = (found - expected).abs() / scale;
                 assert!(error < tolerance, "block {block} of {blocks}: {error:e}");
             }

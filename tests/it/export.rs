@@ -18,8 +18,19 @@ const FEWER: u64 = 100;
 const JOBS: u64 = 8 * SEEDS;
 
 fn exported(folder: &Folder, directory: &str, format: &str) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
-    let report = json(&folder.ends(0, &format!("export {directory} -o out --format {format} --json")).stdout);
-    assert_eq!((report["jobs"].as_u64(), report["jobs_missing"].as_u64()), (Some(JOBS), Some(0)), "{report}");
+    let report = json(
+        &folder
+            .ends(
+                0,
+                &format!("export {directory} -o out --format {format} --json"),
+            )
+            .stdout,
+    );
+    assert_eq!(
+        (report["jobs"].as_u64(), report["jobs_missing"].as_u64()),
+        (Some(JOBS), Some(0)),
+        "{report}"
+    );
     let contents = folder.contents("out");
     fs::remove_dir_all(folder.path("out")).unwrap();
     contents
@@ -31,11 +42,19 @@ fn an_export_has_the_same_bytes_whatever_threads_shards_kills_and_retries_came_b
     folder.write("cheap.toml", &sweep(SEEDS));
     folder.write("fewer.toml", &sweep(FEWER));
     let mut expected = BTreeMap::new();
-    for (threads, shards, killed, extended) in
-        [(2, 1, false, false), (1, 1, true, false), (2, 3, false, false), (1, 1, false, true), (2, 3, true, true)]
-    {
+    for (threads, shards, killed, extended) in [
+        (2, 1, false, false),
+        (1, 1, true, false),
+        (2, 3, false, false),
+        (1, 1, false, true),
+        (2, 3, true, true),
+    ] {
         let directory = format!("r-{threads}-{shards}-{killed}-{extended}");
-        for sweep in if extended { &["fewer", "cheap"][..] } else { &["cheap"] } {
+        for sweep in if extended {
+            &["fewer", "cheap"][..]
+        } else {
+            &["cheap"]
+        } {
             for shard in 1..=shards {
                 let command = format!(
                     "run {sweep}.toml --out {directory} --threads {threads} --shard {shard}/{shards} --no-reduce"
@@ -51,7 +70,9 @@ fn an_export_has_the_same_bytes_whatever_threads_shards_kills_and_retries_came_b
         }
         for format in ["parquet", "csv", "arrow"] {
             let found = exported(&folder, &directory, format);
-            let first = expected.entry((extended, format)).or_insert_with(|| found.clone());
+            let first = expected
+                .entry((extended, format))
+                .or_insert_with(|| found.clone());
             assert!(found == *first, "{directory} {format}");
         }
     }
@@ -64,26 +85,44 @@ fn every_row_of_an_export_has_all_swept_parameters_and_the_frequency_in_the_orde
     folder.ends(0, "run cheap.toml --out r --no-reduce");
     let jobs = folder.table("r", "jobs").cells.len();
     let files = exported(&folder, "r", "csv");
-    let text = |name: &str| String::from_utf8(files[&PathBuf::from(name)].clone().unwrap()).unwrap();
-    for (table, rows) in [("jobs.csv", jobs), ("slips.csv", folder.table("r", "slips").cells.len())] {
+    let text =
+        |name: &str| String::from_utf8(files[&PathBuf::from(name)].clone().unwrap()).unwrap();
+    for (table, rows) in [
+        ("jobs.csv", jobs),
+        ("slips.csv", folder.table("r", "slips").cells.len()),
+    ] {
         let text = text(table);
         let mut lines = text.lines();
         let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-        let column = |name: &str| names.iter().position(|other| *other == name).unwrap_or_else(|| panic!("{name}"));
+        let column = |name: &str| {
+            names
+                .iter()
+                .position(|other| *other == name)
+                .unwrap_or_else(|| panic!("{name}"))
+        };
         let [frequency, amplitude, stiffness] = ["frequency", "Delta", "K"].map(column);
         let mut count = 0;
         for line in lines {
             let cells: Vec<&str> = line.split(',').collect();
-            let expected = if cells[amplitude] == "0.0" { "" } else { "29.0" };
+            let expected = if cells[amplitude] == "0.0" {
+                ""
+            } else {
+                "29.0"
+            };
             assert!(
-                cells[frequency] == expected && ["100000000.0", "200000000.0"].contains(&cells[stiffness]),
+                cells[frequency] == expected
+                    && ["100000000.0", "200000000.0"].contains(&cells[stiffness]),
                 "{line}"
             );
             count += 1;
         }
         assert_eq!(count, rows, "{table}");
     }
-    let in_plan_order: Vec<String> = text("jobs.csv").lines().skip(1).map(|line| line[..32].to_owned()).collect();
+    let in_plan_order: Vec<String> = text("jobs.csv")
+        .lines()
+        .skip(1)
+        .map(|line| line[..32].to_owned())
+        .collect();
     assert_eq!(in_plan_order, folder.table("r", "jobs").texts("job_id"));
 }
 
@@ -97,11 +136,21 @@ fn a_folder_that_is_not_empty_is_refused_and_what_is_missing_is_said() {
     }
     folder.write("full/mine.txt", "mine");
     let refused = folder.ends(2, "export r -o full");
-    assert!(refused.stderr.contains("full: is not empty"), "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("full: is not empty"),
+        "{}",
+        refused.stderr
+    );
     assert_eq!(folder.contents("full").len(), 1);
     // As a killed export leaves it.
     folder.write("killed/.unfinished-0/slips.parquet", "half");
     let ended = folder.ends(0, "export r -o killed");
-    assert!(ended.stderr.contains("jobs are missing; stickslip run continues with them"), "{}", ended.stderr);
+    assert!(
+        ended
+            .stderr
+            .contains("jobs are missing; stickslip run continues with them"),
+        "{}",
+        ended.stderr
+    );
     assert_eq!(folder.contents("killed").len(), 2);
 }

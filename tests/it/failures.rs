@@ -32,27 +32,67 @@ fn a_failing_job_becomes_a_row_with_its_reason_and_the_others_go_on() {
     let folder = Folder::new();
     folder.write("failing.toml", FAILING);
     let ended = folder.ends(1, "run failing.toml --out r");
-    assert!(ended.stdout.starts_with("jobs run         6, 2 failed\n"), "{}", ended.stdout);
+    assert!(
+        ended.stdout.starts_with("jobs run         6, 2 failed\n"),
+        "{}",
+        ended.stdout
+    );
     assert!(ended.stderr.contains("--retry-failed"), "{}", ended.stderr);
     let jobs = folder.table("r", "jobs");
     assert_eq!(jobs.counts("N"), [1, 1, 2, 2, 30, 30]);
-    assert_eq!(jobs.texts("outcome"), ["done", "done", "done", "done", "failed", "failed"]);
+    assert_eq!(
+        jobs.texts("outcome"),
+        ["done", "done", "done", "done", "failed", "failed"]
+    );
     let reasons = jobs.texts("reason");
     assert_eq!(reasons[..4], [""; 4]);
     for (reason, id) in reasons[4..].iter().zip(&jobs.texts("job_id")[4..]) {
-        assert!(reason.contains("300 contact events") && reason.contains("record.max_events"), "{reason}");
-        assert!(ended.stderr.contains(&format!("job {id} failed: {reason}")), "{}", ended.stderr);
+        assert!(
+            reason.contains("300 contact events") && reason.contains("record.max_events"),
+            "{reason}"
+        );
+        assert!(
+            ended.stderr.contains(&format!("job {id} failed: {reason}")),
+            "{}",
+            ended.stderr
+        );
     }
     assert_eq!(jobs.counts("slips"), [2; 4]);
 
     let status = json(&folder.ends(1, "status r --json").stdout);
-    assert_eq!((status["jobs_done"].as_u64(), status["jobs_failed"].as_u64()), (Some(4), Some(2)));
-    assert_eq!(json(&folder.ends(1, "reduce r --json").stdout)["failed_jobs"].as_u64(), Some(2));
+    assert_eq!(
+        (status["jobs_done"].as_u64(), status["jobs_failed"].as_u64()),
+        (Some(4), Some(2))
+    );
+    assert_eq!(
+        json(&folder.ends(1, "reduce r --json").stdout)["failed_jobs"].as_u64(),
+        Some(2)
+    );
     let before = folder.tables("r");
-    let again = json(&folder.ends(1, "run failing.toml --out r --no-reduce --json").stdout);
-    assert_eq!((again["jobs_run"].as_u64(), again["jobs_failed"].as_u64()), (Some(0), Some(2)));
-    let retried = json(&folder.ends(1, "run failing.toml --out r --no-reduce --json --retry-failed").stdout);
-    assert_eq!((retried["jobs_run"].as_u64(), retried["jobs_failed"].as_u64()), (Some(2), Some(2)));
+    let again = json(
+        &folder
+            .ends(1, "run failing.toml --out r --no-reduce --json")
+            .stdout,
+    );
+    assert_eq!(
+        (again["jobs_run"].as_u64(), again["jobs_failed"].as_u64()),
+        (Some(0), Some(2))
+    );
+    let retried = json(
+        &folder
+            .ends(
+                1,
+                "run failing.toml --out r --no-reduce --json --retry-failed",
+            )
+            .stdout,
+    );
+    assert_eq!(
+        (
+            retried["jobs_run"].as_u64(),
+            retried["jobs_failed"].as_u64()
+        ),
+        (Some(2), Some(2))
+    );
     assert!(folder.tables("r") == before);
 }
 
@@ -63,20 +103,41 @@ fn a_poison_job_is_reported_as_a_command_that_fails_in_the_same_way() {
     let ended = folder.ends(1, "run poison.toml --out r");
     let jobs = folder.table("r", "jobs");
     let outcomes = jobs.texts("outcome");
-    assert_eq!(outcomes.iter().filter(|outcome| **outcome == "failed").count(), 4, "{outcomes:?}");
-    let reasons: BTreeMap<&str, &str> = jobs.texts("job_id").into_iter().zip(jobs.texts("reason")).collect();
+    assert_eq!(
+        outcomes
+            .iter()
+            .filter(|outcome| **outcome == "failed")
+            .count(),
+        4,
+        "{outcomes:?}"
+    );
+    let reasons: BTreeMap<&str, &str> = jobs
+        .texts("job_id")
+        .into_iter()
+        .zip(jobs.texts("reason"))
+        .collect();
     for part in ["is lost in the resolution", "400 contact events"] {
-        assert!(reasons.values().any(|reason| reason.contains(part)), "{reasons:?}");
+        assert!(
+            reasons.values().any(|reason| reason.contains(part)),
+            "{reasons:?}"
+        );
     }
 
-    let failures = json(&folder.ends(1, "status r --json").stdout)["failures"].as_array().unwrap().clone();
+    let failures = json(&folder.ends(1, "status r --json").stdout)["failures"]
+        .as_array()
+        .unwrap()
+        .clone();
     let status_report = folder.ends(1, "status r").stdout;
     assert_eq!(failures.len(), 4);
     for failure in &failures {
-        let [job_id, reason, command] = ["job_id", "reason", "command"].map(|key| failure[key].as_str().unwrap());
+        let [job_id, reason, command] =
+            ["job_id", "reason", "command"].map(|key| failure[key].as_str().unwrap());
         assert_eq!(reasons[job_id], reason);
         for report in [&ended.stderr, &status_report] {
-            assert!(report.contains(job_id) && report.contains(&format!("alone: {command}\n")), "{report}");
+            assert!(
+                report.contains(job_id) && report.contains(&format!("alone: {command}\n")),
+                "{report}"
+            );
         }
         let alone = folder.ends(1, command.strip_prefix("stickslip ").unwrap());
         assert_eq!(alone.stderr, format!("error: {reason}\n"), "{command}");
@@ -98,12 +159,19 @@ fn the_command_of_a_job_is_that_job() {
         let mut compared = 0;
         for job in sweep.jobs() {
             let command = sweep.command(&job);
-            let ended = folder.run(&format!("{} --json", command.strip_prefix("stickslip ").unwrap()));
+            let ended = folder.run(&format!(
+                "{} --json",
+                command.strip_prefix("stickslip ").unwrap()
+            ));
             // The poison among them names no id.
             if ended.code == Some(0) {
                 compared += 1;
                 let job_id = sweep.job_id(&job.parameters);
-                assert_eq!(json(&ended.stdout)["job_id"].as_str(), Some(job_id.as_str()), "{command}");
+                assert_eq!(
+                    json(&ended.stdout)["job_id"].as_str(),
+                    Some(job_id.as_str()),
+                    "{command}"
+                );
             }
         }
         assert!(compared >= 4, "{text}");

@@ -11,29 +11,55 @@ const MODULATED: [&str; 2] = ["phi-eta", "tau-T"];
 #[test]
 fn each_sweep_gets_the_figures_that_fit_it() {
     let table: &[(&str, &[&str])] = &[
-        ("Delta = { log = [1e-7, 2e-6], points = 8 }\nfrequency = { log = [20, 400], points = 8 }", &["locking-map"]),
-        ("Delta = [0, 1e-6]\nfrequency = { linear = [20, 400], points = 24 }", &["staircase"]),
-        ("Delta = { linear = [0, 2e-6], points = 8 }\nfrequency = { linear = [20, 400], points = 7 }", &["overview"]),
-        ("Delta = [0, 1e-6]\nfrequency = [90]\ntau_r = [1e-3, 2e-3, 5e-3]", &["overview", "tau-histograms"]),
+        (
+            "Delta = { log = [1e-7, 2e-6], points = 8 }\nfrequency = { log = [20, 400], points = 8 }",
+            &["locking-map"],
+        ),
+        (
+            "Delta = [0, 1e-6]\nfrequency = { linear = [20, 400], points = 24 }",
+            &["staircase"],
+        ),
+        (
+            "Delta = { linear = [0, 2e-6], points = 8 }\nfrequency = { linear = [20, 400], points = 7 }",
+            &["overview"],
+        ),
+        (
+            "Delta = [0, 1e-6]\nfrequency = [90]\ntau_r = [1e-3, 2e-3, 5e-3]",
+            &["overview", "tau-histograms"],
+        ),
         (
             "Delta = [0, 1e-6]\nfrequency = [90]\nbreak_on = [\"magnitude\", \"tension\"]",
             &["overview", "tau-histograms"],
         ),
-        ("Delta = [0, 5e-7, 1e-6, 2e-6, 4e-6]\nfrequency = [90]", &["overview"]),
-        ("Delta = [0, 1e-6]\nfrequency = [90]", &["overview", "tau-histograms"]),
+        (
+            "Delta = [0, 5e-7, 1e-6, 2e-6, 4e-6]\nfrequency = [90]",
+            &["overview"],
+        ),
+        (
+            "Delta = [0, 1e-6]\nfrequency = [90]",
+            &["overview", "tau-histograms"],
+        ),
     ];
     let folder = Folder::new();
     for (index, (axes, expected)) in table.iter().enumerate() {
-        let text = format!("name = \"s\"\n[model]\nN = 3\nNs = 4\n[axes]\n{axes}\n[record]\nslips = 4\n");
+        let text =
+            format!("name = \"s\"\n[model]\nN = 3\nNs = 4\n[axes]\n{axes}\n[record]\nslips = 4\n");
         folder.write("sweep.toml", &text);
         folder.ends(0, &format!("run sweep.toml --out r{index}"));
         let figures = folder.contents(&format!("r{index}/figures"));
-        let mut names: Vec<String> = MODULATED.iter().chain(*expected).map(|name| (*name).to_owned()).collect();
+        let mut names: Vec<String> = MODULATED
+            .iter()
+            .chain(*expected)
+            .map(|name| (*name).to_owned())
+            .collect();
         names.sort();
         for extension in ["png", "svg"] {
-            let drawn = figures.keys().filter(|path| path.extension().unwrap() == extension);
-            let mut drawn: Vec<String> =
-                drawn.map(|path| path.file_stem().unwrap().to_string_lossy().into_owned()).collect();
+            let drawn = figures
+                .keys()
+                .filter(|path| path.extension().unwrap() == extension);
+            let mut drawn: Vec<String> = drawn
+                .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
+                .collect();
             drawn.sort();
             assert_eq!(drawn, names, "{extension}: {axes}");
         }
@@ -66,12 +92,20 @@ fn own() -> Folder {
 fn each_option_of_a_figure_changes_what_it_says() {
     let folder = own();
     let svg = |options: &str| {
-        folder.ends(0, &format!("plot r --x V0 --y tau_mean -o own.svg {options}"));
+        folder.ends(
+            0,
+            &format!("plot r --x V0 --y tau_mean -o own.svg {options}"),
+        );
         fs::read_to_string(folder.path("own.svg")).unwrap()
     };
     let plain = svg("");
-    for text in ["Drive velocity V₀ (m/s)", ">10⁻⁴<", "Mean interval ⟨τ⟩ (ms)", ">Δ = 1 µm<", "Sweep own"]
-    {
+    for text in [
+        "Drive velocity V₀ (m/s)",
+        ">10⁻⁴<",
+        "Mean interval ⟨τ⟩ (ms)",
+        ">Δ = 1 µm<",
+        "Sweep own",
+    ] {
         assert!(plain.contains(text), "{text}");
     }
     for (options, text) in [
@@ -80,19 +114,34 @@ fn each_option_of_a_figure_changes_what_it_says() {
         ("--colour frequency", ">1/T = 90 Hz<"),
         ("--colour V0", ">V₀ (m/s)<"),
         ("--panels Delta", ">(b)<"),
-        ("--xlim 1e-5:1e-4 --size 250mmx90mm", "not shown: 10 of 16 sets"),
+        (
+            "--xlim 1e-5:1e-4 --size 250mmx90mm",
+            "not shown: 10 of 16 sets",
+        ),
         ("--xlabel speed", ">speed<"),
         ("--ylabel τ", ">τ<"),
         ("--ylabel \u{7}", r">\u{7}<"),
         ("--style print", r#"width="86.00mm""#),
-        ("--size 100mmx90mm --style print", r#"width="100.00mm" height="90.00mm""#),
+        (
+            "--size 100mmx90mm --style print",
+            r#"width="100.00mm" height="90.00mm""#,
+        ),
     ] {
-        assert!(svg(options).contains(text) && !plain.contains(text), "{options}: {text}");
+        assert!(
+            svg(options).contains(text) && !plain.contains(text),
+            "{options}: {text}"
+        );
     }
     // A journal has the small print in the caption.
     assert!(!svg("--style print").contains("Sweep own"));
     let print = folder.ends(0, "plot r --x V0 --y tau_mean -o own.svg --style print");
-    assert!(print.stderr.starts_with("for the caption: Sweep own; N = 3"), "{}", print.stderr);
+    assert!(
+        print
+            .stderr
+            .starts_with("for the caption: Sweep own; N = 3"),
+        "{}",
+        print.stderr
+    );
     // Joined sets, bars and dots have the same numbers in print.
     let dots = |svg: &str| svg.matches("<circle").count() + svg.matches("<use").count();
     assert_eq!(dots(&svg("--style print")), dots(&plain));
@@ -101,26 +150,43 @@ fn each_option_of_a_figure_changes_what_it_says() {
 #[test]
 fn figures_come_in_the_formats_that_are_asked_for_and_are_the_same_each_time() {
     let folder = own();
-    folder.ends(0, "plot r --x V0 --y tau_mean --log xy --format svg,png,pdf");
+    folder.ends(
+        0,
+        "plot r --x V0 --y tau_mean --log xy --format svg,png,pdf",
+    );
     let contents = folder.contents("r/figures");
-    for (format, start) in [("svg", &b"<svg"[..]), ("png", b"\x89PNG"), ("pdf", b"%PDF-1.")] {
-        let bytes = contents[Path::new(&format!("tau_mean-V0.{format}"))].as_ref().unwrap();
+    for (format, start) in [
+        ("svg", &b"<svg"[..]),
+        ("png", b"\x89PNG"),
+        ("pdf", b"%PDF-1."),
+    ] {
+        let bytes = contents[Path::new(&format!("tau_mean-V0.{format}"))]
+            .as_ref()
+            .unwrap();
         assert!(bytes.starts_with(start), "{format}");
     }
     let standing = folder.ends(0, "plot r --format pdf --style print").stdout;
     assert!(
         standing.lines().count() > 1
-            && standing.lines().all(|line| Path::new(line).extension().is_some_and(|end| end == "pdf")),
+            && standing
+                .lines()
+                .all(|line| Path::new(line).extension().is_some_and(|end| end == "pdf")),
         "{standing}"
     );
     let before = folder.contents("r/figures");
-    folder.ends(0, "plot r --x V0 --y tau_mean --log xy --format svg,png,pdf");
+    folder.ends(
+        0,
+        "plot r --x V0 --y tau_mean --log xy --format svg,png,pdf",
+    );
     folder.ends(0, "plot r --format pdf --style print");
     assert!(folder.contents("r/figures") == before);
     folder.ends(0, "plot r --x V0 --y tau_mean -o own.pdf");
     let pdf = fs::read(folder.path("own.pdf")).unwrap();
     let text = String::from_utf8_lossy(&pdf);
-    assert!(text.trim_end().ends_with("%%EOF") && text.contains("/MediaBox"), "one whole page");
+    assert!(
+        text.trim_end().ends_with("%%EOF") && text.contains("/MediaBox"),
+        "one whole page"
+    );
 }
 
 #[test]
@@ -130,30 +196,82 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
     let table: &[(&str, &[&str])] = &[
         ("--x V0", &["--y <COLUMN>"]),
         ("--colour V0", &["--x <COLUMN>"]),
-        ("--x v0 --y tau_mean", &["--x v0: no such column; did you mean V0?", "--list"]),
-        ("--x V0 --y nothing_like_it", &["--y nothing_like_it: no such column; `stickslip plot --list` shows all"]),
-        ("--x regime --y tau_mean --log x", &["--log x: regime holds words"]),
-        ("--x V0 --y T_to", &["--y T_to: no set has a value of both V0 and T_to"]),
-        ("--x V0 --y tau_mean --xlim 1:2", &["none of 12 sets lies within --xlim and --ylim"]),
-        ("--x V0 --y tau_mean --xlim 2:1", &["--xlim 2:1", "less than the upper"]),
-        ("--x V0 --y tau_mean --xlim 1", &["must be LOW:HIGH", "1e-6:1e-3"]),
-        ("--x V0 --y tau_mean --log x --xlim -1:1", &["--xlim -1:1: must be > 0 on a logarithmic axis"]),
-        ("--x V0 --y tau_mean --panels tau_mean", &["--panels tau_mean: has 12 values, and 9 panels fit"]),
-        ("--x set_id --y tau_mean", &["--x set_id: has 16 words, and 12 fit an axis"]),
-        ("--x V0 --y tau_mean --colour set_id", &["--colour set_id: has 16 words, and there are 6 colours"]),
-        ("--x V0 --y tau_mean --size 5mmx5mm", &["--size: figure tau_mean-V0 needs at least "]),
-        ("--x V0 --y tau_mean --size 5", &["must be WIDTHxHEIGHT", "86mmx60mm"]),
-        ("--size 5mmx5mm", &["--size: figure phi-eta needs at least "]),
+        (
+            "--x v0 --y tau_mean",
+            &["--x v0: no such column; did you mean V0?", "--list"],
+        ),
+        (
+            "--x V0 --y nothing_like_it",
+            &["--y nothing_like_it: no such column; `stickslip plot --list` shows all"],
+        ),
+        (
+            "--x regime --y tau_mean --log x",
+            &["--log x: regime holds words"],
+        ),
+        (
+            "--x V0 --y T_to",
+            &["--y T_to: no set has a value of both V0 and T_to"],
+        ),
+        (
+            "--x V0 --y tau_mean --xlim 1:2",
+            &["none of 12 sets lies within --xlim and --ylim"],
+        ),
+        (
+            "--x V0 --y tau_mean --xlim 2:1",
+            &["--xlim 2:1", "less than the upper"],
+        ),
+        (
+            "--x V0 --y tau_mean --xlim 1",
+            &["must be LOW:HIGH", "1e-6:1e-3"],
+        ),
+        (
+            "--x V0 --y tau_mean --log x --xlim -1:1",
+            &["--xlim -1:1: must be > 0 on a logarithmic axis"],
+        ),
+        (
+            "--x V0 --y tau_mean --panels tau_mean",
+            &["--panels tau_mean: has 12 values, and 9 panels fit"],
+        ),
+        (
+            "--x set_id --y tau_mean",
+            &["--x set_id: has 16 words, and 12 fit an axis"],
+        ),
+        (
+            "--x V0 --y tau_mean --colour set_id",
+            &["--colour set_id: has 16 words, and there are 6 colours"],
+        ),
+        (
+            "--x V0 --y tau_mean --size 5mmx5mm",
+            &["--size: figure tau_mean-V0 needs at least "],
+        ),
+        (
+            "--x V0 --y tau_mean --size 5",
+            &["must be WIDTHxHEIGHT", "86mmx60mm"],
+        ),
+        (
+            "--size 5mmx5mm",
+            &["--size: figure phi-eta needs at least "],
+        ),
         ("--size 2mx2m", &["must be WIDTHxHEIGHT"]),
-        ("--size 2000mmx2000mm --style print", &["a PNG of 2232 million pixels", "the most is 100 million"]),
+        (
+            "--size 2000mmx2000mm --style print",
+            &["a PNG of 2232 million pixels", "the most is 100 million"],
+        ),
         ("--format eps", &["svg, png, pdf"]),
         ("--style poster", &["screen, print"]),
-        ("--x V0 --y tau_mean -o own.eps", &["own.eps: must end in .svg, .png or .pdf"]),
+        (
+            "--x V0 --y tau_mean -o own.eps",
+            &["own.eps: must end in .svg, .png or .pdf"],
+        ),
     ];
     for (options, words) in table {
         let ended = folder.ends(2, &format!("plot r {options}"));
         for word in *words {
-            assert!(ended.stderr.contains(word), "{options}: {word:?} is missing in\n{}", ended.stderr);
+            assert!(
+                ended.stderr.contains(word),
+                "{options}: {word:?} is missing in\n{}",
+                ended.stderr
+            );
         }
     }
     assert!(folder.contents("") == before);
@@ -163,11 +281,25 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
 fn the_list_of_columns_is_that_of_the_table_and_all_of_its_numbers_can_be_drawn() {
     let folder = own();
     let list = folder.ends(0, "plot --list").stdout;
-    assert!(list.lines().any(|line| line.starts_with("V0 ") && line.ends_with("drive velocity")), "{list}");
-    let names: BTreeSet<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(
+        list.lines()
+            .any(|line| line.starts_with("V0 ") && line.ends_with("drive velocity")),
+        "{list}"
+    );
+    let names: BTreeSet<&str> = list
+        .lines()
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
     assert!(names.contains("tau_mean_low") && names.len() > 60);
     // A number of the table, a flag and a word.
-    for name in ["eta", "jobs", "has_phase", "regime", "phase_mean", "mean_friction"] {
+    for name in [
+        "eta",
+        "jobs",
+        "has_phase",
+        "regime",
+        "phase_mean",
+        "mean_friction",
+    ] {
         folder.ends(0, &format!("plot r --x V0 --y {name} -o {name}.svg"));
     }
 }
@@ -196,19 +328,29 @@ fn every_sweep_has_a_figure_without_raw_names_and_without_an_empty_panel() {
             let axis = AXES[draw(AXES.len())];
             let keys = |axis: &str| axis.split(['\n', '=']).next().unwrap().trim().to_owned();
             let has_modulation = |axis: &str| axis.contains("Delta");
-            let clashes = |other: &&str| keys(other) == keys(axis) || (has_modulation(other) && has_modulation(axis));
+            let clashes = |other: &&str| {
+                keys(other) == keys(axis) || (has_modulation(other) && has_modulation(axis))
+            };
             if !axes.iter().any(clashes) {
                 axes.push(axis);
             }
         }
-        let model = if axes.iter().any(|axis| axis.starts_with("N ")) { "" } else { "N = 5\n" };
+        let model = if axes.iter().any(|axis| axis.starts_with("N ")) {
+            ""
+        } else {
+            "N = 5\n"
+        };
         // A table comes after what stands alone.
         axes.sort_by_key(|axis| axis.starts_with('['));
         let axes = axes.join("\n");
-        let text = format!("name = \"s\"\n[model]\n{model}Ns = 5\n[axes]\n{axes}\n[record]\nslips = 4\n");
+        let text =
+            format!("name = \"s\"\n[model]\n{model}Ns = 5\n[axes]\n{axes}\n[record]\nslips = 4\n");
         folder.write("sweep.toml", &text);
         folder.ends(0, &format!("run sweep.toml --out r{index}"));
-        assert!(panels_are_full(&folder, &format!("r{index}"), &axes) > 0, "{axes}");
+        assert!(
+            panels_are_full(&folder, &format!("r{index}"), &axes) > 0,
+            "{axes}"
+        );
     }
 }
 
@@ -221,12 +363,18 @@ fn panels_are_full(folder: &Folder, directory: &str, sweep: &str) -> usize {
         .map(|(_, bytes)| String::from_utf8(bytes.clone().unwrap()).unwrap())
         .collect();
     for svg in &svgs {
-        let texts = svg.split("<text").skip(1).map(|text| text.split(['>', '<']).nth(1).unwrap());
+        let texts = svg
+            .split("<text")
+            .skip(1)
+            .map(|text| text.split(['>', '<']).nth(1).unwrap());
         let names = texts.filter(|text| text.contains('_'));
         assert_eq!(names.collect::<Vec<_>>(), [""; 0], "{sweep}");
         // What is drawn inside a frame comes between the clip and its end, dots after it.
         for panel in svg.split("clip-path=\"").skip(1) {
-            assert!(["<circle", "<rect"].iter().any(|mark| panel.contains(mark)), "{sweep}");
+            assert!(
+                ["<circle", "<rect"].iter().any(|mark| panel.contains(mark)),
+                "{sweep}"
+            );
         }
     }
     svgs.len()
@@ -240,16 +388,32 @@ fn the_sweeps_of_this_project_have_figures_if_anything_slips() {
         let path = file.unwrap().path();
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
         let text = fs::read_to_string(&path).unwrap();
-        let has = |key: &str| text.lines().any(|line| line.split([' ', '=']).next() == Some(key));
+        let has = |key: &str| {
+            text.lines()
+                .any(|line| line.split([' ', '=']).next() == Some(key))
+        };
         let smaller = text.lines().map(|line| match line.split_once(" = ") {
             Some(("seeds   " | "seeds", _)) => "seeds = { from = 2, to = 2 }",
             _ => line,
         });
         folder.write("sweep.toml", &smaller.collect::<Vec<_>>().join("\n"));
-        let settings = [("N", !has("N"), 5), ("Ns", true, 5), ("slips", has("slips"), 4)];
+        let settings = [
+            ("N", !has("N"), 5),
+            ("Ns", true, 5),
+            ("slips", has("slips"), 4),
+        ];
         let settings = settings.into_iter().filter(|(_, is_set, _)| *is_set);
-        let settings: Vec<String> = settings.map(|(key, _, value)| format!("--set {key}={value}")).collect();
-        folder.ends(0, &format!("run sweep.toml {} --out {name}", settings.join(" ")));
-        assert_eq!(panels_are_full(&folder, &name, &name) == 0, name == "eq1", "{name}");
+        let settings: Vec<String> = settings
+            .map(|(key, _, value)| format!("--set {key}={value}"))
+            .collect();
+        folder.ends(
+            0,
+            &format!("run sweep.toml {} --out {name}", settings.join(" ")),
+        );
+        assert_eq!(
+            panels_are_full(&folder, &name, &name) == 0,
+            name == "eq1",
+            "{name}"
+        );
     }
 }

@@ -9,17 +9,31 @@ fn a_sweep_file_to_start_from_plans_as_it_is_and_is_not_overwritten() {
     let said = folder.ends(0, "init mine.toml").stderr;
     assert!(said.contains("stickslip plan mine.toml"), "{said}");
     let planned = folder.ends(0, "plan mine.toml").stdout;
-    assert!(planned.contains("mine") && planned.contains("18 after conditions"), "{planned}");
+    assert!(
+        planned.contains("mine") && planned.contains("18 after conditions"),
+        "{planned}"
+    );
     let text = fs::read_to_string(folder.path("mine.toml")).unwrap();
     let again = folder.ends(2, "init mine.toml --preset fig2");
-    assert!(again.stderr.contains("is there already and was not changed"), "{}", again.stderr);
+    assert!(
+        again
+            .stderr
+            .contains("is there already and was not changed"),
+        "{}",
+        again.stderr
+    );
     assert_eq!(fs::read_to_string(folder.path("mine.toml")).unwrap(), text);
 }
 
 #[test]
 fn a_sweep_of_the_paper_runs_without_a_file_and_can_be_changed() {
     let folder = Folder::new();
-    assert!(folder.ends(0, "plan --preset fig3-full").stdout.contains("14360 after conditions"));
+    assert!(
+        folder
+            .ends(0, "plan --preset fig3-full")
+            .stdout
+            .contains("14360 after conditions")
+    );
     folder.ends(0, "run --preset eq1 --no-reduce");
     assert_eq!(folder.table("results/eq1", "jobs").cells.len(), 1);
     folder.ends(0, "init my-map.toml --preset locking-map");
@@ -27,7 +41,11 @@ fn a_sweep_of_the_paper_runs_without_a_file_and_can_be_changed() {
     let unknown = folder.ends(2, "run --preset fig33");
     assert!(unknown.stderr.contains("fig3"), "{}", unknown.stderr);
     let both = folder.ends(2, "plan my-map.toml --preset fig3");
-    assert!(both.stderr.contains("cannot be used with"), "{}", both.stderr);
+    assert!(
+        both.stderr.contains("cannot be used with"),
+        "{}",
+        both.stderr
+    );
     let neither = folder.ends(2, "run");
     assert!(neither.stderr.contains("SWEEP.toml"), "{}", neither.stderr);
 }
@@ -35,13 +53,15 @@ fn a_sweep_of_the_paper_runs_without_a_file_and_can_be_changed() {
 #[test]
 fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
     let folder = Folder::new();
-    let text =
-        "# Mine.\nname = \"mine\"\n[model]\nN = 3\nNs = 4\n[axes]\nV0 = [1e-4, 2e-4]  # two\n[record]\nslips = 2\n";
+    let text = "# Mine.\nname = \"mine\"\n[model]\nN = 3\nNs = 4\n[axes]\nV0 = [1e-4, 2e-4]  # two\n[record]\nslips = 2\n";
     fs::write(folder.path("mine.toml"), text).unwrap();
     folder.ends(0, "run mine.toml --no-reduce");
     let flags = "--set V0=3e-4 --axis seed=count:3 --set slips=1";
     let planned = folder.ends(0, &format!("plan mine.toml {flags}")).stdout;
-    assert!(planned.contains("3 after conditions") && planned.contains("none yet"), "{planned}");
+    assert!(
+        planned.contains("3 after conditions") && planned.contains("none yet"),
+        "{planned}"
+    );
     let refused = folder.ends(2, &format!("run mine.toml {flags}")).stderr;
     let choices = "results/mine holds another sweep; give a new directory with -o DIR, or -o results/mine to extend";
     assert!(refused.contains(choices), "{refused}");
@@ -49,9 +69,11 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
     let jobs = folder.table("other", "jobs");
     assert_eq!(jobs.reals("V0"), [3e-4; 3]);
     // That text is the directory's own, so the same command resumes, and so does its name alone.
-    for again in
-        [format!("run mine.toml {flags} -o other"), "run other".to_owned(), "run other --set V0=3e-4".to_owned()]
-    {
+    for again in [
+        format!("run mine.toml {flags} -o other"),
+        "run other".to_owned(),
+        "run other --set V0=3e-4".to_owned(),
+    ] {
         let ended = folder.ends(0, &format!("{again} --no-reduce"));
         assert!(
             ended.stdout.contains("jobs run") && ended.stdout.contains(" 0, 0 failed"),
@@ -59,24 +81,40 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
             ended.stdout
         );
     }
-    assert_eq!(folder.table("results/mine", "jobs").reals("V0"), [1e-4, 2e-4]);
+    assert_eq!(
+        folder.table("results/mine", "jobs").reals("V0"),
+        [1e-4, 2e-4]
+    );
     // Where there is no directory yet, none can be extended by mistake.
     folder.ends(0, "run --preset eq1 --set N=3 --set Ns=4 --no-reduce");
     assert_eq!(folder.table("results/eq1", "jobs").counts("N"), [3]);
     folder.ends(0, &format!("init other.toml --preset velocity {flags}"));
-    assert!(folder.ends(0, "plan other.toml").stdout.contains("3 after conditions"));
+    assert!(
+        folder
+            .ends(0, "plan other.toml")
+            .stdout
+            .contains("3 after conditions")
+    );
     folder.ends(0, "simulate mine.toml --set V0=1e-4");
 }
 
 #[test]
 fn each_question_is_a_sweep_that_plans() {
     let folder = Folder::new();
-    for (question, jobs) in [("friction", 296), ("interval", 65), ("locking", 560), ("sliding", 200)] {
+    for (question, jobs) in [
+        ("friction", 296),
+        ("interval", 65),
+        ("locking", 560),
+        ("sliding", 200),
+    ] {
         folder.ends(0, &format!("init {question}.toml --question {question}"));
         let text = fs::read_to_string(folder.path(&format!("{question}.toml"))).unwrap();
         assert!(text.lines().next().unwrap().ends_with('?'), "{text}");
         let planned = folder.ends(0, &format!("plan {question}.toml")).stdout;
-        assert!(planned.contains(&format!("{jobs} after conditions")), "{planned}");
+        assert!(
+            planned.contains(&format!("{jobs} after conditions")),
+            "{planned}"
+        );
     }
 }
 
@@ -84,7 +122,10 @@ fn each_question_is_a_sweep_that_plans() {
 fn a_file_name_that_suits_no_sweep_is_rejected_and_leaves_nothing() {
     let folder = Folder::new();
     let said = folder.ends(2, "init my.sweep.toml").stderr;
-    assert!(said.contains("my.sweep.toml") && said.contains("letters, digits"), "{said}");
+    assert!(
+        said.contains("my.sweep.toml") && said.contains("letters, digits"),
+        "{said}"
+    );
     assert!(!folder.path("my.sweep.toml").exists());
 }
 
@@ -93,7 +134,11 @@ fn every_command_has_a_manual_page() {
     let folder = Folder::new();
     folder.ends(0, "generate man pages/man1");
     for command in ["", "-run", "-simulate", "-init"] {
-        let page = fs::read_to_string(folder.path(&format!("pages/man1/stickslip{command}.1"))).unwrap();
-        assert!(page.contains(".SH DESCRIPTION") || page.contains(".SH OPTIONS"), "{command}: {page}");
+        let page =
+            fs::read_to_string(folder.path(&format!("pages/man1/stickslip{command}.1"))).unwrap();
+        assert!(
+            page.contains(".SH DESCRIPTION") || page.contains(".SH OPTIONS"),
+            "{command}: {page}"
+        );
     }
 }

@@ -94,7 +94,10 @@ fn token() -> impl Strategy<Value = Vec<u8>> {
         ",",
         "/ 0",
     ]);
-    prop_oneof![words.prop_map(|word| word.as_bytes().to_vec()), prop::collection::vec(any::<u8>(), 1..8)]
+    prop_oneof![
+        words.prop_map(|word| word.as_bytes().to_vec()),
+        prop::collection::vec(any::<u8>(), 1..8)
+    ]
 }
 
 fn apply(bytes: &mut Vec<u8>, change: &Change) {
@@ -133,10 +136,19 @@ fn changed(bytes: &[u8], changes: &[Change]) -> Vec<u8> {
 /// The sweep files of the repository, and one with everything in it.
 static SWEEPS: LazyLock<Vec<String>> = LazyLock::new(|| {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sweeps");
-    let mut paths: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    let mut paths: Vec<PathBuf> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    paths.retain(|path| {
+        path.extension()
+            .is_some_and(|extension| extension == "toml")
+    });
     paths.sort();
-    let mut texts: Vec<String> = paths.iter().map(|path| fs::read_to_string(path).unwrap()).collect();
+    let mut texts: Vec<String> = paths
+        .iter()
+        .map(|path| fs::read_to_string(path).unwrap())
+        .collect();
     texts.push(TINY.to_owned());
     texts
 });
@@ -185,14 +197,31 @@ struct Examples {
 static RESULTS: LazyLock<Examples> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     for name in EXAMPLES {
-        let sweep = Sweep::parse(if name == "rounds" { ROUNDS } else { TINY }, Path::new("tiny.toml")).unwrap();
+        let sweep = Sweep::parse(
+            if name == "rounds" { ROUNDS } else { TINY },
+            Path::new("tiny.toml"),
+        )
+        .unwrap();
         let stop = AtomicBool::new(false);
-        let options =
-            Options { threads: None, stop: &stop, retry_failed: false, shard: Shard::default(), walltime: None };
+        let options = Options {
+            threads: None,
+            stop: &stop,
+            retry_failed: false,
+            shard: Shard::default(),
+            walltime: None,
+        };
         let (recording, solver) = (*sweep.recording(), sweep.solver());
-        let kernel =
-            |job: &stickslip::sweep::Job, stop: &AtomicBool| measure(&job.parameters, &recording, solver, stop);
-        run(&Layout::new(&Disk, &folder.path().join(name)), &sweep, options, &kernel, &mut |_| ()).unwrap();
+        let kernel = |job: &stickslip::sweep::Job, stop: &AtomicBool| {
+            measure(&job.parameters, &recording, solver, stop)
+        };
+        run(
+            &Layout::new(&Disk, &folder.path().join(name)),
+            &sweep,
+            options,
+            &kernel,
+            &mut |_| (),
+        )
+        .unwrap();
     }
     for name in EXAMPLES {
         reduce(&Results::read(&Layout::new(&Disk, &folder.path().join(name))).unwrap()).unwrap();
@@ -224,13 +253,19 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 /// Copies a directory, with a file changed, to a place of its own.
 fn copy(from: &Path, file: &Path, changes: &[Change]) -> (tempfile::TempDir, bool) {
     // Where syncs cost nothing, if there is such a place.
-    let to = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap();
+    let to = tempfile::tempdir_in("/dev/shm")
+        .or_else(|_| tempfile::tempdir())
+        .unwrap();
     let mut is_changed = false;
     for path in files(from) {
         let target = to.path().join(path.strip_prefix(from).unwrap());
         fs::create_dir_all(target.parent().unwrap()).unwrap();
         let bytes = fs::read(&path).unwrap();
-        let written = if path == file { changed(&bytes, changes) } else { bytes.clone() };
+        let written = if path == file {
+            changed(&bytes, changes)
+        } else {
+            bytes.clone()
+        };
         is_changed |= written != bytes;
         fs::write(target, written).unwrap();
     }
@@ -238,8 +273,18 @@ fn copy(from: &Path, file: &Path, changes: &[Change]) -> (tempfile::TempDir, boo
 }
 
 /// Numbers that make no sense almost anywhere.
-const NUMBERS: [&str; 10] =
-    ["-1", "0", "1", "2", "1e308", "-1e-320", "4294967296", "9223372036854775807", "18446744073709551615", "null"];
+const NUMBERS: [&str; 10] = [
+    "-1",
+    "0",
+    "1",
+    "2",
+    "1e308",
+    "-1e-320",
+    "4294967296",
+    "9223372036854775807",
+    "18446744073709551615",
+    "null",
+];
 
 /// An extension's file with one of its numbers replaced, and the checksum of that.
 fn resealed_json(text: &str, which: Index, number: &str) -> String {
@@ -247,12 +292,19 @@ fn resealed_json(text: &str, which: Index, number: &str) -> String {
     let is_of_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
     let starts: Vec<usize> = body
         .char_indices()
-        .filter(|&(at, c)| (is_of_number(c) && !body[..at].ends_with(is_of_number)) || body[at..].starts_with("null"))
+        .filter(|&(at, c)| {
+            (is_of_number(c) && !body[..at].ends_with(is_of_number))
+                || body[at..].starts_with("null")
+        })
         .map(|(at, _)| at)
         .collect();
     let at = starts[which.index(starts.len())];
     let rest = &body[at..];
-    let end = if rest.starts_with("null") { 4 } else { rest.find(|c| !is_of_number(c)).unwrap_or(rest.len()) };
+    let end = if rest.starts_with("null") {
+        4
+    } else {
+        rest.find(|c| !is_of_number(c)).unwrap_or(rest.len())
+    };
     let body = format!("{}{number}{}", &body[..at], &rest[end..]);
     let sha256 = hexadecimal(&Sha256::digest(format!("{body}\n}}")));
     format!("{body},\n  \"sha256\": \"{sha256}\"\n}}\n")
@@ -263,25 +315,65 @@ fn write_nonsense<R: Row>(path: &Path, column: Index, row: Index, value: Index) 
     let footer = stickslip::table::file::footer(&Disk, path).unwrap();
     let kept = |key: &&str| !["seal", "units", "meaning", "ARROW:schema"].contains(key);
     let keys: Vec<&str> = footer.keys().map(String::as_str).filter(kept).collect();
-    let footer = keys.into_iter().fold(Footer::default(), |new, key| new.with(key, &footer[key]));
-    let batches: Vec<Batch> = Dataset::new(&Disk, vec![path.to_owned()]).batches().collect::<Result<_, _>>().unwrap();
-    let is_left_out = |name: &Cow<'static, str>| batches.iter().any(|batch| batch.rows.column_by_name(name).is_none());
-    let left_out: Vec<_> = R::columns().into_iter().map(|column| column.name).filter(is_left_out).collect();
-    let mut writer = TableWriter::<R>::without(&left_out, Disk.create(path).unwrap(), &footer).unwrap();
-    for Batch { path, rows } in batches.into_iter().filter(|batch| batch.rows.num_rows() > 0) {
+    let footer = keys
+        .into_iter()
+        .fold(Footer::default(), |new, key| new.with(key, &footer[key]));
+    let batches: Vec<Batch> = Dataset::new(&Disk, vec![path.to_owned()])
+        .batches()
+        .collect::<Result<_, _>>()
+        .unwrap();
+    let is_left_out = |name: &Cow<'static, str>| {
+        batches
+            .iter()
+            .any(|batch| batch.rows.column_by_name(name).is_none())
+    };
+    let left_out: Vec<_> = R::columns()
+        .into_iter()
+        .map(|column| column.name)
+        .filter(is_left_out)
+        .collect();
+    let mut writer =
+        TableWriter::<R>::without(&left_out, Disk.create(path).unwrap(), &footer).unwrap();
+    for Batch { path, rows } in batches
+        .into_iter()
+        .filter(|batch| batch.rows.num_rows() > 0)
+    {
         let (column, row) = (column.index(rows.num_columns()), row.index(rows.num_rows()));
         let mut columns = rows.columns().to_vec();
         columns[column] = nonsense(&columns[column], row, value);
         let rows = RecordBatch::try_new(rows.schema(), columns).unwrap();
-        writer.copy(&Batch { path, rows: rows.clone() }, 0..rows.num_rows()).unwrap();
+        writer
+            .copy(
+                &Batch {
+                    path,
+                    rows: rows.clone(),
+                },
+                0..rows.num_rows(),
+            )
+            .unwrap();
     }
     writer.finish().unwrap();
 }
 
 fn nonsense(column: &ArrayRef, row: usize, value: Index) -> ArrayRef {
-    const REALS: [f64; 8] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -1.0, 0.0, 1e-320, 1e300];
+    const REALS: [f64; 8] = [
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::MAX,
+        -1.0,
+        0.0,
+        1e-320,
+        1e300,
+    ];
     const COUNTS: [i64; 7] = [-1, 0, 1, i64::MAX, i64::MIN, 1 << 40, i64::MAX - 1];
-    const TEXTS: [&str; 5] = ["", "done", "failed", "\u{1b}[31m", "ffffffffffffffffffffffffffffffff"];
+    const TEXTS: [&str; 5] = [
+        "",
+        "done",
+        "failed",
+        "\u{1b}[31m",
+        "ffffffffffffffffffffffffffffffff",
+    ];
     match column.data_type() {
         DataType::Float64 => {
             let mut cells: Vec<Option<f64>> = column.as_primitive::<Float64Type>().iter().collect();
@@ -319,7 +411,11 @@ fn read_all(root: &Path, file: &Path) {
         }
     }
     assert!(begin.elapsed() < LONGEST, "{:?}", begin.elapsed());
-    assert!(peak_memory().is_none_or(|bytes| bytes < MAX_MEMORY), "{:?}", peak_memory());
+    assert!(
+        peak_memory().is_none_or(|bytes| bytes < MAX_MEMORY),
+        "{:?}",
+        peak_memory()
+    );
 }
 
 /// All tests of this process take less.
@@ -335,7 +431,10 @@ fn peak_memory() -> Option<u64> {
 /// A table file of a copy of one of the directories.
 fn table_file(example: &str, which: Index) -> (tempfile::TempDir, PathBuf) {
     let root = RESULTS.folder.path().join(example);
-    let tables: Vec<PathBuf> = ["tables", "reduced"].iter().flat_map(|folder| files(&root.join(folder))).collect();
+    let tables: Vec<PathBuf> = ["tables", "reduced"]
+        .iter()
+        .flat_map(|folder| files(&root.join(folder)))
+        .collect();
     let file = &tables[which.index(tables.len())];
     let (copy, _) = copy(&root, Path::new(""), &[]);
     let file = copy.path().join(file.strip_prefix(&root).unwrap());
@@ -347,8 +446,15 @@ fn config() -> ProptestConfig {
 }
 
 fn config_with(cases: u32) -> ProptestConfig {
-    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(cases);
-    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
+    let cases = std::env::var("PROPTEST_CASES")
+        .ok()
+        .and_then(|cases| cases.parse().ok())
+        .unwrap_or(cases);
+    ProptestConfig {
+        cases,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
 }
 
 proptest! {

@@ -68,7 +68,8 @@ precursor_size = 5
 ";
 
 fn hexadecimal(hash: &[u8]) -> String {
-    hash.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+    hash.iter()
+        .fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }
 
 /// A hash of rows that does not depend on their order: the sum of the hashes of their cells.
@@ -77,7 +78,14 @@ fn hash_of_rows(rows: &Rows) -> String {
         let hash = Sha256::digest(format!("{row:?}"));
         u128::from_be_bytes(hash[..16].try_into().unwrap())
     };
-    hexadecimal(&rows.cells.iter().map(of_row).fold(0, u128::wrapping_add).to_be_bytes())
+    hexadecimal(
+        &rows
+            .cells
+            .iter()
+            .map(of_row)
+            .fold(0, u128::wrapping_add)
+            .to_be_bytes(),
+    )
 }
 
 /// One line for each file that is a result, and for the rows of each table.
@@ -85,15 +93,28 @@ fn fingerprint(folder: &Folder, directory: &str) -> String {
     let mut text = String::new();
     for below in ["tables", "reduced", "figures"] {
         for (path, bytes) in folder.contents(&format!("{directory}/{below}")) {
-            if let Some(bytes) = bytes.filter(|_| path.extension().is_some_and(|extension| extension != "png")) {
-                writeln!(text, "{}  {below}/{}", hexadecimal(&Sha256::digest(bytes)), path.display()).unwrap();
+            if let Some(bytes) =
+                bytes.filter(|_| path.extension().is_some_and(|extension| extension != "png"))
+            {
+                writeln!(
+                    text,
+                    "{}  {below}/{}",
+                    hexadecimal(&Sha256::digest(bytes)),
+                    path.display()
+                )
+                .unwrap();
             }
         }
     }
     for table in TABLES {
         let rows = folder.table(directory, table);
         if !rows.cells.is_empty() {
-            writeln!(text, "{}  rows of {table}, in any order", hash_of_rows(&rows)).unwrap();
+            writeln!(
+                text,
+                "{}  rows of {table}, in any order",
+                hash_of_rows(&rows)
+            )
+            .unwrap();
         }
     }
     text
@@ -111,15 +132,25 @@ fn assert_golden(name: &str, sweep: &str) {
     child.kill().unwrap();
     wait(child);
     folder.ends(0, "run sweep.toml --threads 2 --out two");
-    assert_eq!(fingerprint(&folder, "two"), found, "{name}: after a kill, with two threads");
+    assert_eq!(
+        fingerprint(&folder, "two"),
+        found,
+        "{name}: after a kill, with two threads"
+    );
 
     folder.ends(0, "verify two");
 
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{name}.txt"));
+    let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/golden")
+        .join(format!("{name}.txt"));
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         fs::write(&file, &found).unwrap();
     }
-    assert_eq!(found, fs::read_to_string(&file).unwrap_or_default(), "{name}: see the head of tests/it/golden.rs");
+    assert_eq!(
+        found,
+        fs::read_to_string(&file).unwrap_or_default(),
+        "{name}: see the head of tests/it/golden.rs"
+    );
 }
 
 #[test]

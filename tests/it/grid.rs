@@ -6,7 +6,11 @@ use stickslip::observe::{ContactLog, Recording, SlipObserver};
 use stickslip::solver::{GRID_TOLERANCE, Limits, Resolve, Solver, Summary, simulate};
 
 fn modulated() -> Parameters {
-    Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() }
+    Parameters {
+        modulation_amplitude: 1e-6,
+        modulation_period: Some(1.0 / 58.0),
+        ..Parameters::default()
+    }
 }
 
 fn contact_log(
@@ -15,9 +19,19 @@ fn contact_log(
     resolve: Resolve,
     end_time: f64,
 ) -> (Summary, Vec<ContactEvent>) {
-    let limits = Limits { end_time, events: u64::MAX, interrupt: None };
+    let limits = Limits {
+        end_time,
+        events: u64::MAX,
+        interrupt: None,
+    };
     let mut log = ContactLog::default();
-    let summary = simulate(parameters, Solver::EventDriven { tolerance, resolve }, limits, &mut log).unwrap();
+    let summary = simulate(
+        parameters,
+        Solver::EventDriven { tolerance, resolve },
+        limits,
+        &mut log,
+    )
+    .unwrap();
     (summary, log.events)
 }
 
@@ -25,12 +39,23 @@ fn contact_log(
 fn break_errors(exact: &[ContactEvent], found: &[ContactEvent]) -> Vec<f64> {
     let key = |event: &ContactEvent| (event.block, event.contact, event.generation);
     let breaks = |events: &[ContactEvent]| -> Vec<ContactEvent> {
-        events.iter().filter(|event| event.change == Change::Break).copied().collect()
+        events
+            .iter()
+            .filter(|event| event.change == Change::Break)
+            .copied()
+            .collect()
     };
-    let found: HashMap<_, f64> = breaks(found).iter().map(|event| (key(event), event.time)).collect();
+    let found: HashMap<_, f64> = breaks(found)
+        .iter()
+        .map(|event| (key(event), event.time))
+        .collect();
     let mut errors: Vec<f64> = breaks(exact)[..100]
         .iter()
-        .map(|event| found.get(&key(event)).map_or(f64::INFINITY, |time| (time - event.time).abs()))
+        .map(|event| {
+            found
+                .get(&key(event))
+                .map_or(f64::INFINITY, |time| (time - event.time).abs())
+        })
         .collect();
     errors.sort_by(f64::total_cmp);
     errors
@@ -39,7 +64,11 @@ fn break_errors(exact: &[ContactEvent], found: &[ContactEvent]) -> Vec<f64> {
 #[test]
 fn errors_of_break_times_fall_sixteenfold_when_the_step_is_halved() {
     for parameters in [Parameters::default(), modulated()] {
-        let end_time = if parameters.modulation_amplitude > 0.0 { 0.12 } else { 0.07 };
+        let end_time = if parameters.modulation_amplitude > 0.0 {
+            0.12
+        } else {
+            0.07
+        };
         let (_, exact) = contact_log(&parameters, 1e-12, Resolve::Taylor, end_time);
         // A sixteenth of the tolerance is half the step.
         let errors = [1e-3, 1e-3 / 16.0, 1e-3 / 256.0, 1e-3 / 4096.0].map(|tolerance| {
@@ -58,8 +87,12 @@ fn errors_of_break_times_fall_sixteenfold_when_the_step_is_halved() {
 
 #[test]
 fn the_tolerance_chooses_the_grid_and_a_ramp_or_an_end_does_not_leave_it() {
-    let ramped =
-        Parameters { turning_period: Some(1.0 / 80.0), turning_amplitude: Some(5e-7), ramp_time: 0.1, ..modulated() };
+    let ramped = Parameters {
+        turning_period: Some(1.0 / 80.0),
+        turning_amplitude: Some(5e-7),
+        ramp_time: 0.1,
+        ..modulated()
+    };
     for parameters in [Parameters::default(), modulated(), ramped] {
         for (tolerance, resolve, takes_grid) in [
             (1e-3, Resolve::Auto, true),
@@ -70,7 +103,11 @@ fn the_tolerance_chooses_the_grid_and_a_ramp_or_an_end_does_not_leave_it() {
         ] {
             let (summary, events) = contact_log(&parameters, tolerance, resolve, 0.0815);
             assert_eq!(summary.end_time, 0.0815, "{resolve:?} at {tolerance:e}");
-            assert_eq!(summary.grid_steps > summary.steps / 2, takes_grid, "{resolve:?} at {tolerance:e}: {summary:?}");
+            assert_eq!(
+                summary.grid_steps > summary.steps / 2,
+                takes_grid,
+                "{resolve:?} at {tolerance:e}: {summary:?}"
+            );
             assert_eq!(summary.grid_steps == 0, !takes_grid);
             assert!(events.is_sorted_by_key(|event| event.time));
         }
@@ -92,7 +129,11 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
                 Change::Attach => self.1 += 1,
                 Change::Break => self.1 -= 1,
             }
-            assert!(event.attached == self.1 || event.time == 0.0, "{event:?}, not {}", self.1);
+            assert!(
+                event.attached == self.1 || event.time == 0.0,
+                "{event:?}, not {}",
+                self.1
+            );
             self.0.contact(event);
         }
 
@@ -102,10 +143,22 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
     }
 
     // The slow one moves the frame between slips.
-    let slow = Parameters { drive_velocity: 1e-6, ..Parameters::default() };
+    let slow = Parameters {
+        drive_velocity: 1e-6,
+        ..Parameters::default()
+    };
     for parameters in [Parameters::default(), modulated(), slow] {
-        let recording = Recording { slips: 8, discard: 0, drop_size: Some(20.0), ..Recording::default() };
-        let limits = Limits { end_time: f64::INFINITY, events: u64::MAX, interrupt: None };
+        let recording = Recording {
+            slips: 8,
+            discard: 0,
+            drop_size: Some(20.0),
+            ..Recording::default()
+        };
+        let limits = Limits {
+            end_time: f64::INFINITY,
+            events: u64::MAX,
+            interrupt: None,
+        };
         let mut alone = SlipObserver::new(&parameters, &recording);
         let mut following = Following(alone.clone(), 0);
         simulate(&parameters, Solver::default(), limits, &mut alone).unwrap();
@@ -113,14 +166,29 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
         let (alone, following) = (alone.into_rows().0, following.0.into_rows().0);
         assert_eq!(alone.len(), 8);
         for (slip, other) in alone.iter().zip(&following) {
-            assert_eq!((slip.size, slip.precursors, slip.nucleation), (other.size, other.precursors, other.nucleation));
-            assert_eq!((slip.attached_before, slip.least_attached), (other.attached_before, other.least_attached));
+            assert_eq!(
+                (slip.size, slip.precursors, slip.nucleation),
+                (other.size, other.precursors, other.nucleation)
+            );
+            assert_eq!(
+                (slip.attached_before, slip.least_attached),
+                (other.attached_before, other.least_attached)
+            );
             // Segments are cut elsewhere: rounding.
-            assert!((slip.onset - other.onset).abs() < 1e-9, "{slip:?} {other:?}");
-            assert!((slip.peak_force - other.peak_force).abs() < 1e-6, "{slip:?} {other:?}");
+            assert!(
+                (slip.onset - other.onset).abs() < 1e-9,
+                "{slip:?} {other:?}"
+            );
+            assert!(
+                (slip.peak_force - other.peak_force).abs() < 1e-6,
+                "{slip:?} {other:?}"
+            );
             assert!((slip.drop - other.drop).abs() < 1e-6, "{slip:?} {other:?}");
             // From the force at the first and at the last break.
-            assert!((slip.edge_distance / other.edge_distance - 1.0).abs() < 1e-8, "{slip:?} {other:?}");
+            assert!(
+                (slip.edge_distance / other.edge_distance - 1.0).abs() < 1e-8,
+                "{slip:?} {other:?}"
+            );
         }
     }
 }

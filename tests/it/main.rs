@@ -1,5 +1,9 @@
 //! Tests of the library from outside and of the built program, in one binary: `cargo test --release --test it NAME`.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "integration tests")]
+#![allow(
+    clippy::tests_outside_test_module,
+    clippy::unwrap_used,
+    reason = "integration tests"
+)]
 
 mod accuracy;
 mod bad_input;

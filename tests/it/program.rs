@@ -77,8 +77,12 @@ impl Folder {
     /// Runs the program with arguments that contain no spaces.
     pub fn run(&self, arguments: &str) -> Ended {
         let mut command = assert_cmd::Command::new(PROGRAM);
-        let output =
-            command.args(arguments.split_whitespace()).current_dir(self.0.path()).timeout(LONGEST).output().unwrap();
+        let output = command
+            .args(arguments.split_whitespace())
+            .current_dir(self.0.path())
+            .timeout(LONGEST)
+            .output()
+            .unwrap();
         Ended {
             code: output.status.code(),
             stdout: String::from_utf8(output.stdout).unwrap(),
@@ -90,7 +94,13 @@ impl Folder {
     #[track_caller]
     pub fn ends(&self, code: i32, arguments: &str) -> Ended {
         let ended = self.run(arguments);
-        assert_eq!(ended.code, Some(code), "{arguments}\n{}\n{}", ended.stdout, ended.stderr);
+        assert_eq!(
+            ended.code,
+            Some(code),
+            "{arguments}\n{}\n{}",
+            ended.stdout,
+            ended.stderr
+        );
         ended
     }
 
@@ -117,7 +127,10 @@ impl Folder {
                 if path.is_dir() {
                     folders.push(path.clone());
                 }
-                found.insert(path.strip_prefix(self.path(below)).unwrap().to_owned(), bytes);
+                found.insert(
+                    path.strip_prefix(self.path(below)).unwrap().to_owned(),
+                    bytes,
+                );
             }
         }
         found
@@ -125,7 +138,9 @@ impl Folder {
 
     /// The files of one table of a results directory, in order of their names.
     pub fn parts(&self, directory: &str, table: &str) -> Vec<PathBuf> {
-        let Ok(entries) = fs::read_dir(self.path(directory).join("tables").join(table)) else { return Vec::new() };
+        let Ok(entries) = fs::read_dir(self.path(directory).join("tables").join(table)) else {
+            return Vec::new();
+        };
         let mut parts: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
         parts.sort();
         parts
@@ -136,7 +151,10 @@ impl Folder {
         let paths = TABLES.iter().flat_map(|table| self.parts(directory, table));
         let files = paths.map(|path| {
             let bytes = fs::read(&path).unwrap();
-            (path.strip_prefix(self.path(directory)).unwrap().to_owned(), bytes)
+            (
+                path.strip_prefix(self.path(directory)).unwrap().to_owned(),
+                bytes,
+            )
         });
         files.collect()
     }
@@ -145,21 +163,34 @@ impl Folder {
     pub fn wait_for_parts(&self, directory: &str, parts: usize, child: &mut Child) {
         let begin = Instant::now();
         while self.parts(directory, "jobs").len() < parts && child.try_wait().unwrap().is_none() {
-            assert!(begin.elapsed() < Duration::from_mins(1), "no part is committed");
+            assert!(
+                begin.elapsed() < Duration::from_mins(1),
+                "no part is committed"
+            );
             std::thread::sleep(Duration::from_millis(1));
         }
     }
 
     /// When the committed files were written.
     pub fn written(&self, directory: &str) -> BTreeMap<PathBuf, SystemTime> {
-        let written = |path: PathBuf| (path.clone(), fs::metadata(path).unwrap().modified().unwrap());
-        self.parts(directory, "jobs").into_iter().map(written).collect()
+        let written = |path: PathBuf| {
+            (
+                path.clone(),
+                fs::metadata(path).unwrap().modified().unwrap(),
+            )
+        };
+        self.parts(directory, "jobs")
+            .into_iter()
+            .map(written)
+            .collect()
     }
 
     /// All rows of one table of a results directory.
     pub fn table(&self, directory: &str, table: &str) -> Rows {
         let mut rows = Rows::default();
-        self.parts(directory, table).iter().for_each(|path| rows.read(path));
+        self.parts(directory, table)
+            .iter()
+            .for_each(|path| rows.read(path));
         rows
     }
 
@@ -212,7 +243,10 @@ impl Rows {
         let reader = ParquetRecordBatchReaderBuilder::try_new(file)
             .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         self.schema = Some(reader.schema().clone());
-        reader.build().unwrap().for_each(|batch| self.take(&batch.unwrap()));
+        reader
+            .build()
+            .unwrap()
+            .for_each(|batch| self.take(&batch.unwrap()));
     }
 
     fn take(&mut self, batch: &RecordBatch) {
@@ -220,7 +254,13 @@ impl Rows {
             batch
                 .columns()
                 .iter()
-                .map(|column| if column.is_null(row) { Cell::Null } else { cell(column, row) })
+                .map(|column| {
+                    if column.is_null(row) {
+                        Cell::Null
+                    } else {
+                        cell(column, row)
+                    }
+                })
                 .collect()
         }));
     }
@@ -281,7 +321,12 @@ impl Rows {
 
     /// The unit of a column, from the metadata of its field.
     pub fn unit(&self, column: &str) -> String {
-        self.schema.as_ref().unwrap().field(self.index(column)).metadata()["unit"].clone()
+        self.schema
+            .as_ref()
+            .unwrap()
+            .field(self.index(column))
+            .metadata()["unit"]
+            .clone()
     }
 }
 

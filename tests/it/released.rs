@@ -11,27 +11,54 @@ fn copy(from: &Path, to: &Path) {
     for entry in fs::read_dir(from).unwrap() {
         let entry = entry.unwrap();
         let to = to.join(entry.file_name());
-        if entry.path().is_dir() { copy(&entry.path(), &to) } else { _ = fs::copy(entry.path(), to).unwrap() }
+        if entry.path().is_dir() {
+            copy(&entry.path(), &to)
+        } else {
+            _ = fs::copy(entry.path(), to).unwrap()
+        }
     }
 }
 
 #[test]
 fn directories_of_released_versions_are_shown_drawn_reported_and_exported() {
     let released = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/released");
-    let versions = fs::read_dir(released).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir());
+    let versions = fs::read_dir(released)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_dir());
     let mut count = 0;
     for path in versions {
         let folder = Folder::new();
         copy(&path, &folder.path("r"));
-        let show = || folder.ends(0, "show r --csv --columns frequency,slips,tau_mean,resultant_drive").stdout;
+        let show = || {
+            folder
+                .ends(
+                    0,
+                    "show r --csv --columns frequency,slips,tau_mean,resultant_drive",
+                )
+                .stdout
+        };
         let as_written = show();
-        for words in ["58.0,6,0.011588447867285098,", "29.0,6,0.02298621917456732,"] {
-            assert!(as_written.contains(words), "{}: {as_written}", path.display());
+        for words in [
+            "58.0,6,0.011588447867285098,",
+            "29.0,6,0.02298621917456732,",
+        ] {
+            assert!(
+                as_written.contains(words),
+                "{}: {as_written}",
+                path.display()
+            );
         }
         for command in ["plot r", "report r", "export r -o exported --format csv"] {
             folder.ends(0, command);
         }
-        let rows = |table: &str| fs::read_to_string(folder.path("exported").join(table)).unwrap().lines().count() - 1;
+        let rows = |table: &str| {
+            fs::read_to_string(folder.path("exported").join(table))
+                .unwrap()
+                .lines()
+                .count()
+                - 1
+        };
         assert_eq!((rows("jobs.csv"), rows("slips.csv")), (3, 13));
         // Reduced by this version.
         fs::remove_dir_all(folder.path("r/reduced")).unwrap();

@@ -16,7 +16,10 @@ const MAP: &str = "name = \"map\"\n[model]\nN = 20\nNs = 5\n[axes]\nfrequency = 
 /// The files that say which rounds a directory has had.
 fn extensions(folder: &Folder, out: &str) -> Vec<Vec<u8>> {
     let is_extension = |path: &PathBuf| path.to_str().unwrap().starts_with("extension-");
-    let files = folder.contents(&format!("{out}/run")).into_iter().filter(|(path, _)| is_extension(path));
+    let files = folder
+        .contents(&format!("{out}/run"))
+        .into_iter()
+        .filter(|(path, _)| is_extension(path));
     files.filter_map(|(_, bytes)| bytes).collect()
 }
 
@@ -25,10 +28,15 @@ fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
     let folder = Folder::new();
     folder.write("map.toml", MAP);
     let whole = json(&folder.ends(0, "run map.toml --out whole --json").stdout);
-    assert!(whole["rounds"]["round"].as_u64() > Some(4) && whole["rounds"]["is_over"] == true, "{whole}");
+    assert!(
+        whole["rounds"]["round"].as_u64() > Some(4) && whole["rounds"]["is_over"] == true,
+        "{whole}"
+    );
     folder.ends(0, "verify whole");
 
-    let shared: Vec<_> = (0..4).map(|_| folder.start("run map.toml --out shared --threads 1")).collect();
+    let shared: Vec<_> = (0..4)
+        .map(|_| folder.start("run map.toml --out shared --threads 1"))
+        .collect();
     let ended: Vec<_> = shared.into_iter().map(wait).collect();
     assert!(ended.iter().all(|(code, ..)| *code == Some(0)), "{ended:?}");
 
@@ -40,7 +48,11 @@ fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
         child.kill().unwrap();
         if wait(child).0.is_none() {
             kills += 1;
-            let is_there = |round: &usize| folder.path(&format!("killed/run/extension-{round:03}.json")).exists();
+            let is_there = |round: &usize| {
+                folder
+                    .path(&format!("killed/run/extension-{round:03}.json"))
+                    .exists()
+            };
             let rounds = (0..100).take_while(is_there).count();
             rounds_at_kills.insert(rounds);
         } else {
@@ -50,23 +62,36 @@ fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
         if kills >= 20 && rounds_at_kills.len() >= 3 {
             break;
         }
-        assert!(run < 200, "{kills} kills at these numbers of rounds: {rounds_at_kills:?}");
+        assert!(
+            run < 200,
+            "{kills} kills at these numbers of rounds: {rounds_at_kills:?}"
+        );
     }
     folder.ends(0, "run map.toml --out killed");
 
     for out in ["shared", "killed"] {
-        assert!(folder.tables(out) == folder.tables("whole"), "tables of {out}");
+        assert!(
+            folder.tables(out) == folder.tables("whole"),
+            "tables of {out}"
+        );
         for results in ["reduced", "figures"] {
             assert!(
-                folder.contents(&format!("{out}/{results}")) == folder.contents(&format!("whole/{results}")),
+                folder.contents(&format!("{out}/{results}"))
+                    == folder.contents(&format!("whole/{results}")),
                 "{out}"
             );
         }
-        assert!(extensions(&folder, out) == extensions(&folder, "whole"), "extensions of {out}");
+        assert!(
+            extensions(&folder, out) == extensions(&folder, "whole"),
+            "extensions of {out}"
+        );
         folder.ends(0, &format!("verify {out}"));
     }
     let again = json(&folder.ends(0, "run whole --json --no-reduce").stdout);
-    assert_eq!((again["jobs_run"].as_u64(), &again["rounds"]), (Some(0), &whole["rounds"]));
+    assert_eq!(
+        (again["jobs_run"].as_u64(), &again["rounds"]),
+        (Some(0), &whole["rounds"])
+    );
 }
 
 #[test]
@@ -95,20 +120,35 @@ fn an_interrupted_round_goes_on_and_decides_the_same() {
 }
 
 #[test]
-fn a_directory_that_has_had_other_sweeps_goes_through_the_same_rounds_and_runs_what_is_missing_alone() {
+fn a_directory_that_has_had_other_sweeps_goes_through_the_same_rounds_and_runs_what_is_missing_alone()
+ {
     let folder = Folder::new();
     folder.write("map.toml", MAP);
     // Other seeds of some of its sets, and sets of its own.
     let (axes, _) = MAP.split_once("[refine]").unwrap();
-    folder.write("plain.toml", &axes.replace("[record]", "seed = { count = 9 }\n[record]"));
+    folder.write(
+        "plain.toml",
+        &axes.replace("[record]", "seed = { count = 9 }\n[record]"),
+    );
     folder.write("coarse.toml", &MAP.replace("to = 0.1", "to = 0.2"));
-    let whole = json(&folder.ends(0, "run map.toml --out whole --no-reduce --json").stdout);
+    let whole = json(
+        &folder
+            .ends(0, "run map.toml --out whole --no-reduce --json")
+            .stdout,
+    );
     for sweep in ["plain.toml", "coarse.toml"] {
         folder.ends(0, &format!("run {sweep} --out r --no-reduce"));
     }
-    let after = json(&folder.ends(0, "run map.toml --out r --no-reduce --json").stdout);
+    let after = json(
+        &folder
+            .ends(0, "run map.toml --out r --no-reduce --json")
+            .stdout,
+    );
     assert_eq!(after["rounds"], whole["rounds"]);
-    assert!(after["jobs_run"].as_u64() < whole["jobs_run"].as_u64(), "{after}");
+    assert!(
+        after["jobs_run"].as_u64() < whole["jobs_run"].as_u64(),
+        "{after}"
+    );
     let wider = folder.ends(0, "plan map.toml --out r").stdout;
     assert!(wider.contains("0 to run"), "{wider}");
     let ids = folder.table("r", "jobs");
@@ -127,47 +167,124 @@ fn a_target_that_cannot_be_met_ends_at_the_cap_and_says_so() {
                 [precision]\nof = [\"tau_mean\", \"mean_friction\"]\nrelative = 1e-9\nseeds = { from = 3, to = 11 }\n";
     folder.write("hard.toml", text);
     let planned = folder.ends(0, "plan hard.toml");
-    assert!(planned.stderr.contains("warning: seeds: from = 3 is raised to 11"), "{}", planned.stderr);
+    assert!(
+        planned
+            .stderr
+            .contains("warning: seeds: from = 3 is raised to 11"),
+        "{}",
+        planned.stderr
+    );
     let planned = planned.stdout;
     assert!(
-        planned.contains("jobs                 22 ") && planned.contains("at most 2 sets, 22 jobs; estimated"),
+        planned.contains("jobs                 22 ")
+            && planned.contains("at most 2 sets, 22 jobs; estimated"),
         "{planned}"
     );
     let ended = folder.ends(0, "run hard.toml --out r");
-    assert!(ended.stderr.contains("running 22 jobs of this round, 0 there already"), "{}", ended.stderr);
-    assert!(ended.stdout.contains("2 sets with all seeds allowed, above the target"), "{}", ended.stdout);
-    assert!(folder.ends(0, "status r").stdout.contains("round         1 (the last): 0 sets done, 0 open; 2 sets"));
+    assert!(
+        ended
+            .stderr
+            .contains("running 22 jobs of this round, 0 there already"),
+        "{}",
+        ended.stderr
+    );
+    assert!(
+        ended
+            .stdout
+            .contains("2 sets with all seeds allowed, above the target"),
+        "{}",
+        ended.stdout
+    );
+    assert!(
+        folder
+            .ends(0, "status r")
+            .stdout
+            .contains("round         1 (the last): 0 sets done, 0 open; 2 sets")
+    );
     let sets = folder.file("r/reduced/sets.parquet");
     assert_eq!(
-        (sets.counts("jobs"), sets.counts("seeds"), sets.counts("last_round")),
+        (
+            sets.counts("jobs"),
+            sets.counts("seeds"),
+            sets.counts("last_round")
+        ),
         (vec![11; 2], vec![11; 2], vec![1; 2])
     );
     let refused = folder.ends(2, "run hard.toml --out s --shard 1/2");
-    assert!(refused.stderr.contains("has no shards"), "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("has no shards"),
+        "{}",
+        refused.stderr
+    );
 }
 
 #[test]
 fn edges_have_intervals_and_say_how_they_ended_and_rows_without_one_say_so() {
     let folder = Folder::new();
     folder.write("map.toml", MAP);
-    folder.write("few.toml", &MAP.replace("jobs = 3000", "jobs = 150").replace("threshold = 0.5", "threshold = 0.999"));
+    folder.write(
+        "few.toml",
+        &MAP.replace("jobs = 3000", "jobs = 150")
+            .replace("threshold = 0.5", "threshold = 0.999"),
+    );
     let ended = folder.ends(0, "run map.toml --out r");
-    assert!(ended.stderr.contains("warning: seeds: from = 8 is raised to 24"), "{}", ended.stderr);
+    assert!(
+        ended
+            .stderr
+            .contains("warning: seeds: from = 8 is raised to 24"),
+        "{}",
+        ended.stderr
+    );
     let edges = folder.file("r/reduced/edges.parquet");
-    let (place, low, high) = (edges.reals("edge"), edges.reals("edge_low"), edges.reals("edge_high"));
-    assert_eq!(edges.texts("statistic").len(), 4, "two frequencies, two statistics");
-    for ((place, low), (high, ended)) in place.iter().zip(&low).zip(high.iter().zip(edges.texts("ended"))) {
-        assert!(5e-8 < *low && low < place && place < high && *high < 1.6e-6, "{low} {place} {high}");
-        assert_eq!(ended == "width", high / low < 1.1 * (1.0 + 1e-9), "{ended}: {low} to {high}");
+    let (place, low, high) = (
+        edges.reals("edge"),
+        edges.reals("edge_low"),
+        edges.reals("edge_high"),
+    );
+    assert_eq!(
+        edges.texts("statistic").len(),
+        4,
+        "two frequencies, two statistics"
+    );
+    for ((place, low), (high, ended)) in place
+        .iter()
+        .zip(&low)
+        .zip(high.iter().zip(edges.texts("ended")))
+    {
+        assert!(
+            5e-8 < *low && low < place && place < high && *high < 1.6e-6,
+            "{low} {place} {high}"
+        );
+        assert_eq!(
+            ended == "width",
+            high / low < 1.1 * (1.0 + 1e-9),
+            "{ended}: {low} to {high}"
+        );
     }
     assert!(folder.path("r/figures/edges.svg").exists());
-    let told = json(&folder.ends(0, "show r --json").stdout)["edges"].as_array().unwrap().clone();
-    let of_json = |key: &str| told.iter().map(|edge| edge[key].as_f64().unwrap()).collect::<Vec<_>>();
-    assert!(of_json("edge") == place && of_json("edge_high") == high && told[0]["statistic"].is_string(), "{told:?}");
+    let told = json(&folder.ends(0, "show r --json").stdout)["edges"]
+        .as_array()
+        .unwrap()
+        .clone();
+    let of_json = |key: &str| {
+        told.iter()
+            .map(|edge| edge[key].as_f64().unwrap())
+            .collect::<Vec<_>>()
+    };
+    assert!(
+        of_json("edge") == place
+            && of_json("edge_high") == high
+            && told[0]["statistic"].is_string(),
+        "{told:?}"
+    );
     assert!(folder.table("r", "jobs").counts("seed").into_iter().min() == Some(5));
     folder.ends(0, "run few.toml --out few");
     let none = folder.file("few/reduced/edges.parquet");
-    assert!(none.texts("ended").iter().all(|ended| *ended == "no crossing"));
+    assert!(
+        none.texts("ended")
+            .iter()
+            .all(|ended| *ended == "no crossing")
+    );
 }
 
 #[test]
@@ -186,7 +303,12 @@ fn lost_rounds_are_restored() {
     let lost = folder.path("r/run/extension-001.json");
     let text = fs::read_to_string(&lost).unwrap();
     fs::write(&lost, text.replace("sets_done", "sets_dome")).unwrap();
-    assert!(folder.ends(4, "verify r").stdout.contains("extension-001.json"));
+    assert!(
+        folder
+            .ends(4, "verify r")
+            .stdout
+            .contains("extension-001.json")
+    );
     folder.ends(0, "verify r --repair");
     assert_eq!(fs::read_to_string(&lost).unwrap(), text);
     // A part of an early round is run again before anything else.

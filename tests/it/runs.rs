@@ -25,15 +25,22 @@ const TINY_JOBS: u64 = 12;
 /// Every row of every table, all columns, by job and slip.
 fn sorted_rows(folder: &Folder, directory: &str) -> Vec<Vec<Vec<Cell>>> {
     vec![
-        folder.table(directory, "slips").sorted_by(&["job_id", "slip"]),
-        folder.table(directory, "precursors").sorted_by(&["job_id", "slip", "precursor"]),
+        folder
+            .table(directory, "slips")
+            .sorted_by(&["job_id", "slip"]),
+        folder
+            .table(directory, "precursors")
+            .sorted_by(&["job_id", "slip", "precursor"]),
         folder.table(directory, "jobs").sorted_by(&["job_id"]),
     ]
 }
 
 /// The words before the values of a report.
 fn labels(report: &str) -> Vec<&str> {
-    report.lines().map(|line| line.split("  ").next().unwrap_or_default()).collect()
+    report
+        .lines()
+        .map(|line| line.split("  ").next().unwrap_or_default())
+        .collect()
 }
 
 #[test]
@@ -41,24 +48,56 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     let folder = Folder::new();
     folder.write("tiny.toml", TINY);
     let plan = json(&folder.ends(0, "plan tiny.toml --json").stdout);
-    assert_eq!((plan["jobs"].as_u64(), plan["format"].as_u64()), (Some(TINY_JOBS), Some(1)));
+    assert_eq!(
+        (plan["jobs"].as_u64(), plan["format"].as_u64()),
+        (Some(TINY_JOBS), Some(1))
+    );
     // Of a job's contacts, and of the slips of a part, which here is a job.
-    assert_eq!(plan["thread_memory_bytes"].as_f64(), Some(350.0 * (9.0 * 20.0) + 600.0 * 4.0));
+    assert_eq!(
+        plan["thread_memory_bytes"].as_f64(),
+        Some(350.0 * (9.0 * 20.0) + 600.0 * 4.0)
+    );
     assert_eq!(folder.contents("").len(), 1, "a plan writes nothing");
 
     let first = folder.ends(0, "run tiny.toml");
     let (lines, rest) = first.stdout.split_once("\n\n").unwrap();
-    let expected = ["jobs run", "parts committed", "CPU time", "wall time", "jobs reduced", "parameter sets", "slips"];
+    let expected = [
+        "jobs run",
+        "parts committed",
+        "CPU time",
+        "wall time",
+        "jobs reduced",
+        "parameter sets",
+        "slips",
+    ];
     assert_eq!(labels(lines), [&expected[..], &["reduced data"]].concat());
     let (result, figures) = rest.split_once("\n\n").unwrap();
-    assert_eq!(result, folder.ends(0, "show results/tiny").stdout.trim_end());
-    assert!(labels(figures).iter().all(|label| *label == "figure"), "{}", first.stdout);
-    assert!(first.stdout.contains("jobs run         12, 0 failed\n"), "{}", first.stdout);
-    assert!(!first.stderr.contains('\u{1b}'), "no terminal, no colours: {:?}", first.stderr);
+    assert_eq!(
+        result,
+        folder.ends(0, "show results/tiny").stdout.trim_end()
+    );
+    assert!(
+        labels(figures).iter().all(|label| *label == "figure"),
+        "{}",
+        first.stdout
+    );
+    assert!(
+        first.stdout.contains("jobs run         12, 0 failed\n"),
+        "{}",
+        first.stdout
+    );
+    assert!(
+        !first.stderr.contains('\u{1b}'),
+        "no terminal, no colours: {:?}",
+        first.stderr
+    );
 
     let before = folder.contents("results/tiny");
-    let there: Vec<&str> =
-        before.iter().filter(|(_, bytes)| bytes.is_some()).map(|(p, _)| p.to_str().unwrap()).collect();
+    let there: Vec<&str> = before
+        .iter()
+        .filter(|(_, bytes)| bytes.is_some())
+        .map(|(p, _)| p.to_str().unwrap())
+        .collect();
     for file in [
         "tables/slips/part-000-000000.parquet",
         "tables/precursors/part-000-000000.parquet",
@@ -79,12 +118,25 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     assert_eq!(there.iter().filter(is_result).count(), 10, "{there:?}");
     // Few jobs are parts of their own.
     assert_eq!(folder.parts("results/tiny", "jobs").len() as u64, TINY_JOBS);
-    assert!(!there.iter().any(|file| file.starts_with("run/staging")), "{there:?}");
-    assert_eq!(folder.table("results/tiny", "jobs").cells.len() as u64, TINY_JOBS);
-    assert_eq!(folder.table("results/tiny", "slips").cells.len() as u64, 4 * TINY_JOBS);
+    assert!(
+        !there.iter().any(|file| file.starts_with("run/staging")),
+        "{there:?}"
+    );
+    assert_eq!(
+        folder.table("results/tiny", "jobs").cells.len() as u64,
+        TINY_JOBS
+    );
+    assert_eq!(
+        folder.table("results/tiny", "slips").cells.len() as u64,
+        4 * TINY_JOBS
+    );
 
     let second = folder.ends(0, "run tiny.toml");
-    assert!(second.stdout.starts_with("jobs run         0, 0 failed\n"), "{}", second.stdout);
+    assert!(
+        second.stdout.starts_with("jobs run         0, 0 failed\n"),
+        "{}",
+        second.stdout
+    );
     assert!(folder.contents("results/tiny") == before);
 }
 
@@ -95,11 +147,17 @@ fn tables_do_not_depend_on_threads() {
         folder.write("sweep.toml", text);
         for threads in [1, 2] {
             let out = format!("{name}-{threads}");
-            folder.ends(0, &format!("run sweep.toml --no-reduce --threads {threads} --out {out}"));
+            folder.ends(
+                0,
+                &format!("run sweep.toml --no-reduce --threads {threads} --out {out}"),
+            );
         }
         let [one, two] = [1, 2].map(|threads| format!("{name}-{threads}"));
         // Every column of every row, bit by bit; and what is more, the files.
-        assert!(sorted_rows(&folder, &one) == sorted_rows(&folder, &two), "{name}");
+        assert!(
+            sorted_rows(&folder, &one) == sorted_rows(&folder, &two),
+            "{name}"
+        );
         assert!(folder.tables(&one) == folder.tables(&two), "{name}");
     }
     assert_eq!(folder.parts("many-1", "jobs").len(), MANY_PARTS);
@@ -113,11 +171,22 @@ fn an_extended_axis_runs_its_new_jobs_alone() {
     folder.ends(0, "run tiny.toml --no-reduce --out grown");
     let before = folder.tables("grown");
     folder.write("tiny.toml", &TINY.replace("count = 2", "count = 3"));
-    let report = json(&folder.ends(0, "run tiny.toml --no-reduce --out grown --json").stdout);
+    let report = json(
+        &folder
+            .ends(0, "run tiny.toml --no-reduce --out grown --json")
+            .stdout,
+    );
     assert_eq!(report["jobs_run"].as_u64(), Some(TINY_JOBS / 2));
     let after = folder.tables("grown");
-    assert!(before.iter().all(|(path, bytes)| after.get(path) == Some(bytes)));
-    assert_eq!(json(&folder.ends(0, "status grown --json").stdout)["jobs_kept"].as_u64(), Some(0));
+    assert!(
+        before
+            .iter()
+            .all(|(path, bytes)| after.get(path) == Some(bytes))
+    );
+    assert_eq!(
+        json(&folder.ends(0, "status grown --json").stdout)["jobs_kept"].as_u64(),
+        Some(0)
+    );
     folder.ends(0, "run tiny.toml --no-reduce --out at-once");
     assert!(sorted_rows(&folder, "grown") == sorted_rows(&folder, "at-once"));
 }
@@ -128,14 +197,30 @@ fn values_that_a_sweep_no_longer_has_keep_their_data_and_the_status_says_so() {
     folder.write("tiny.toml", TINY);
     folder.ends(0, "run tiny.toml --no-reduce --out r");
     let before = folder.tables("r");
-    folder.write("tiny.toml", &TINY.replace("V0 = [1e-4, 2e-4]", "V0 = [2e-4]"));
-    let report = json(&folder.ends(0, "run tiny.toml --no-reduce --out r --json").stdout);
-    assert_eq!((report["jobs_run"].as_u64(), report["jobs_left"].as_u64()), (Some(0), Some(0)));
+    folder.write(
+        "tiny.toml",
+        &TINY.replace("V0 = [1e-4, 2e-4]", "V0 = [2e-4]"),
+    );
+    let report = json(
+        &folder
+            .ends(0, "run tiny.toml --no-reduce --out r --json")
+            .stdout,
+    );
+    assert_eq!(
+        (report["jobs_run"].as_u64(), report["jobs_left"].as_u64()),
+        (Some(0), Some(0))
+    );
     assert!(folder.tables("r") == before);
     let status = json(&folder.ends(0, "status r --json").stdout);
-    assert_eq!((status["jobs_done"].as_u64(), status["jobs_kept"].as_u64()), (Some(TINY_JOBS), Some(TINY_JOBS / 2)));
+    assert_eq!(
+        (status["jobs_done"].as_u64(), status["jobs_kept"].as_u64()),
+        (Some(TINY_JOBS), Some(TINY_JOBS / 2))
+    );
     let text = folder.ends(0, "status r").stdout;
-    assert!(text.contains("jobs done     12, 6 of them kept of values that the sweep no longer has\n"), "{text}");
+    assert!(
+        text.contains("jobs done     12, 6 of them kept of values that the sweep no longer has\n"),
+        "{text}"
+    );
 }
 
 #[cfg(unix)]
@@ -150,7 +235,9 @@ fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables()
         let command = format!("run many.toml --no-reduce --threads 1 --out {signal}");
         let mut child = folder.start(&command);
         folder.wait_for_parts(signal, 2, &mut child);
-        let sent = std::process::Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).status();
+        let sent = std::process::Command::new("sh")
+            .args(["-c", &format!("kill -{signal} {}", child.id())])
+            .status();
         assert!(sent.unwrap().success());
         let (code, stdout, stderr) = wait(child);
         assert_eq!(code, Some(3), "{signal}: {stderr}");
@@ -158,17 +245,29 @@ fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables()
         assert!(stdout.starts_with("jobs run"), "{stdout}");
 
         let kept = folder.tables(signal);
-        assert!((2..MANY_PARTS).contains(&folder.parts(signal, "jobs").len()), "it was to be stopped in the middle");
-        assert!(kept.iter().all(|(path, bytes)| whole.get(path) == Some(bytes)));
+        assert!(
+            (2..MANY_PARTS).contains(&folder.parts(signal, "jobs").len()),
+            "it was to be stopped in the middle"
+        );
+        assert!(
+            kept.iter()
+                .all(|(path, bytes)| whole.get(path) == Some(bytes))
+        );
         let times = folder.written(signal);
         let status = json(&folder.ends(0, &format!("status {signal} --json")).stdout);
-        assert_eq!(status["parts_done"].as_u64(), Some(folder.parts(signal, "jobs").len() as u64));
+        assert_eq!(
+            status["parts_done"].as_u64(),
+            Some(folder.parts(signal, "jobs").len() as u64)
+        );
         assert!(status["jobs_missing"].as_u64() > Some(0));
 
         folder.ends(0, &command);
         assert!(folder.tables(signal) == whole, "{signal}");
         let times_after = folder.written(signal);
-        assert!(times.iter().all(|(path, time)| times_after[path] == *time), "a committed part was written again");
+        assert!(
+            times.iter().all(|(path, time)| times_after[path] == *time),
+            "a committed part was written again"
+        );
     }
 }
 
@@ -182,12 +281,38 @@ fn the_status_counts_what_is_there_for_people_and_for_programs() {
     }
     let status = json(&folder.ends(0, "status r --json").stdout);
     let count = |key: &str| status[key].as_u64().unwrap();
-    assert_eq!((status["name"].as_str(), count("format")), (Some("many"), 2));
-    assert_eq!((count("jobs_done"), count("jobs_failed"), count("jobs_missing")), (28_000 - 437, 0, 437));
-    assert_eq!((count("parts_done"), count("parts_missing")), (MANY_PARTS as u64 - 1, 1));
-    assert!(status["time_left"].as_f64() > Some(0.0) && status["workers"].as_array().unwrap().is_empty());
+    assert_eq!(
+        (status["name"].as_str(), count("format")),
+        (Some("many"), 2)
+    );
+    assert_eq!(
+        (
+            count("jobs_done"),
+            count("jobs_failed"),
+            count("jobs_missing")
+        ),
+        (28_000 - 437, 0, 437)
+    );
+    assert_eq!(
+        (count("parts_done"), count("parts_missing")),
+        (MANY_PARTS as u64 - 1, 1)
+    );
+    assert!(
+        status["time_left"].as_f64() > Some(0.0)
+            && status["workers"].as_array().unwrap().is_empty()
+    );
     let text = folder.ends(0, "status r").stdout;
-    assert_eq!(labels(&text), ["sweep", "jobs done", "jobs failed", "jobs missing", "parts", "time left"]);
+    assert_eq!(
+        labels(&text),
+        [
+            "sweep",
+            "jobs done",
+            "jobs failed",
+            "jobs missing",
+            "parts",
+            "time left"
+        ]
+    );
     assert!(text.contains("jobs missing  437\n"), "{text}");
 }
 
@@ -203,12 +328,22 @@ fn reduced_data_and_figures_can_be_made_again() {
     folder.ends(0, "plot r");
     assert!(folder.contents("r") == before);
     let summary = json(&folder.ends(0, "reduce r --json").stdout);
-    assert_eq!((summary["jobs"].as_u64(), summary["slips"].as_u64()), (Some(TINY_JOBS), Some(4 * TINY_JOBS)));
+    assert_eq!(
+        (summary["jobs"].as_u64(), summary["slips"].as_u64()),
+        (Some(TINY_JOBS), Some(4 * TINY_JOBS))
+    );
     let drawn = folder.ends(0, "plot r").stdout;
     assert_eq!(
         drawn.lines().collect::<Vec<_>>(),
-        ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png", "overview.svg", "overview.png"]
-            .map(|name| format!("r/figures/{name}"))
+        [
+            "phi-eta.svg",
+            "phi-eta.png",
+            "tau-T.svg",
+            "tau-T.png",
+            "overview.svg",
+            "overview.png"
+        ]
+        .map(|name| format!("r/figures/{name}"))
     );
     assert!(folder.contents("r") == before);
 }
@@ -216,11 +351,19 @@ fn reduced_data_and_figures_can_be_made_again() {
 #[test]
 fn reduced_data_of_other_tables_are_made_again_whatever_their_age() {
     let folder = Folder::new();
-    let text = |seeds: u32| TINY.replace("seed = { count = 2 }", &format!("seed = {{ count = {seeds} }}"));
+    let text = |seeds: u32| {
+        TINY.replace(
+            "seed = { count = 2 }",
+            &format!("seed = {{ count = {seeds} }}"),
+        )
+    };
     assert_ne!(text(2), text(3));
     folder.write("tiny.toml", &text(2));
     folder.ends(0, "run tiny.toml --out r");
-    let read = || ["sets", "points"].map(|name| fs::read(folder.path(&format!("r/reduced/{name}.parquet"))).unwrap());
+    let read = || {
+        ["sets", "points"]
+            .map(|name| fs::read(folder.path(&format!("r/reduced/{name}.parquet"))).unwrap())
+    };
     let write = |bytes: &[Vec<u8>; 2]| {
         for (name, bytes) in ["sets", "points"].iter().zip(bytes) {
             fs::write(folder.path(&format!("r/reduced/{name}.parquet")), bytes).unwrap();
@@ -239,12 +382,20 @@ fn reduced_data_of_other_tables_are_made_again_whatever_their_age() {
     }
     // Those that are theirs stay, though all else is newer.
     let set_modified = |name: &str, time| {
-        fs::File::options().write(true).open(folder.path(name)).unwrap().set_modified(time).unwrap();
+        fs::File::options()
+            .write(true)
+            .open(folder.path(name))
+            .unwrap()
+            .set_modified(time)
+            .unwrap();
     };
     let long_ago = SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000_000);
     set_modified("r/reduced/sets.parquet", long_ago);
     folder.ends(0, "report r");
-    let kept = fs::metadata(folder.path("r/reduced/sets.parquet")).unwrap().modified().unwrap();
+    let kept = fs::metadata(folder.path("r/reduced/sets.parquet"))
+        .unwrap()
+        .modified()
+        .unwrap();
     assert_eq!(kept, long_ago);
 }
 
@@ -255,31 +406,57 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
     folder.ends(0, "run many.toml --no-reduce --out r");
     let whole = folder.tables("r");
     for (table, commands) in [
-        ("jobs", &["run many.toml --out r", "status r", "reduce r"][..]),
+        (
+            "jobs",
+            &["run many.toml --out r", "status r", "reduce r"][..],
+        ),
         ("slips", &["run many.toml --out r", "reduce r"]),
     ] {
         let part = folder.parts("r", table)[1].clone();
-        let name = part.strip_prefix(folder.path("")).unwrap().display().to_string();
+        let name = part
+            .strip_prefix(folder.path(""))
+            .unwrap()
+            .display()
+            .to_string();
         let bytes = fs::read(&part).unwrap();
         fs::write(&part, &bytes[..bytes.len() / 2]).unwrap();
         for command in commands {
             let ended = folder.ends(4, command);
-            assert!(ended.stderr.contains(&format!("{name}: damaged")), "{command}: {}", ended.stderr);
-            assert!(ended.stderr.contains("stickslip verify"), "{}", ended.stderr);
+            assert!(
+                ended.stderr.contains(&format!("{name}: damaged")),
+                "{command}: {}",
+                ended.stderr
+            );
+            assert!(
+                ended.stderr.contains("stickslip verify"),
+                "{}",
+                ended.stderr
+            );
         }
         // The way out that the message gives.
         folder.ends(4, "verify r");
         folder.ends(0, "verify r --repair");
-        let report = json(&folder.ends(0, "run many.toml --out r --no-reduce --json").stdout);
+        let report = json(
+            &folder
+                .ends(0, "run many.toml --out r --no-reduce --json")
+                .stdout,
+        );
         assert_eq!(report["jobs_run"].as_u64(), Some(437));
         assert!(folder.tables("r") == whole, "{table}");
     }
-    for (file, text) in [("run/extension-000.json", "{"), ("run/extension-000.json", "")] {
+    for (file, text) in [
+        ("run/extension-000.json", "{"),
+        ("run/extension-000.json", ""),
+    ] {
         let kept = fs::read(folder.path("r").join(file)).unwrap();
         folder.write(&format!("r/{file}"), text);
         for command in ["run many.toml --out r", "status r", "reduce r", "plot r"] {
             let ended = folder.ends(4, command);
-            assert!(ended.stderr.contains(&format!("r/{file}: damaged")), "{command}: {}", ended.stderr);
+            assert!(
+                ended.stderr.contains(&format!("r/{file}: damaged")),
+                "{command}: {}",
+                ended.stderr
+            );
         }
         fs::write(folder.path("r").join(file), kept).unwrap();
     }
@@ -291,7 +468,13 @@ fn a_pipe_gets_the_report_and_nothing_else() {
     let folder = Folder::new();
     folder.write("tiny.toml", TINY);
     let report = folder.ends(0, "run tiny.toml --json --out r").stdout;
-    assert_eq!((json(&report)["jobs_run"].as_u64(), json(&report)["format"].as_u64()), (Some(TINY_JOBS), Some(2)));
+    assert_eq!(
+        (
+            json(&report)["jobs_run"].as_u64(),
+            json(&report)["format"].as_u64()
+        ),
+        (Some(TINY_JOBS), Some(2))
+    );
     for command in [
         "plan tiny.toml --json",
         "status r --json",
@@ -305,7 +488,11 @@ fn a_pipe_gets_the_report_and_nothing_else() {
             Some("status" | "reduce") => 2,
             _ => 1,
         };
-        assert_eq!(json(&folder.ends(0, command).stdout)["format"].as_u64(), Some(format), "{command}");
+        assert_eq!(
+            json(&folder.ends(0, command).stdout)["format"].as_u64(),
+            Some(format),
+            "{command}"
+        );
     }
 }
 
@@ -327,7 +514,9 @@ fn a_reader_that_leaves_does_not_end_a_run() {
 fn completions_are_there_for_the_usual_shells() {
     let folder = Folder::new();
     for shell in ["bash", "zsh", "fish"] {
-        let script = folder.ends(0, &format!("generate completions {shell}")).stdout;
+        let script = folder
+            .ends(0, &format!("generate completions {shell}"))
+            .stdout;
         for word in ["stickslip", "simulate", "retry-failed"] {
             assert!(script.contains(word), "{shell}: {word}");
         }
@@ -337,15 +526,26 @@ fn completions_are_there_for_the_usual_shells() {
 #[test]
 fn the_help_of_every_command_holds_an_example() {
     let folder = Folder::new();
-    assert!(folder.ends(0, "--help").stdout.contains("Exit codes: 0 done"));
+    assert!(
+        folder
+            .ends(0, "--help")
+            .stdout
+            .contains("Exit codes: 0 done")
+    );
     let commands = [
-        "", "init", "plan", "run", "batch", "status", "reduce", "plot", "report", "verify", "export", "simulate",
-        "accuracy", "generate",
+        "", "init", "plan", "run", "batch", "status", "reduce", "plot", "report", "verify",
+        "export", "simulate", "accuracy", "generate",
     ];
     for command in commands {
         let help = folder.ends(0, &format!("{command} --help")).stdout;
-        let example = help.split_once("Example").unwrap_or_else(|| panic!("{command}: {help}")).1;
-        assert!(example.contains(format!("  stickslip {command}").trim_end()), "{command}: {example}");
+        let example = help
+            .split_once("Example")
+            .unwrap_or_else(|| panic!("{command}: {help}"))
+            .1;
+        assert!(
+            example.contains(format!("  stickslip {command}").trim_end()),
+            "{command}: {example}"
+        );
     }
 }
 
@@ -358,24 +558,43 @@ fn a_directory_resumes_without_its_sweep_file() {
     fs::remove_file(folder.path("results/tiny/tables/jobs/part-000-000000.parquet")).unwrap();
     fs::remove_file(folder.path("tiny.toml")).unwrap();
     let resumed = folder.ends(0, "run results/tiny --no-reduce");
-    assert!(resumed.stdout.contains("jobs run         1, 0 failed\n"), "{}", resumed.stdout);
+    assert!(
+        resumed.stdout.contains("jobs run         1, 0 failed\n"),
+        "{}",
+        resumed.stdout
+    );
     assert_eq!(folder.contents("results/tiny/tables"), whole);
 }
 
 #[test]
 fn a_budget_of_events_can_be_raised_for_the_jobs_that_it_failed() {
     let folder = Folder::new();
-    let with =
-        |events: &str| format!("name = \"b\"\n[model]\nN = 9\n[axes]\nseed = [0, 1]\n[record]\nslips = 2\n{events}");
+    let with = |events: &str| {
+        format!(
+            "name = \"b\"\n[model]\nN = 9\n[axes]\nseed = [0, 1]\n[record]\nslips = 2\n{events}"
+        )
+    };
     folder.write("b.toml", &with(""));
     folder.ends(0, "run b.toml --out whole --no-reduce");
     folder.write("b.toml", &with("max_events = 300"));
     let failed = folder.ends(1, "run b.toml --out r --no-reduce");
-    assert!(failed.stderr.contains("record.max_events"), "{}", failed.stderr);
-    folder.write("b.toml", &with("max_events = 100000"));
-    assert!(folder.ends(1, "run b.toml --out r --no-reduce").stdout.contains("jobs run         0"));
     assert!(
-        folder.ends(0, "run b.toml --out r --no-reduce --retry-failed").stdout.contains("jobs run         2, 0 failed")
+        failed.stderr.contains("record.max_events"),
+        "{}",
+        failed.stderr
+    );
+    folder.write("b.toml", &with("max_events = 100000"));
+    assert!(
+        folder
+            .ends(1, "run b.toml --out r --no-reduce")
+            .stdout
+            .contains("jobs run         0")
+    );
+    assert!(
+        folder
+            .ends(0, "run b.toml --out r --no-reduce --retry-failed")
+            .stdout
+            .contains("jobs run         2, 0 failed")
     );
     for table in ["slips", "jobs"] {
         let rows = |directory| folder.table(directory, table).sorted_by(&["job_id"]);
@@ -387,21 +606,41 @@ fn a_budget_of_events_can_be_raised_for_the_jobs_that_it_failed() {
 fn a_plan_says_what_of_the_sweep_is_in_its_directory() {
     let folder = Folder::new();
     let text = |seeds: u32, model: &str| {
-        format!("name = \"p\"\n[model]\nN = 9\n{model}\n[axes]\nseed = {{ count = {seeds} }}\n[record]\nslips = 2\n")
+        format!(
+            "name = \"p\"\n[model]\nN = 9\n{model}\n[axes]\nseed = {{ count = {seeds} }}\n[record]\nslips = 2\n"
+        )
     };
-    let directory = |folder: &Folder| json(&folder.ends(0, "plan p.toml --json").stdout)["directory"].clone();
+    let directory =
+        |folder: &Folder| json(&folder.ends(0, "plan p.toml --json").stdout)["directory"].clone();
     folder.write("p.toml", &text(3, ""));
     assert!(directory(&folder).is_null());
     folder.ends(0, "run p.toml --no-reduce");
     let before = folder.contents("results");
     folder.write("p.toml", &text(5, ""));
     let extended = directory(&folder);
-    assert_eq!((extended["jobs_done"].as_u64(), extended["jobs_missing"].as_u64()), (Some(3), Some(2)));
+    assert_eq!(
+        (
+            extended["jobs_done"].as_u64(),
+            extended["jobs_missing"].as_u64()
+        ),
+        (Some(3), Some(2))
+    );
     folder.write("p.toml", &text(1, ""));
     assert_eq!(directory(&folder)["jobs_kept"].as_u64(), Some(2));
     let said = folder.ends(0, "plan p.toml").stdout;
-    assert!(said.contains(": 1 done, 0 failed, 0 to run; 2 more done that the sweep no longer has"), "{said}");
+    assert!(
+        said.contains(": 1 done, 0 failed, 0 to run; 2 more done that the sweep no longer has"),
+        "{said}"
+    );
     folder.write("p.toml", &text(3, "Ns = 10"));
-    assert!(directory(&folder)["refused"].as_str().unwrap().contains("model.Ns: 20 -> 10"));
-    assert!(folder.contents("results") == before, "a plan writes nothing");
+    assert!(
+        directory(&folder)["refused"]
+            .as_str()
+            .unwrap()
+            .contains("model.Ns: 20 -> 10")
+    );
+    assert!(
+        folder.contents("results") == before,
+        "a plan writes nothing"
+    );
 }

@@ -17,18 +17,37 @@ fn run_ends_with_the_result_and_show_tells_it_again() {
     for head in ["Δ (µm)", "1/T (Hz)", "⟨τ⟩ (ms)", "⟨Fₛ⟩ (N)", "μ", "R"] {
         assert!(lines[0].contains(head), "{head}: {shown}");
     }
-    assert!(lines[1..].iter().all(|line| line.contains(" ± ") && line.contains("stick-slip")), "{shown}");
+    assert!(
+        lines[1..]
+            .iter()
+            .all(|line| line.contains(" ± ") && line.contains("stick-slip")),
+        "{shown}"
+    );
     // The numbers are those of the reduced table, in SI.
-    let csv = folder.ends(0, "show out --columns frequency,tau_mean --csv").stdout;
-    assert!(csv.starts_with("frequency,tau_mean,tau_mean_low,tau_mean_high\n"), "{csv}");
+    let csv = folder
+        .ends(0, "show out --columns frequency,tau_mean --csv")
+        .stdout;
+    assert!(
+        csv.starts_with("frequency,tau_mean,tau_mean_low,tau_mean_high\n"),
+        "{csv}"
+    );
     let of_table = folder.file("out/reduced/sets.parquet").reals("tau_mean");
     let all = json(&folder.ends(0, "show out --json").stdout);
-    let of_json: Vec<f64> =
-        all["sets"].as_array().unwrap().iter().map(|set| set["tau_mean"].as_f64().unwrap()).collect();
+    let of_json: Vec<f64> = all["sets"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|set| set["tau_mean"].as_f64().unwrap())
+        .collect();
     assert_eq!(of_json, of_table);
     // Each column stands once, whether it is asked for or goes with another.
     let ends = "show out --csv --columns tau_sd_high,tau_sd,tau_sd_low";
-    assert!(folder.ends(0, ends).stdout.starts_with("tau_sd_high,tau_sd,tau_sd_low\n"));
+    assert!(
+        folder
+            .ends(0, ends)
+            .stdout
+            .starts_with("tau_sd_high,tau_sd,tau_sd_low\n")
+    );
 }
 
 #[test]
@@ -36,22 +55,51 @@ fn sets_are_chosen_sorted_and_computed_with() {
     let folder = Folder::new();
     folder.write("small.toml", SWEEP);
     folder.ends(0, "run small.toml --out out");
-    let found = folder.run("show out --json --where frequency>30 --columns frequency,1e3*tau_mean").stdout;
+    let found = folder
+        .run("show out --json --where frequency>30 --columns frequency,1e3*tau_mean")
+        .stdout;
     let sets = json(&found)["sets"].as_array().unwrap().clone();
-    assert_eq!((sets.len(), sets[0]["frequency"].as_f64().map(f64::round)), (1, Some(58.0)));
+    assert_eq!(
+        (sets.len(), sets[0]["frequency"].as_f64().map(f64::round)),
+        (1, Some(58.0))
+    );
     let taus = |order: &str| -> Vec<f64> {
-        let found = json(&folder.run(&format!("show out --json --sort {order} --columns tau_mean")).stdout);
-        found["sets"].as_array().unwrap().iter().map(|set| set["tau_mean"].as_f64().unwrap()).collect()
+        let found = json(
+            &folder
+                .run(&format!(
+                    "show out --json --sort {order} --columns tau_mean"
+                ))
+                .stdout,
+        );
+        found["sets"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|set| set["tau_mean"].as_f64().unwrap())
+            .collect()
     };
     let (up, down) = (taus("tau_mean"), taus("-tau_mean"));
-    assert!(up.is_sorted() && down.iter().rev().eq(&up), "{up:?} {down:?}");
+    assert!(
+        up.is_sorted() && down.iter().rev().eq(&up),
+        "{up:?} {down:?}"
+    );
     for (arguments, problem) in [
-        ("--columns tau_men", "--columns tau_men: no such column; did you mean tau_mean?"),
-        ("--where tau_mean", "--where tau_mean: at character 1: a comparison is needed"),
+        (
+            "--columns tau_men",
+            "--columns tau_men: no such column; did you mean tau_mean?",
+        ),
+        (
+            "--where tau_mean",
+            "--where tau_mean: at character 1: a comparison is needed",
+        ),
         ("--sort colour", "--sort colour: no such column"),
     ] {
         let ended = folder.run(&format!("show out {arguments}"));
-        assert!(ended.code == Some(2) && ended.stderr.contains(problem), "{}", ended.stderr);
+        assert!(
+            ended.code == Some(2) && ended.stderr.contains(problem),
+            "{}",
+            ended.stderr
+        );
     }
 }
 
@@ -59,23 +107,44 @@ fn sets_are_chosen_sorted_and_computed_with() {
 fn directories_are_compared_seed_by_seed_where_all_that_varies_agrees() {
     let folder = Folder::new();
     folder.write("small.toml", SWEEP);
-    folder.write("stiff.toml", &SWEEP.replace("Ns = 5", "Ns = 5\nKd = 1e7").replace("[29, 58]", "[58, 87]"));
+    folder.write(
+        "stiff.toml",
+        &SWEEP
+            .replace("Ns = 5", "Ns = 5\nKd = 1e7")
+            .replace("[29, 58]", "[58, 87]"),
+    );
     folder.ends(0, "run small.toml --out a");
     folder.ends(0, "run stiff.toml --out b");
     let number = |set: &serde_json::Value, key: &str| set[key].as_f64();
-    let sets = |arguments: &str| json(&folder.ends(0, arguments).stdout)["sets"].as_array().unwrap().clone();
+    let sets = |arguments: &str| {
+        json(&folder.ends(0, arguments).stdout)["sets"]
+            .as_array()
+            .unwrap()
+            .clone()
+    };
     let pairs = sets("show a b --json");
     assert_eq!(pairs.len(), 2, "without modulation, and 58 Hz");
     for pair in &pairs {
         assert_eq!(number(pair, "seeds"), Some(4.0));
-        let [a, b, difference, low, high] = ["a", "b", "difference", "difference_low", "difference_high"]
-            .map(|end| number(pair, &format!("tau_mean_{end}")).unwrap());
-        assert!((b - a - difference).abs() < 1e-12 && low < difference && difference < high, "{pair}");
+        let [a, b, difference, low, high] =
+            ["a", "b", "difference", "difference_low", "difference_high"]
+                .map(|end| number(pair, &format!("tau_mean_{end}")).unwrap());
+        assert!(
+            (b - a - difference).abs() < 1e-12 && low < difference && difference < high,
+            "{pair}"
+        );
     }
     // As the table of sets says, where every seed has as many slips.
     let alone = sets("show a --json");
-    assert!((number(&alone[0], "tau_mean").unwrap() - number(&pairs[0], "tau_mean_a").unwrap()).abs() < 1e-12);
-    assert!(sets("show a a --json").iter().all(|pair| number(pair, "mean_friction_difference") == Some(0.0)));
+    assert!(
+        (number(&alone[0], "tau_mean").unwrap() - number(&pairs[0], "tau_mean_a").unwrap()).abs()
+            < 1e-12
+    );
+    assert!(
+        sets("show a a --json")
+            .iter()
+            .all(|pair| number(pair, "mean_friction_difference") == Some(0.0))
+    );
 }
 
 #[test]
@@ -86,20 +155,50 @@ fn jobs_without_slips_are_told_with_a_command_that_shows_one() {
         "name = \"fast\"\n[model]\nN = 5\nNs = 5\n[axes]\nV0 = [1e-4, 1]\nseed = { count = 2 }\n[record]\nslips = 4\ngive_up_after = 0.5\n",
     );
     let run = folder.ends(0, "run fast.toml --out out").stdout;
-    let note = "2 jobs of 1 set ended as no further slip came: they slide, or give_up_after is too short";
-    assert!(run.contains(&format!("{note}; a job of one such set: stickslip simulate ")), "{run}");
+    let note =
+        "2 jobs of 1 set ended as no further slip came: they slide, or give_up_after is too short";
+    assert!(
+        run.contains(&format!(
+            "{note}; a job of one such set: stickslip simulate "
+        )),
+        "{run}"
+    );
     assert!(run.contains("--set V0=1"), "{run}");
     // Without an end of any interval, the unit is that of what it is at least.
-    let shown = folder.ends(0, "show out --where V0==1 --columns tau_mean,tau_mean_bound").stdout;
+    let shown = folder
+        .ends(
+            0,
+            "show out --where V0==1 --columns tau_mean,tau_mean_bound",
+        )
+        .stdout;
     let (head, of_set) = shown.split_once('\n').unwrap();
-    let unit = head.strip_prefix("⟨τ⟩ (").and_then(|head| head.split_once(')')).unwrap().0;
+    let unit = head
+        .strip_prefix("⟨τ⟩ (")
+        .and_then(|head| head.split_once(')'))
+        .unwrap()
+        .0;
     assert_eq!(head, format!("⟨τ⟩ ({unit})  ⟨τ⟩, at least ({unit})"));
-    let bounds = of_set.lines().next().unwrap().trim_start().strip_prefix("> ").unwrap();
-    let bounds: Vec<f64> = bounds.split_whitespace().map(|bound| bound.parse().unwrap()).collect();
-    assert!(bounds[0] == bounds[1] && (1.0..1000.0).contains(&bounds[0]), "{shown}");
+    let bounds = of_set
+        .lines()
+        .next()
+        .unwrap()
+        .trim_start()
+        .strip_prefix("> ")
+        .unwrap();
+    let bounds: Vec<f64> = bounds
+        .split_whitespace()
+        .map(|bound| bound.parse().unwrap())
+        .collect();
+    assert!(
+        bounds[0] == bounds[1] && (1.0..1000.0).contains(&bounds[0]),
+        "{shown}"
+    );
     // A sweep that no longer has the set has no command for it.
     let fast = std::fs::read_to_string(folder.path("fast.toml")).unwrap();
     folder.write("fast.toml", &fast.replace("[1e-4, 1]", "[1e-4]"));
     let narrowed = folder.ends(0, "run fast.toml --out out").stdout;
-    assert!(narrowed.contains(&format!("{note}\nno longer in the sweep: 1 set of these\n")), "{narrowed}");
+    assert!(
+        narrowed.contains(&format!("{note}\nno longer in the sweep: 1 set of these\n")),
+        "{narrowed}"
+    );
 }

@@ -25,11 +25,29 @@ struct Intervals(Vec<f64>);
 impl Intervals {
     /// Of this many slips for each seed, with the default solver.
     fn of(parameters: &Parameters, seeds: u64, slips: u64) -> Self {
-        let recording = Recording { slips, ..Recording::default() };
+        let recording = Recording {
+            slips,
+            ..Recording::default()
+        };
         let of_seed = |seed| {
-            let parameters = Parameters { seed, ..parameters.clone() }.validated().unwrap();
-            let result = measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap();
-            result.slips.iter().filter_map(|slip| slip.interval).collect::<Vec<_>>()
+            let parameters = Parameters {
+                seed,
+                ..parameters.clone()
+            }
+            .validated()
+            .unwrap();
+            let result = measure(
+                &parameters,
+                &recording,
+                Solver::default(),
+                &AtomicBool::new(false),
+            )
+            .unwrap();
+            result
+                .slips
+                .iter()
+                .filter_map(|slip| slip.interval)
+                .collect::<Vec<_>>()
         };
         let mut intervals: Vec<f64> = (0..seeds).into_par_iter().flat_map_iter(of_seed).collect();
         intervals.sort_by(f64::total_cmp);
@@ -42,7 +60,8 @@ impl Intervals {
 
     fn deviation(&self) -> f64 {
         let mean = self.mean();
-        (self.0.iter().map(|tau| (tau - mean).powi(2)).sum::<f64>() / (self.0.len() as f64 - 1.0)).sqrt()
+        (self.0.iter().map(|tau| (tau - mean).powi(2)).sum::<f64>() / (self.0.len() as f64 - 1.0))
+            .sqrt()
     }
 
     fn standard_error(&self) -> f64 {
@@ -51,19 +70,28 @@ impl Intervals {
 
     /// Share of the intervals in [low, high).
     fn share(&self, low: f64, high: f64) -> f64 {
-        self.0.iter().filter(|tau| (low..high).contains(*tau)).count() as f64 / self.0.len() as f64
+        self.0
+            .iter()
+            .filter(|tau| (low..high).contains(*tau))
+            .count() as f64
+            / self.0.len() as f64
     }
 
     /// |<exp(2πi τ/T)>|: 1 if every interval is a whole number of periods.
     fn locking_index(&self, period: f64) -> f64 {
         let mean = |part: fn(f64) -> f64| {
-            self.0.iter().map(|tau| part(std::f64::consts::TAU * tau / period)).sum::<f64>() / self.0.len() as f64
+            self.0
+                .iter()
+                .map(|tau| part(std::f64::consts::TAU * tau / period))
+                .sum::<f64>()
+                / self.0.len() as f64
         };
         mean(f64::cos).hypot(mean(f64::sin))
     }
 
     fn describe(&self) -> String {
-        let quantiles = [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| quantile(&self.0, share).unwrap());
+        let quantiles =
+            [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| quantile(&self.0, share).unwrap());
         let (mean, error, deviation) = (self.mean(), self.standard_error(), self.deviation());
         format!(
             "{} intervals, mean {mean:.4} ({error:.4}) s, s.d. {deviation:.4} s, quantiles {quantiles:.4?} s",
@@ -73,7 +101,11 @@ impl Intervals {
 }
 
 fn modulated(frequency: f64) -> Parameters {
-    Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / frequency), ..Parameters::default() }
+    Parameters {
+        modulation_amplitude: 1e-6,
+        modulation_period: Some(1.0 / frequency),
+        ..Parameters::default()
+    }
 }
 
 #[test]
@@ -83,20 +115,44 @@ fn without_modulation_intervals_have_the_mean_and_the_two_peaks_of_fig_2d() {
     // 3 % are five standard errors.
     assert!((intervals.mean() / 0.111 - 1.0).abs() < 0.03, "{shown}");
     // The reference's s.d. rests on the few intervals of the second peak: a fifth is two of its standard errors.
-    assert!((intervals.deviation() / 0.0159 - 1.0).abs() < 0.2, "{shown}");
+    assert!(
+        (intervals.deviation() / 0.0159 - 1.0).abs() < 0.2,
+        "{shown}"
+    );
     // The first peak, the gap behind it, and the second peak near 0.165 s.
     assert!(intervals.share(0.095, 0.125) > 0.8, "{shown}");
     assert!(intervals.share(0.14, 0.15) < 0.01, "{shown}");
-    let long: Vec<f64> = intervals.0.iter().copied().filter(|tau| *tau >= 0.15).collect();
-    assert!((0.01..0.15).contains(&intervals.share(0.15, f64::INFINITY)), "{shown}");
-    assert!((long.iter().sum::<f64>() / long.len() as f64 - 0.165).abs() < 0.005, "{long:?}");
+    let long: Vec<f64> = intervals
+        .0
+        .iter()
+        .copied()
+        .filter(|tau| *tau >= 0.15)
+        .collect();
+    assert!(
+        (0.01..0.15).contains(&intervals.share(0.15, f64::INFINITY)),
+        "{shown}"
+    );
+    assert!(
+        (long.iter().sum::<f64>() / long.len() as f64 - 0.165).abs() < 0.005,
+        "{long:?}"
+    );
 }
 
 #[test]
 fn identical_contacts_keep_the_distribution_broad() {
-    let intervals = Intervals::of(&Parameters { threshold_deviation: 0.0, ..Parameters::default() }, 8, 30);
+    let intervals = Intervals::of(
+        &Parameters {
+            threshold_deviation: 0.0,
+            ..Parameters::default()
+        },
+        8,
+        30,
+    );
     let shown = intervals.describe();
-    assert!((intervals.mean() - 0.1118).abs() < 0.03 * 0.1118 + 3.0 * intervals.standard_error(), "{shown}");
+    assert!(
+        (intervals.mean() - 0.1118).abs() < 0.03 * 0.1118 + 3.0 * intervals.standard_error(),
+        "{shown}"
+    );
     // Reference: 0.0157 s, and 0.0092 s between the quartiles.
     assert!(intervals.deviation() > 0.01, "{shown}");
     let [lower, upper] = [0.25, 0.75].map(|share| quantile(&intervals.0, share).unwrap());
@@ -112,20 +168,47 @@ fn modulated_intervals_sit_on_multiples_of_the_period_at_29_and_58_hz() {
         let index = intervals.locking_index(1.0 / frequency);
         assert!(index > 0.8, "{frequency} Hz: {index}, {shown}");
         // A third or more at the median's number, and nowhere as many.
-        let share = |n: i32| intervals.share((f64::from(n) - 0.5) / frequency, (f64::from(n) + 0.5) / frequency);
+        let share = |n: i32| {
+            intervals.share(
+                (f64::from(n) - 0.5) / frequency,
+                (f64::from(n) + 0.5) / frequency,
+            )
+        };
         let most = (1..20).max_by(|a, b| share(*a).total_cmp(&share(*b)));
-        assert!(most == Some(periods) && share(periods) > 1.0 / 3.0, "{frequency} Hz: {most:?}, {shown}");
+        assert!(
+            most == Some(periods) && share(periods) > 1.0 / 3.0,
+            "{frequency} Hz: {most:?}, {shown}"
+        );
         let difference = (intervals.mean() - mean).abs();
-        assert!(difference < 0.03 * mean + 3.0 * intervals.standard_error(), "{frequency} Hz: {shown}");
+        assert!(
+            difference < 0.03 * mean + 3.0 * intervals.standard_error(),
+            "{frequency} Hz: {shown}"
+        );
     }
 }
 
 #[test]
 fn a_job_that_ends_within_an_interval_knows_what_it_is_at_least() {
-    let parameters = Parameters { blocks: 10, contacts_per_block: 5, ..Parameters::default() }.validated().unwrap();
+    let parameters = Parameters {
+        blocks: 10,
+        contacts_per_block: 5,
+        ..Parameters::default()
+    }
+    .validated()
+    .unwrap();
     let run = |max_time| {
-        let recording = Recording { slips: 20, max_time, ..Recording::default() };
-        measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap()
+        let recording = Recording {
+            slips: 20,
+            max_time,
+            ..Recording::default()
+        };
+        measure(
+            &parameters,
+            &recording,
+            Solver::default(),
+            &AtomicBool::new(false),
+        )
+        .unwrap()
     };
     let whole = run(None);
     assert_eq!(whole.running_interval, None);
@@ -133,9 +216,14 @@ fn a_job_that_ends_within_an_interval_knows_what_it_is_at_least() {
     for step in 1..60 {
         let end = whole.slips[2].onset + 0.013 * f64::from(step);
         let cut = run(Some(end));
-        let Some(next) = whole.slips.get(cut.slips.len()) else { break };
+        let Some(next) = whole.slips.get(cut.slips.len()) else {
+            break;
+        };
         let (running, interval) = (cut.running_interval.unwrap(), next.interval.unwrap());
-        assert!(running <= interval && running >= 0.0, "{running} of {interval}");
+        assert!(
+            running <= interval && running >= 0.0,
+            "{running} of {interval}"
+        );
         (least, most) = (least.min(running / interval), most.max(running / interval));
         // Nothing is known of intervals of start-up.
         assert_eq!(run(Some(0.01)).running_interval, None);
@@ -143,12 +231,28 @@ fn a_job_that_ends_within_an_interval_knows_what_it_is_at_least() {
     assert!(least < 0.1 && most > 0.9, "{least} to {most}");
     // One that gives up knows the whole time since its last slip, if there was any.
     let gives_up = |drive_velocity| {
-        let parameters = Parameters { drive_velocity, ..parameters.clone() };
-        let recording = Recording { give_up_after: Some(3e-6), ..Recording::default() };
-        measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap()
+        let parameters = Parameters {
+            drive_velocity,
+            ..parameters.clone()
+        };
+        let recording = Recording {
+            give_up_after: Some(3e-6),
+            ..Recording::default()
+        };
+        measure(
+            &parameters,
+            &recording,
+            Solver::default(),
+            &AtomicBool::new(false),
+        )
+        .unwrap()
     };
     let (some, none) = (gives_up(1e-4), gives_up(2e-4));
-    assert!(some.has_given_up && some.running_interval.unwrap() >= 3e-6 / 1e-4, "{:?}", some.running_interval);
+    assert!(
+        some.has_given_up && some.running_interval.unwrap() >= 3e-6 / 1e-4,
+        "{:?}",
+        some.running_interval
+    );
     assert!(none.has_given_up && none.slips.is_empty() && none.running_interval.is_none());
 }
 
@@ -183,18 +287,30 @@ impl Observer for FirstBreak {
 /// Displacement over that of the trailing edge, of the block and at the instant of the first break: as simulated, and by
 /// the static chain with the very contacts of this realisation.
 fn profile_at_the_first_break(parameters: &Parameters) -> (usize, f64, f64) {
-    let mut observer = FirstBreak { contacts: vec![0.0; parameters.blocks], force: 0.0, first: None };
-    let limits = Limits { end_time: f64::INFINITY, events: u64::MAX, interrupt: None };
+    let mut observer = FirstBreak {
+        contacts: vec![0.0; parameters.blocks],
+        force: 0.0,
+        first: None,
+    };
+    let limits = Limits {
+        end_time: f64::INFINITY,
+        events: u64::MAX,
+        interrupt: None,
+    };
     simulate(parameters, Solver::default(), limits, &mut observer).unwrap();
     let first = observer.first.unwrap();
-    let trailing = parameters.drive_velocity * first.time - observer.force / parameters.drive_stiffness;
+    let trailing =
+        parameters.drive_velocity * first.time - observer.force / parameters.drive_stiffness;
     // Elimination from the leading edge: x_(j+1) = K_int x_j / p_(j+1).
     let chain = StiffnessMatrix::new(parameters, &observer.contacts);
     let mut pivots = chain.diagonal;
     for block in (1..pivots.len() - 1).rev() {
         pivots[block] -= chain.coupling * chain.coupling / pivots[block + 1];
     }
-    let exact = pivots[1..=first.block].iter().map(|pivot| -chain.coupling / pivot).product();
+    let exact = pivots[1..=first.block]
+        .iter()
+        .map(|pivot| -chain.coupling / pivot)
+        .product();
     (first.block, first.displacement / trailing, exact)
 }
 
@@ -202,10 +318,22 @@ fn profile_at_the_first_break(parameters: &Parameters) -> (usize, f64, f64) {
 fn displacement_before_the_first_break_decays_as_eq_1() {
     // A wide spread of thresholds, so that the first contact to break lies now here, now there; slow, so that inertia and
     // damping are below 1e-4 of the forces.
-    let of_seed = |seed| Parameters { seed, threshold_deviation: 0.45, drive_velocity: 1e-5, ..Parameters::default() };
-    let profiles: Vec<_> = (0..200).into_par_iter().map(|seed| profile_at_the_first_break(&of_seed(seed))).collect();
+    let of_seed = |seed| Parameters {
+        seed,
+        threshold_deviation: 0.45,
+        drive_velocity: 1e-5,
+        ..Parameters::default()
+    };
+    let profiles: Vec<_> = (0..200)
+        .into_par_iter()
+        .map(|seed| profile_at_the_first_break(&of_seed(seed)))
+        .collect();
     for (block, simulated, exact) in &profiles {
-        assert!((simulated / exact - 1.0).abs() < 1e-3, "block {}: {simulated} against {exact}", block + 1);
+        assert!(
+            (simulated / exact - 1.0).abs() < 1e-3,
+            "block {}: {simulated} against {exact}",
+            block + 1
+        );
     }
     // The spread makes contacts softer, k E[sqrt(f/fs)], which takes 0.7 % from the rate, and differs from block to block.
     let rates: Vec<f64> = profiles
@@ -213,8 +341,15 @@ fn displacement_before_the_first_break_decays_as_eq_1() {
         .filter(|(block, ..)| *block >= 3)
         .map(|(block, simulated, _)| -simulated.ln() / *block as f64)
         .collect();
-    assert!(rates.len() >= 30, "{} first breaks away from the edge", rates.len());
+    assert!(
+        rates.len() >= 30,
+        "{} first breaks away from the edge",
+        rates.len()
+    );
     let rate = rates.iter().sum::<f64>() / rates.len() as f64;
     let theory = exact_decay_per_block(&Parameters::default());
-    assert!((rate / theory - 1.0).abs() < 0.02, "{rate} against {theory} a block");
+    assert!(
+        (rate / theory - 1.0).abs() < 0.02,
+        "{rate} against {theory} a block"
+    );
 }

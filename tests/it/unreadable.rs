@@ -38,11 +38,19 @@ fn folder() -> Folder {
 fn run_within(folder: &Folder, limit: &str, arguments: &str) -> Ended {
     let script = format!("ulimit {limit} && exec '{PROGRAM}' {arguments}");
     // glibc reserves 64 MB of addresses for an arena of a thread where they are to be had: by chance, close to a limit.
-    let shell =
-        Command::new("sh").args(["-c", &script]).current_dir(folder.path("")).env("MALLOC_ARENA_MAX", "1").output();
+    let shell = Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(folder.path(""))
+        .env("MALLOC_ARENA_MAX", "1")
+        .output();
     let output = shell.unwrap();
-    let [stdout, stderr] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
-    Ended { code: output.status.code(), stdout, stderr }
+    let [stdout, stderr] =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    Ended {
+        code: output.status.code(),
+        stdout,
+        stderr,
+    }
 }
 
 /// All commands that read.
@@ -63,11 +71,23 @@ fn within_limits_on_files_and_memory_every_command_works_or_says_what_it_could_n
     let folder = folder();
     let before = folder.tables("r");
     let mut refused = 0;
-    for limit in ["-n 5", "-n 6", "-n 7", "-n 8", "-n 20", "-v 100000", "-v 400000"] {
+    for limit in [
+        "-n 5",
+        "-n 6",
+        "-n 7",
+        "-n 8",
+        "-n 20",
+        "-v 100000",
+        "-v 400000",
+    ] {
         for command in COMMANDS {
             let ended = run_within(&folder, limit, command);
             let case = format!("{limit}, {command}: {}{}", ended.stdout, ended.stderr);
-            assert!([Some(0), Some(3)].contains(&ended.code), "{:?}, {case}", ended.code);
+            assert!(
+                [Some(0), Some(3)].contains(&ended.code),
+                "{:?}, {case}",
+                ended.code
+            );
             if ended.code == Some(3) {
                 assert!(ended.stderr.starts_with("error: "), "{case}");
                 refused += 1;
@@ -101,7 +121,11 @@ fn assert_unread(folder: &Folder, file: &str) {
     let before = folder.contents("r");
     for command in ["verify r", "verify r --repair"] {
         let ended = folder.ends(3, command);
-        assert!(ended.stderr.contains(&format!("error: {file}: cannot ")), "{command}: {}", ended.stderr);
+        assert!(
+            ended.stderr.contains(&format!("error: {file}: cannot ")),
+            "{command}: {}",
+            ended.stderr
+        );
         let mut after = folder.contents("r");
         after.retain(|path, bytes| bytes.is_some() || before.contains_key(path));
         assert!(after == before, "{command}: {file}");
@@ -114,13 +138,25 @@ fn assert_unread(folder: &Folder, file: &str) {
 fn a_file_that_does_not_fit_in_memory_is_named() {
     let folder = folder();
     let path = "r/tables/jobs/part-000-000001.parquet";
-    let file = File::options().append(true).open(folder.path(path)).unwrap();
+    let file = File::options()
+        .append(true)
+        .open(folder.path(path))
+        .unwrap();
     file.set_len(3 << 30).unwrap();
     let ended = run_within(&folder, "-v 200000", "verify r");
-    assert!(ended.code == Some(3) && ended.stderr.starts_with(&format!("error: {path}: cannot read")), "{ended:?}");
+    assert!(
+        ended.code == Some(3)
+            && ended
+                .stderr
+                .starts_with(&format!("error: {path}: cannot read")),
+        "{ended:?}"
+    );
     file.set_len(8 << 30).unwrap();
     let ended = run_within(&folder, "-v 200000", "verify r");
-    assert!(ended.code == Some(4) && ended.stdout.contains(&format!("{path}: it has more than")), "{ended:?}");
+    assert!(
+        ended.code == Some(4) && ended.stdout.contains(&format!("{path}: it has more than")),
+        "{ended:?}"
+    );
 }
 
 /// Makes a FIFO, which nobody writes.
@@ -135,7 +171,9 @@ fn a_fifo_makes_no_command_wait() {
     for command in ["plan fifo.toml", "run fifo.toml"] {
         let ended = folder.ends(2, command);
         assert!(
-            ended.stderr.contains("fifo.toml: cannot be read: it is no regular file"),
+            ended
+                .stderr
+                .contains("fifo.toml: cannot be read: it is no regular file"),
             "{command}: {}",
             ended.stderr
         );
@@ -153,9 +191,17 @@ fn a_fifo_makes_no_command_wait() {
         let (path, aside) = (folder.path(file), folder.path("aside"));
         let was_there = fs::rename(&path, &aside).is_ok();
         fifo(&path);
-        for command in ["status r", "run r --no-reduce", "plot r", "plan small.toml --out r"] {
+        for command in [
+            "status r",
+            "run r --no-reduce",
+            "plot r",
+            "plan small.toml --out r",
+        ] {
             let ended = folder.run(command);
-            assert!(matches!(ended.code, Some(0 | 2 | 3 | 4)), "{file}, {command}: {ended:?}");
+            assert!(
+                matches!(ended.code, Some(0 | 2 | 3 | 4)),
+                "{file}, {command}: {ended:?}"
+            );
         }
         let text = folder.ends(code, "verify r").stdout;
         assert!(code == 0 || text.contains(file), "{file}: {text}");
@@ -171,22 +217,49 @@ fn names_and_keys_pass_for_no_other_line_of_a_message() {
     let folder = folder();
     let names: [&[u8]; 3] = [b"a\nto go on:\n  rm -r x", b"\x1b[31mred", b"\xff\xfe"];
     for name in names {
-        fs::write(folder.path("r/tables/jobs").join(OsStr::from_bytes(name)), "").unwrap();
+        fs::write(
+            folder.path("r/tables/jobs").join(OsStr::from_bytes(name)),
+            "",
+        )
+        .unwrap();
     }
     let text = folder.ends(4, "verify r").stdout;
-    for shown in [r"jobs/a\nto go on:\n  rm -r x: no", r"jobs/\u{1b}[31mred: no", r"jobs/\xff\xfe: no"] {
+    for shown in [
+        r"jobs/a\nto go on:\n  rm -r x: no",
+        r"jobs/\u{1b}[31mred: no",
+        r"jobs/\xff\xfe: no",
+    ] {
         assert!(text.contains(shown), "{shown}: {text}");
     }
-    assert_eq!(text.lines().filter(|line| *line == "to go on:").count(), 1, "{text}");
+    assert_eq!(
+        text.lines().filter(|line| *line == "to go on:").count(),
+        1,
+        "{text}"
+    );
     let report = json(&folder.ends(4, "verify r --json").stdout);
-    let paths: Vec<&str> = report["problems"].as_array().unwrap().iter().map(|p| p["path"].as_str().unwrap()).collect();
+    let paths: Vec<&str> = report["problems"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["path"].as_str().unwrap())
+        .collect();
     assert_eq!(
         paths,
-        ["r/tables/jobs/\u{1b}[31mred", "r/tables/jobs/a\nto go on:\n  rm -r x", r"r/tables/jobs/\xff\xfe"]
+        [
+            "r/tables/jobs/\u{1b}[31mred",
+            "r/tables/jobs/a\nto go on:\n  rm -r x",
+            r"r/tables/jobs/\xff\xfe"
+        ]
     );
-    folder.write("key.toml", "name = \"x\"\n[axes]\n\"\\u001b[31mN\\nerror: forged\" = [1]\n");
+    folder.write(
+        "key.toml",
+        "name = \"x\"\n[axes]\n\"\\u001b[31mN\\nerror: forged\" = [1]\n",
+    );
     let text = folder.ends(2, "plan key.toml").stderr;
-    assert!(text.starts_with(r"error: key.toml:3: \u{1b}[31mN\nerror: forged = [1]: unknown"), "{text}");
+    assert!(
+        text.starts_with(r"error: key.toml:3: \u{1b}[31mN\nerror: forged = [1]: unknown"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -196,7 +269,12 @@ fn a_directory_whose_name_is_no_text_is_shown_as_a_shell_reads_it() {
     fs::rename(folder.path("r"), &root).unwrap();
     fs::write(root.join("tables/jobs/notes.txt"), "").unwrap();
     let verify = |json: &[&str]| {
-        let output = Command::new(PROGRAM).arg("verify").arg(&root).args(json).output().unwrap();
+        let output = Command::new(PROGRAM)
+            .arg("verify")
+            .arg(&root)
+            .args(json)
+            .output()
+            .unwrap();
         assert_eq!(output.status.code(), Some(4), "{output:?}");
         String::from_utf8(output.stdout).unwrap()
     };
@@ -204,7 +282,13 @@ fn a_directory_whose_name_is_no_text_is_shown_as_a_shell_reads_it() {
     let command = report["commands"][0].as_str().unwrap();
     assert!(verify(&[]).contains(&format!("  {command}\n")), "{command}");
     let arguments = command.strip_prefix("stickslip ").unwrap();
-    let repaired = Command::new("bash").args(["-c", &format!("'{PROGRAM}' {arguments}")]).status().unwrap();
+    let repaired = Command::new("bash")
+        .args(["-c", &format!("'{PROGRAM}' {arguments}")])
+        .status()
+        .unwrap();
     assert!(repaired.success(), "{command}");
-    assert!(root.join("run/quarantine/jobs/notes.txt").exists(), "{command}");
+    assert!(
+        root.join("run/quarantine/jobs/notes.txt").exists(),
+        "{command}"
+    );
 }

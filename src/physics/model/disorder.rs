@@ -82,7 +82,10 @@ impl Disorder {
         if self.buffered_from[contact] != generation - ahead {
             self.refill(contact, generation - ahead);
         }
-        let Draw { mut threshold, delay } = self.buffered[contact][ahead as usize];
+        let Draw {
+            mut threshold,
+            delay,
+        } = self.buffered[contact][ahead as usize];
         if threshold.is_nan() || threshold <= 0.0 {
             threshold = self.final_threshold(contact, generation);
         }
@@ -100,7 +103,8 @@ impl Disorder {
     fn refill(&mut self, contact: usize, first: u32) {
         self.seek(contact, first, 0);
         let mut words = [[0; 2]; DRAWS_PER_REFILL as usize];
-        self.generator.fill_bytes(bytemuck::bytes_of_mut(&mut words));
+        self.generator
+            .fill_bytes(bytemuck::bytes_of_mut(&mut words));
         self.buffered[contact] = self.features.dispatch(SideBySide(self, &words));
         self.buffered_from[contact] = first;
     }
@@ -129,7 +133,8 @@ impl Disorder {
         // From within a block, a change of stream would compute that block of the new one.
         self.generator.set_word_pos(0);
         self.generator.set_stream(contact as u64);
-        self.generator.set_word_pos(u128::from(generation) * WORDS_PER_DRAW + redraw * REDRAW_STRIDE);
+        self.generator
+            .set_word_pos(u128::from(generation) * WORDS_PER_DRAW + redraw * REDRAW_STRIDE);
     }
 }
 
@@ -164,9 +169,17 @@ fn uniform(word: u64) -> f64 {
 /// `libm::log` of a positive normal number, to the last bit: its algorithm (FreeBSD's `e_log.c`) without branches.
 #[inline(always)]
 fn logarithm(x: f64) -> f64 {
-    const EVEN: [f64; 3] = [0.399_999_999_994_094_2, 0.222_221_984_321_497_84, 0.153_138_376_992_093_73];
-    const ODD: [f64; 4] =
-        [0.666_666_666_666_673_5, 0.285_714_287_436_623_9, 0.181_835_721_616_180_5, 0.147_981_986_051_165_86];
+    const EVEN: [f64; 3] = [
+        0.399_999_999_994_094_2,
+        0.222_221_984_321_497_84,
+        0.153_138_376_992_093_73,
+    ];
+    const ODD: [f64; 4] = [
+        0.666_666_666_666_673_5,
+        0.285_714_287_436_623_9,
+        0.181_835_721_616_180_5,
+        0.147_981_986_051_165_86,
+    ];
     const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
     const ROOT_OF_HALF: u64 = 0x3fe6_a09e << 32;
     // x = (1 + f) 2^exponent, where 1 + f goes from sqrt(1/2), but for its lower bits, to its double.
@@ -226,11 +239,20 @@ fn quantile_outside_tails(probability: f64) -> f64 {
         1.050_750_071_644_416_843_24e-9,
     ];
     let offset = probability - 0.5;
-    let central = offset * ratio(&CENTRAL_NUMERATOR, &CENTRAL_DENOMINATOR, 0.180_625 - offset * offset);
+    let central = offset
+        * ratio(
+            &CENTRAL_NUMERATOR,
+            &CENTRAL_DENOMINATOR,
+            0.180_625 - offset * offset,
+        );
     let depth = depth(probability);
     let middle = ratio(&MIDDLE_NUMERATOR, &MIDDLE_DENOMINATOR, depth - 1.6).copysign(offset);
     let outer = if depth <= 5.0 { middle } else { f64::NAN };
-    if offset.abs() <= 0.425 { central } else { outer }
+    if offset.abs() <= 0.425 {
+        central
+    } else {
+        outer
+    }
 }
 
 /// A quantile of the standard normal distribution, be it in the tails.
@@ -258,7 +280,8 @@ pub fn standard_normal_quantile(probability: f64) -> f64 {
     ];
     let quantile = quantile_outside_tails(probability);
     if quantile.is_nan() {
-        ratio(&TAIL_NUMERATOR, &TAIL_DENOMINATOR, depth(probability) - 5.0).copysign(probability - 0.5)
+        ratio(&TAIL_NUMERATOR, &TAIL_DENOMINATOR, depth(probability) - 5.0)
+            .copysign(probability - 0.5)
     } else {
         quantile
     }
@@ -276,7 +299,10 @@ fn ratio(numerator: &[f64; 8], denominator: &[f64; 8], at: f64) -> f64 {
 
 #[inline(always)]
 fn polynomial<const COUNT: usize>(coefficients: &[f64; COUNT], at: f64) -> f64 {
-    coefficients[..COUNT - 1].iter().rev().fold(coefficients[COUNT - 1], |sum, c| sum * at + c)
+    coefficients[..COUNT - 1]
+        .iter()
+        .rev()
+        .fold(coefficients[COUNT - 1], |sum, c| sum * at + c)
 }
 
 #[cfg(test)]
@@ -295,7 +321,10 @@ mod tests {
             (0.975, 1.959_963_984_540_054),
         ] {
             let difference: f64 = standard_normal_quantile(probability) - quantile;
-            assert!(difference.abs() <= 4e-15 * (1.0 + quantile.abs()), "{probability}: off by {difference}");
+            assert!(
+                difference.abs() <= 4e-15 * (1.0 + quantile.abs()),
+                "{probability}: off by {difference}"
+            );
         }
     }
 
@@ -314,19 +343,60 @@ mod tests {
     fn draws_are_pinned_to_the_last_bit() {
         // A change here gives every job other contacts: raise RNG_SCHEME.
         let narrow = Parameters::default();
-        let redrawn = Parameters { threshold_deviation: 1.37, seed: 3, ..Parameters::default() };
+        let redrawn = Parameters {
+            threshold_deviation: 1.37,
+            seed: 3,
+            ..Parameters::default()
+        };
         // The last is redrawn.
-        let keys = [(&narrow, 0, 0), (&narrow, 1399, 15), (&narrow, 1399, 16), (&narrow, 7, 17), (&redrawn, 6, 1)];
+        let keys = [
+            (&narrow, 0, 0),
+            (&narrow, 1399, 15),
+            (&narrow, 1399, 16),
+            (&narrow, 7, 17),
+            (&redrawn, 6, 1),
+        ];
         let bits = keys.map(|(parameters, contact, generation)| {
             let contact = Disorder::new(parameters).draw(contact, generation);
-            [contact.threshold, contact.stiffness, contact.reach, contact.delay].map(f64::to_bits)
+            [
+                contact.threshold,
+                contact.stiffness,
+                contact.reach,
+                contact.delay,
+            ]
+            .map(f64::to_bits)
         });
         let pinned = [
-            [0x3ff5_fb15_6d47_2e54, 0x4153_1994_40f2_868e, 0x3e92_69ce_b9f0_eba8, 0x3f6f_485e_9bb4_2685],
-            [0x3ff5_db51_5717_5ca4, 0x4153_0bc2_1e8a_9536, 0x3e92_5c7b_c811_4861, 0x3f72_2c59_16c5_f810],
-            [0x3ff5_e885_9bd7_f168, 0x4153_1182_08b2_0361, 0x3e92_6206_c892_ad8d, 0x3f79_b099_f85f_d3b5],
-            [0x3ff5_efb6_689f_7db6, 0x4153_14a2_de73_82fa, 0x3e92_650a_d473_cc76, 0x3f7f_04b1_9168_090a],
-            [0x400e_db10_6478_2565, 0x4160_0067_0233_0740, 0x3e9e_da49_c2ff_9f19, 0x3f6e_9107_75d1_543c],
+            [
+                0x3ff5_fb15_6d47_2e54,
+                0x4153_1994_40f2_868e,
+                0x3e92_69ce_b9f0_eba8,
+                0x3f6f_485e_9bb4_2685,
+            ],
+            [
+                0x3ff5_db51_5717_5ca4,
+                0x4153_0bc2_1e8a_9536,
+                0x3e92_5c7b_c811_4861,
+                0x3f72_2c59_16c5_f810,
+            ],
+            [
+                0x3ff5_e885_9bd7_f168,
+                0x4153_1182_08b2_0361,
+                0x3e92_6206_c892_ad8d,
+                0x3f79_b099_f85f_d3b5,
+            ],
+            [
+                0x3ff5_efb6_689f_7db6,
+                0x4153_14a2_de73_82fa,
+                0x3e92_650a_d473_cc76,
+                0x3f7f_04b1_9168_090a,
+            ],
+            [
+                0x400e_db10_6478_2565,
+                0x4160_0067_0233_0740,
+                0x3e9e_da49_c2ff_9f19,
+                0x3f6e_9107_75d1_543c,
+            ],
         ];
         assert_eq!(bits, pinned);
     }
@@ -350,16 +420,34 @@ mod tests {
     #[test]
     fn draws_side_by_side_are_those_of_each_alone_on_every_processor() {
         #[cfg(target_arch = "x86_64")]
-        let more = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)].into_iter().flatten();
+        let more = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)]
+            .into_iter()
+            .flatten();
         #[cfg(not(target_arch = "x86_64"))]
         let more = [Arch::new()];
         let f_s = Parameters::default().mean_threshold;
         for features in [Arch::Scalar].into_iter().chain(more) {
-            for threshold_deviation in [Parameters::default().threshold_deviation, 0.4 * f_s, f_s, 1.37 * f_s] {
-                let parameters = Parameters { threshold_deviation, seed: 5, ..Parameters::default() };
-                let mut disorder = Disorder { features, ..Disorder::new(&parameters) };
-                for (contact, generation) in (0..1400).flat_map(|contact| [0, 1, 17, 40].map(|g| (contact, g))) {
-                    let Contact { threshold, delay, .. } = disorder.draw(contact, generation);
+            for threshold_deviation in [
+                Parameters::default().threshold_deviation,
+                0.4 * f_s,
+                f_s,
+                1.37 * f_s,
+            ] {
+                let parameters = Parameters {
+                    threshold_deviation,
+                    seed: 5,
+                    ..Parameters::default()
+                };
+                let mut disorder = Disorder {
+                    features,
+                    ..Disorder::new(&parameters)
+                };
+                for (contact, generation) in
+                    (0..1400).flat_map(|contact| [0, 1, 17, 40].map(|g| (contact, g)))
+                {
+                    let Contact {
+                        threshold, delay, ..
+                    } = disorder.draw(contact, generation);
                     assert_eq!(
                         [threshold, delay].map(f64::to_bits),
                         draw_alone(&parameters, contact, generation),
@@ -368,18 +456,37 @@ mod tests {
                 }
             }
             // The ends of each part of the distribution, which no draw may meet.
-            let words = [0, 1 << 11, 1 << 16, 1 << 27, 0x1333_3333_3333_3000, 1 << 62, (1 << 63) - 1, 1 << 63];
-            let words: [u64; 16] = std::array::from_fn(|i| if i < 8 { words[i] } else { !words[i - 8] });
+            let words = [
+                0,
+                1 << 11,
+                1 << 16,
+                1 << 27,
+                0x1333_3333_3333_3000,
+                1 << 62,
+                (1 << 63) - 1,
+                1 << 63,
+            ];
+            let words: [u64; 16] =
+                std::array::from_fn(|i| if i < 8 { words[i] } else { !words[i - 8] });
             let disorder = Disorder::new(&Parameters::default());
-            let draws = features.dispatch(SideBySide(&disorder, &words.map(|word| [word.to_le(); 2])));
+            let draws =
+                features.dispatch(SideBySide(&disorder, &words.map(|word| [word.to_le(); 2])));
             for (word, Draw { threshold, delay }) in words.into_iter().zip(draws) {
                 let alone = disorder.threshold(standard_normal_quantile(uniform(word)));
                 let in_tail = depth(uniform(word)) > 5.0;
                 assert!(
-                    if in_tail { threshold.is_nan() } else { threshold == alone },
+                    if in_tail {
+                        threshold.is_nan()
+                    } else {
+                        threshold == alone
+                    },
                     "{features:?}, {word}: {threshold}"
                 );
-                assert_eq!(delay, -disorder.reattachment_time * libm::log(uniform(word)), "{features:?}, {word}");
+                assert_eq!(
+                    delay,
+                    -disorder.reattachment_time * libm::log(uniform(word)),
+                    "{features:?}, {word}"
+                );
             }
         }
     }
@@ -387,36 +494,59 @@ mod tests {
     #[test]
     fn the_logarithm_is_that_of_libm() {
         let mut generator = ChaCha8Rng::seed_from_u64(0);
-        let drawn = (0..300_000).map(|_| generator.next_u64()).flat_map(|word| [word, word >> (word % 53)]);
+        let drawn = (0..300_000)
+            .map(|_| generator.next_u64())
+            .flat_map(|word| [word, word >> (word % 53)]);
         let drawn = drawn.map(uniform).flat_map(|x| [x, x.min(1.0 - x)]);
         // Around powers of two and where the exponent changes: by single bits of the lower half too.
         let ends = (0..54).flat_map(|k| {
-            [1.0, 0.5_f64.sqrt(), f64::from_bits(0x3fe6_a09e << 32)].map(|x| x * 0.5_f64.powi(k)).into_iter()
+            [1.0, 0.5_f64.sqrt(), f64::from_bits(0x3fe6_a09e << 32)]
+                .map(|x| x * 0.5_f64.powi(k))
+                .into_iter()
         });
-        let ends = ends.flat_map(|x| (0..4000).map(move |ulp| f64::from_bits(x.to_bits() + 2000 - ulp)));
-        for x in drawn.chain(ends).chain([UNIFORM_STEP / 2.0, 1.0 - UNIFORM_STEP, 0.5]) {
+        let ends =
+            ends.flat_map(|x| (0..4000).map(move |ulp| f64::from_bits(x.to_bits() + 2000 - ulp)));
+        for x in drawn
+            .chain(ends)
+            .chain([UNIFORM_STEP / 2.0, 1.0 - UNIFORM_STEP, 0.5])
+        {
             assert_eq!(logarithm(x).to_bits(), libm::log(x).to_bits(), "{x:e}");
         }
     }
 
     #[test]
     fn a_draw_does_not_depend_on_the_order_of_draws() {
-        let parameters = Parameters { threshold_deviation: 0.4, seed: 3, ..Parameters::default() };
+        let parameters = Parameters {
+            threshold_deviation: 0.4,
+            seed: 3,
+            ..Parameters::default()
+        };
         let mut forward = Disorder::new(&parameters);
         let mut backward = Disorder::new(&parameters);
-        let keys: Vec<(usize, u32)> = (0..60_u32).map(|i| (i as usize * 7 % 1400, i * 13 % 50)).collect();
+        let keys: Vec<(usize, u32)> = (0..60_u32)
+            .map(|i| (i as usize * 7 % 1400, i * 13 % 50))
+            .collect();
         let first: Vec<Contact> = keys.iter().map(|&(c, g)| forward.draw(c, g)).collect();
-        let mut second: Vec<Contact> = keys.iter().rev().map(|&(c, g)| backward.draw(c, g)).collect();
+        let mut second: Vec<Contact> = keys
+            .iter()
+            .rev()
+            .map(|&(c, g)| backward.draw(c, g))
+            .collect();
         second.reverse();
         assert_eq!(first, second);
     }
 
     #[test]
     fn moments_are_those_of_the_model() {
-        let parameters = Parameters { threshold_deviation: 0.1, ..Parameters::default() };
+        let parameters = Parameters {
+            threshold_deviation: 0.1,
+            ..Parameters::default()
+        };
         let mut disorder = Disorder::new(&parameters);
-        let draws: Vec<Contact> =
-            (0..1400).flat_map(|c| (0..100).map(move |g| (c, g))).map(|(c, g)| disorder.draw(c, g)).collect();
+        let draws: Vec<Contact> = (0..1400)
+            .flat_map(|c| (0..100).map(move |g| (c, g)))
+            .map(|(c, g)| disorder.draw(c, g))
+            .collect();
         let count = draws.len() as f64;
         let mean = |of: &dyn Fn(&Contact) -> f64| draws.iter().map(of).sum::<f64>() / count;
         let threshold = mean(&|c| c.threshold);
@@ -431,9 +561,14 @@ mod tests {
 
     #[test]
     fn thresholds_that_are_not_positive_are_drawn_again() {
-        let parameters = Parameters { threshold_deviation: 1.37, ..Parameters::default() };
+        let parameters = Parameters {
+            threshold_deviation: 1.37,
+            ..Parameters::default()
+        };
         let mut disorder = Disorder::new(&parameters);
-        let smallest = (0..1400).map(|c| disorder.draw(c, 0).threshold).fold(f64::INFINITY, f64::min);
+        let smallest = (0..1400)
+            .map(|c| disorder.draw(c, 0).threshold)
+            .fold(f64::INFINITY, f64::min);
         assert!(smallest > 0.0);
     }
 }

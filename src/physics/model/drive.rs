@@ -41,7 +41,11 @@ struct Ramp {
 
 impl Ramp {
     fn new(parameters: &Parameters) -> Option<Self> {
-        let Parameters { modulation_amplitude: amplitude, ramp_time: time, .. } = *parameters;
+        let Parameters {
+            modulation_amplitude: amplitude,
+            ramp_time: time,
+            ..
+        } = *parameters;
         let period = parameters.modulation_period.filter(|_| time > 0.0)?;
         Some(Self {
             time,
@@ -53,7 +57,11 @@ impl Ramp {
     /// Period in s and amplitude in m at a time in s.
     fn at(&self, time: f64) -> (f64, f64) {
         let elapsed = time / self.time;
-        let fraction = if elapsed <= 1.0 { elapsed } else { (2.0 - elapsed).max(0.0) };
+        let fraction = if elapsed <= 1.0 {
+            elapsed
+        } else {
+            (2.0 - elapsed).max(0.0)
+        };
         // With these weights both ends are met exactly, and nothing between them is zero.
         let between = |[start, turning]: [f64; 2]| (1.0 - fraction) * start + fraction * turning;
         (between(self.period), between(self.amplitude))
@@ -76,7 +84,11 @@ impl Drive {
             angular_frequency: parameters.modulation_frequency(),
             period,
             cycle_start: 0.0,
-            cycle_end: if ramp.is_some() { period } else { f64::INFINITY },
+            cycle_end: if ramp.is_some() {
+                period
+            } else {
+                f64::INFINITY
+            },
             ramp,
         }
     }
@@ -88,7 +100,11 @@ impl Drive {
         (self.period, self.amplitude) = ramp.at(start);
         self.angular_frequency = TAU / self.period;
         self.cycle_start = start;
-        self.cycle_end = if ramp.is_over(start) { f64::INFINITY } else { start + self.period };
+        self.cycle_end = if ramp.is_over(start) {
+            f64::INFINITY
+        } else {
+            start + self.period
+        };
     }
 
     /// Advances to the cycle at a time in s, which is not before the present one.
@@ -111,7 +127,11 @@ impl Drive {
     /// Phase of the modulation at a time in s, in (-2π, 2π) rad; reduced before scaling, so that it stays exact in long
     /// runs.
     pub fn phase(&self, time: f64) -> f64 {
-        if self.is_modulated() { TAU * ((time - self.cycle_start) / self.period).fract() } else { 0.0 }
+        if self.is_modulated() {
+            TAU * ((time - self.cycle_start) / self.period).fract()
+        } else {
+            0.0
+        }
     }
 
     /// When the driven end first gets as far as it would be at a time in s of the present cycle without modulation, in s: the
@@ -141,7 +161,11 @@ impl Drive {
                 high = angle;
             }
             let newton = angle + rest / (1.0 - eta * sine);
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            let next = if newton > low && newton < high {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
             if (next - angle).abs() <= f64::EPSILON * TAU {
                 break;
             }
@@ -156,7 +180,10 @@ impl Drive {
         if self.is_modulated() {
             let (sine, cosine) = libm::sincos(self.phase(time));
             let rate = self.amplitude * self.angular_frequency;
-            (ramp + self.amplitude * (cosine - 1.0), self.velocity - rate * sine)
+            (
+                ramp + self.amplitude * (cosine - 1.0),
+                self.velocity - rate * sine,
+            )
         } else {
             (ramp, self.velocity)
         }
@@ -188,8 +215,14 @@ mod tests {
             let before = drive.motion(joint);
             drive.next_cycle();
             let after = drive.motion(joint);
-            assert!((before.0 - after.0).abs() < 1e-18, "{before:?} and {after:?} at {joint} s");
-            assert!((before.1 - after.1).abs() < 1e-15, "{before:?} and {after:?} at {joint} s");
+            assert!(
+                (before.0 - after.0).abs() < 1e-18,
+                "{before:?} and {after:?} at {joint} s"
+            );
+            assert!(
+                (before.1 - after.1).abs() < 1e-15,
+                "{before:?} and {after:?} at {joint} s"
+            );
             joints += 1;
         }
         // The mean frequency over the ramp is ln(0.05/0.03)/0.02 Hz.
@@ -205,7 +238,13 @@ mod tests {
                 ..Parameters::default()
             })
         };
-        let drives = [drive(1e-7, 0.03), drive(1e-6, 0.034), drive(4.77e-7, 0.03), drive(3e-6, 0.002), ramped()];
+        let drives = [
+            drive(1e-7, 0.03),
+            drive(1e-6, 0.034),
+            drive(4.77e-7, 0.03),
+            drive(3e-6, 0.002),
+            ramped(),
+        ];
         for mut drive in drives {
             let mut walked = drive;
             let (mut step, mut furthest) = (0_u32, 0.0_f64);
@@ -223,7 +262,10 @@ mod tests {
                     furthest = furthest.max(walked.motion(now).0);
                     step += 1;
                 }
-                assert!(furthest < level + 1e-15, "{number}: {furthest:e} before {level:e}");
+                assert!(
+                    furthest < level + 1e-15,
+                    "{number}: {furthest:e} before {level:e}"
+                );
             }
         }
     }
@@ -236,12 +278,16 @@ mod tests {
         assert!(drive.cycle_start <= 0.5 && drive.cycle_end > 0.5);
         let up = drive.cycle_start;
         assert!(
-            (drive.period - (0.03 + 0.02 * up)).abs() < 1e-15 && (drive.amplitude - 1e-6 * (1.0 - up)).abs() < 1e-20
+            (drive.period - (0.03 + 0.02 * up)).abs() < 1e-15
+                && (drive.amplitude - 1e-6 * (1.0 - up)).abs() < 1e-20
         );
         drive.advance_to(1.7);
         let down = 2.0 - drive.cycle_start;
         assert!((drive.period - (0.03 + 0.02 * down)).abs() < 1e-15);
         drive.advance_to(100.0);
-        assert_eq!((drive.period, drive.amplitude, drive.cycle_end), (0.03, 1e-6, f64::INFINITY));
+        assert_eq!(
+            (drive.period, drive.amplitude, drive.cycle_end),
+            (0.03, 1e-6, f64::INFINITY)
+        );
     }
 }

@@ -36,12 +36,18 @@ impl StiffnessMatrix {
             })
             .collect();
         diagonal[0] += parameters.drive_stiffness;
-        Self { diagonal, coupling: -coupling }
+        Self {
+            diagonal,
+            coupling: -coupling,
+        }
     }
 
     /// The matrix with every contact attached, at its mean stiffness.
     pub fn intact(parameters: &Parameters) -> Self {
-        Self::new(parameters, &vec![parameters.block_contact_stiffness(); parameters.blocks])
+        Self::new(
+            parameters,
+            &vec![parameters.block_contact_stiffness(); parameters.blocks],
+        )
     }
 
     /// Number of eigenvalues below a value, by the signs of the pivots of S - λ.
@@ -49,7 +55,11 @@ impl StiffnessMatrix {
         let mut pivot = 1.0_f64;
         let mut below = 0;
         for (j, diagonal) in self.diagonal.iter().enumerate() {
-            let fill = if j == 0 { 0.0 } else { self.coupling * self.coupling / pivot };
+            let fill = if j == 0 {
+                0.0
+            } else {
+                self.coupling * self.coupling / pivot
+            };
             pivot = diagonal - value - fill;
             if pivot == 0.0 {
                 pivot = f64::MIN_POSITIVE;
@@ -62,7 +72,8 @@ impl StiffnessMatrix {
     /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m; infinite
     /// if an entry has overflowed.
     pub fn eigenvalue(&self, index: usize) -> f64 {
-        let widest = self.diagonal.iter().fold(0.0_f64, |most, d| most.max(*d)) + 2.0 * self.coupling.abs();
+        let widest =
+            self.diagonal.iter().fold(0.0_f64, |most, d| most.max(*d)) + 2.0 * self.coupling.abs();
         if !widest.is_finite() {
             return f64::INFINITY;
         }
@@ -72,14 +83,20 @@ impl StiffnessMatrix {
             if middle <= low || middle >= high {
                 return high;
             }
-            if self.eigenvalues_below(middle) > index { high = middle } else { low = middle }
+            if self.eigenvalues_below(middle) > index {
+                high = middle
+            } else {
+                low = middle
+            }
         }
     }
 }
 
 /// Largest angular frequency of the intact slider, in rad/s.
 pub fn largest_frequency(parameters: &Parameters) -> f64 {
-    (StiffnessMatrix::intact(parameters).eigenvalue(parameters.blocks - 1) / parameters.block_mass()).sqrt()
+    (StiffnessMatrix::intact(parameters).eigenvalue(parameters.blocks - 1)
+        / parameters.block_mass())
+    .sqrt()
 }
 
 /// Largest stable time step 2/ω_max of an explicit leapfrog scheme on the intact slider, in s.

@@ -61,7 +61,11 @@ impl Description {
 
     /// The allowed values with the rule beside other fields.
     pub fn requirement(&self) -> String {
-        if self.rule.is_empty() { self.allowed() } else { format!("{}, {}", self.allowed(), self.rule) }
+        if self.rule.is_empty() {
+            self.allowed()
+        } else {
+            format!("{}, {}", self.allowed(), self.rule)
+        }
     }
 }
 
@@ -73,21 +77,48 @@ pub struct Range {
 }
 
 impl Range {
-    pub const SIZE: Self = Self::new("a whole number from 1 to 100000", Included(1.0), Included(1e5));
+    pub const SIZE: Self = Self::new(
+        "a whole number from 1 to 100000",
+        Included(1.0),
+        Included(1e5),
+    );
     pub const HELD: Self = Self::new(
         "a whole number from 1 to 10000000: a job holds them in memory, 320 bytes each",
         Included(1.0),
         Included(1e7),
     );
-    pub const COUNT: Self = Self::new("a whole number from 1 to 2^53 - 1", Included(1.0), Excluded(TOO_LARGE));
-    pub const COUNT_OR_ZERO: Self = Self::new("a whole number from 0 to 2^53 - 1", Included(0.0), Excluded(TOO_LARGE));
-    pub const POSITIVE: Self = Self::new("a finite number > 0", Excluded(0.0), Excluded(f64::INFINITY));
-    pub const NOT_NEGATIVE: Self = Self::new("a finite number >= 0", Included(0.0), Excluded(f64::INFINITY));
+    pub const COUNT: Self = Self::new(
+        "a whole number from 1 to 2^53 - 1",
+        Included(1.0),
+        Excluded(TOO_LARGE),
+    );
+    pub const COUNT_OR_ZERO: Self = Self::new(
+        "a whole number from 0 to 2^53 - 1",
+        Included(0.0),
+        Excluded(TOO_LARGE),
+    );
+    pub const POSITIVE: Self = Self::new(
+        "a finite number > 0",
+        Excluded(0.0),
+        Excluded(f64::INFINITY),
+    );
+    pub const NOT_NEGATIVE: Self = Self::new(
+        "a finite number >= 0",
+        Included(0.0),
+        Excluded(f64::INFINITY),
+    );
     pub const FLAG: Self = Self::new("true or false", Unbounded, Unbounded);
-    pub const BREAK_ON: Self = Self::new("\"magnitude\" (either sign) or \"tension\"", Unbounded, Unbounded);
+    pub const BREAK_ON: Self = Self::new(
+        "\"magnitude\" (either sign) or \"tension\"",
+        Unbounded,
+        Unbounded,
+    );
 
     const fn new(words: &'static str, low: Bound<f64>, high: Bound<f64>) -> Self {
-        Self { words, ends: (low, high) }
+        Self {
+            words,
+            ends: (low, high),
+        }
     }
 }
 

@@ -145,8 +145,16 @@ impl Interface {
             upper: Row::filled(f64::INFINITY),
             lower: Row::filled(f64::NEG_INFINITY),
         };
-        let none = Contact { threshold: 0.0, stiffness: 0.0, reach: 0.0, delay: 0.0 };
-        let unborn = Lives { life: [none; LANES], generation: [0; LANES] };
+        let none = Contact {
+            threshold: 0.0,
+            stiffness: 0.0,
+            reach: 0.0,
+            delay: 0.0,
+        };
+        let unborn = Lives {
+            life: [none; LANES],
+            generation: [0; LANES],
+        };
         let mut interface = Self {
             contacts_per_block: parameters.contacts_per_block,
             rows_per_block,
@@ -154,8 +162,15 @@ impl Interface {
             disorder: Disorder::new(parameters),
             rows: vec![detached; blocks * rows_per_block],
             lives: vec![unborn; blocks * rows_per_block],
-            reattachments: Reattachments::new(blocks, parameters.contacts_per_block, parameters.reattachment_time),
-            attached: Attached { count: (blocks * parameters.contacts_per_block) as u64, offset: 0.0 },
+            reattachments: Reattachments::new(
+                blocks,
+                parameters.contacts_per_block,
+                parameters.reattachment_time,
+            ),
+            attached: Attached {
+                count: (blocks * parameters.contacts_per_block) as u64,
+                offset: 0.0,
+            },
             block_stiffness: vec![0.0; blocks],
             block_pull: vec![0.0; blocks],
             block_upper: vec![0.0; blocks],
@@ -164,8 +179,9 @@ impl Interface {
         for block in 0..blocks {
             for contact in 0..parameters.contacts_per_block {
                 let (row, lane) = interface.place(block, contact);
-                interface.lives[row].life[lane] =
-                    interface.disorder.draw(block * parameters.contacts_per_block + contact, 0);
+                interface.lives[row].life[lane] = interface
+                    .disorder
+                    .draw(block * parameters.contacts_per_block + contact, 0);
                 interface.attach(Scalar512b, block, contact, 0.0);
             }
             interface.gather(Scalar512b, block);
@@ -176,9 +192,14 @@ impl Interface {
     /// The initial attachment of every contact as events at time 0, in order.
     pub fn initial_attachments(&self) -> impl Iterator<Item = ContactEvent> {
         (0..self.block_stiffness.len())
-            .flat_map(move |block| (0..self.contacts_per_block).map(move |contact| (block, contact)))
+            .flat_map(move |block| {
+                (0..self.contacts_per_block).map(move |contact| (block, contact))
+            })
             .map(|(block, contact)| self.event(block, contact, 0.0, 0.0, Change::Attach))
-            .map(|event| ContactEvent { attached: self.attached.count, ..event })
+            .map(|event| ContactEvent {
+                attached: self.attached.count,
+                ..event
+            })
     }
 
     /// Time of the next reattachment, in s; infinite when no contact is detached.
@@ -196,7 +217,10 @@ impl Interface {
     /// Time in s and block of the next reattachment, if it is due by a time in s.
     #[inline(always)]
     pub fn next_reattachment_by(&self, time: f64) -> Option<(f64, usize)> {
-        self.reattachments.next().map(|due| (due.time(), due.block())).filter(|(due, _)| *due <= time)
+        self.reattachments
+            .next()
+            .map(|due| (due.time(), due.block()))
+            .filter(|(due, _)| *due <= time)
     }
 
     /// Time in s of the next reattachment at a block, if it is due by a time in s; else infinite.
@@ -216,15 +240,18 @@ impl Interface {
 
     /// Visits the reattachments to come, with time in s and block, in order, until told to stop.
     pub fn look_ahead(&mut self, mut visit: impl FnMut(f64, usize) -> bool) {
-        self.reattachments.look_ahead(|due| visit(due.time(), due.block()));
+        self.reattachments
+            .look_ahead(|due| visit(due.time(), due.block()));
     }
 
     /// The same with stiffness in N/m and reach in m of the life that begins.
     pub fn look_ahead_to_lives(&mut self, mut visit: impl FnMut(f64, usize, [f64; 2]) -> bool) {
         let (lives, rows_per_block) = (&self.lives, self.rows_per_block);
         self.reattachments.look_ahead(|due| {
-            let Contact { stiffness, reach, .. } =
-                lives[due.block() * rows_per_block + due.contact() / LANES].life[due.contact() % LANES];
+            let Contact {
+                stiffness, reach, ..
+            } = lives[due.block() * rows_per_block + due.contact() / LANES].life
+                [due.contact() % LANES];
             visit(due.time(), due.block(), [stiffness, reach])
         });
     }
@@ -261,7 +288,13 @@ impl Interface {
     /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
     /// passes each to `log`.
     #[inline(always)]
-    pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
+    pub fn break_reached(
+        &mut self,
+        block: usize,
+        time: f64,
+        displacement: f64,
+        mut log: impl FnMut(ContactEvent),
+    ) {
         for row in 0..self.rows_per_block {
             let mut reached = self.rows_of(block)[row].reached(Scalar512b, displacement);
             while reached != 0 {
@@ -281,7 +314,13 @@ impl Interface {
     /// Writes the contacts of a block that break up to a displacement in m, with their break positions in m, in the order
     /// in which the block comes to them.
     #[inline(always)]
-    pub(crate) fn reached<S: Simd>(&self, simd: S, block: usize, displacement: f64, contacts: &mut Vec<(f64, usize)>) {
+    pub(crate) fn reached<S: Simd>(
+        &self,
+        simd: S,
+        block: usize,
+        displacement: f64,
+        contacts: &mut Vec<(f64, usize)>,
+    ) {
         contacts.clear();
         let falls = displacement <= self.block_lower[block];
         // As many rows at a time as have a bit for each contact.
@@ -294,7 +333,11 @@ impl Interface {
                 let contact = reached.trailing_zeros() as usize;
                 reached &= reached - 1;
                 let row = &rows[contact / LANES];
-                let level = if falls { row.lower[contact % LANES] } else { row.upper[contact % LANES] };
+                let level = if falls {
+                    row.lower[contact % LANES]
+                } else {
+                    row.upper[contact % LANES]
+                };
                 // A displacement that is not finite reaches lanes beyond the last contact.
                 if level.is_finite() {
                     contacts.push((level, chunk * LANES * LANES + contact));
@@ -302,7 +345,13 @@ impl Interface {
             }
         }
         if contacts.len() > 1 {
-            contacts.sort_by(|a, b| if falls { b.0.total_cmp(&a.0) } else { a.0.total_cmp(&b.0) });
+            contacts.sort_by(|a, b| {
+                if falls {
+                    b.0.total_cmp(&a.0)
+                } else {
+                    a.0.total_cmp(&b.0)
+                }
+            });
         }
     }
 
@@ -325,7 +374,11 @@ impl Interface {
     #[inline(always)]
     pub(crate) fn counted(&mut self, event: ContactEvent) -> ContactEvent {
         self.attached.change(event.change, event.time);
-        ContactEvent { attached: self.attached.count, attached_time: self.attached.integral(event.time), ..event }
+        ContactEvent {
+            attached: self.attached.count,
+            attached_time: self.attached.integral(event.time),
+            ..event
+        }
     }
 
     /// Moves the origin by `time` s and `displacement` m.
@@ -334,7 +387,9 @@ impl Interface {
         self.attached.offset = self.attached.integral(time);
         for row in &mut self.rows {
             for positions in [&mut row.anchor, &mut row.upper, &mut row.lower] {
-                positions.iter_mut().for_each(|position| *position -= displacement);
+                positions
+                    .iter_mut()
+                    .for_each(|position| *position -= displacement);
             }
         }
         for block in 0..self.block_stiffness.len() {
@@ -351,13 +406,17 @@ impl Interface {
             })
         };
         let rows = self.rows.iter().enumerate();
-        rows.flat_map(|(i, row)| of_row(displacements[i / self.rows_per_block], row)).sum()
+        rows.flat_map(|(i, row)| of_row(displacements[i / self.rows_per_block], row))
+            .sum()
     }
 
     /// Row and lane of a contact.
     #[inline(always)]
     fn place(&self, block: usize, contact: usize) -> (usize, usize) {
-        (block * self.rows_per_block + contact / LANES, contact % LANES)
+        (
+            block * self.rows_per_block + contact / LANES,
+            contact % LANES,
+        )
     }
 
     #[inline(always)]
@@ -366,10 +425,21 @@ impl Interface {
     }
 
     #[inline(always)]
-    fn event(&self, block: usize, contact: usize, time: f64, displacement: f64, change: Change) -> ContactEvent {
+    fn event(
+        &self,
+        block: usize,
+        contact: usize,
+        time: f64,
+        displacement: f64,
+        change: Change,
+    ) -> ContactEvent {
         let (row, lane) = self.place(block, contact);
         let Lives { life, generation } = &self.lives[row];
-        let Contact { threshold, stiffness, .. } = life[lane];
+        let Contact {
+            threshold,
+            stiffness,
+            ..
+        } = life[lane];
         ContactEvent {
             time,
             block,
@@ -388,9 +458,17 @@ impl Interface {
 
     /// Begins a life of a contact. Returns the positions above and below at which it breaks.
     #[inline(always)]
-    fn attach<S: Simd>(&mut self, simd: S, block: usize, contact: usize, displacement: f64) -> [f64; 2] {
+    fn attach<S: Simd>(
+        &mut self,
+        simd: S,
+        block: usize,
+        contact: usize,
+        displacement: f64,
+    ) -> [f64; 2] {
         let (row, lane) = self.place(block, contact);
-        let Contact { stiffness, reach, .. } = self.lives[row].life[lane];
+        let Contact {
+            stiffness, reach, ..
+        } = self.lives[row].life[lane];
         let row = &mut self.rows[row];
         let levels = match self.break_on {
             BreakOn::Magnitude => [displacement + reach, displacement - reach],
@@ -412,7 +490,10 @@ impl Interface {
         simd.set(&mut row.upper, lane, f64::INFINITY);
         simd.set(&mut row.lower, lane, f64::NEG_INFINITY);
         lives.generation[lane] += 1;
-        lives.life[lane] = self.disorder.draw(block * self.contacts_per_block + contact, lives.generation[lane]);
+        lives.life[lane] = self.disorder.draw(
+            block * self.contacts_per_block + contact,
+            lives.generation[lane],
+        );
         let due = time + lives.life[lane].delay;
         self.reattachments.push(Due::new(due, block, contact));
         due
@@ -452,21 +533,50 @@ mod tests {
     #[test]
     fn a_block_breaks_what_is_reached_in_the_order_of_contacts() {
         // More contacts than are tested together.
-        let parameters =
-            Parameters { blocks: 2, contacts_per_block: 150, threshold_deviation: 0.4, ..Parameters::default() };
+        let parameters = Parameters {
+            blocks: 2,
+            contacts_per_block: 150,
+            threshold_deviation: 0.4,
+            ..Parameters::default()
+        };
         let whole = Interface::new(&parameters);
-        let reaches: Vec<f64> = (0..150).map(|contact| whole.disorder.clone().draw(150 + contact, 0).reach).collect();
+        let reaches: Vec<f64> = (0..150)
+            .map(|contact| whole.disorder.clone().draw(150 + contact, 0).reach)
+            .collect();
         for displacement in [parameters.contact_reach(), -parameters.contact_reach()] {
-            let expected: Vec<usize> = (0..150).filter(|&contact| reaches[contact] <= displacement.abs()).collect();
-            assert!(expected.len() > 50 && expected.len() < 100, "{} of 150 reached", expected.len());
+            let expected: Vec<usize> = (0..150)
+                .filter(|&contact| reaches[contact] <= displacement.abs())
+                .collect();
+            assert!(
+                expected.len() > 50 && expected.len() < 100,
+                "{} of 150 reached",
+                expected.len()
+            );
             let (mut interface, mut broken) = (whole.clone(), Vec::new());
-            interface.break_reached(1, 0.0, displacement, |event| broken.push((event.block, event.contact)));
-            assert_eq!(broken, expected.iter().map(|&contact| (1, contact)).collect::<Vec<_>>());
+            interface.break_reached(1, 0.0, displacement, |event| {
+                broken.push((event.block, event.contact))
+            });
+            assert_eq!(
+                broken,
+                expected
+                    .iter()
+                    .map(|&contact| (1, contact))
+                    .collect::<Vec<_>>()
+            );
             while interface.next_reattachment_block().is_some() {
                 let event = interface.reattach_next(0.3 * displacement);
-                let known = [interface.block_upper[event.block], interface.block_lower[event.block]];
+                let known = [
+                    interface.block_upper[event.block],
+                    interface.block_lower[event.block],
+                ];
                 interface.gather(Scalar512b, event.block);
-                assert_eq!(known, [interface.block_upper[event.block], interface.block_lower[event.block]]);
+                assert_eq!(
+                    known,
+                    [
+                        interface.block_upper[event.block],
+                        interface.block_lower[event.block]
+                    ]
+                );
             }
         }
     }

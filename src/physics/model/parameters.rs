@@ -80,7 +80,10 @@ pub struct ParameterError {
 impl Parameters {
     /// Sets one parameter. Whole reals are accepted for counts and whole numbers for reals.
     pub fn set(&mut self, symbol: Symbol, value: Value<'_>) -> Result<(), ParameterError> {
-        self.put(symbol, value).ok_or_else(|| ParameterError { symbol, value: value.to_string() })
+        self.put(symbol, value).ok_or_else(|| ParameterError {
+            symbol,
+            value: value.to_string(),
+        })
     }
 
     /// Checks every range and rule and brings the values into canonical form: without modulation there is no period, and
@@ -88,7 +91,10 @@ impl Parameters {
     pub fn validated(mut self) -> Result<Self, ParameterError> {
         for symbol in Symbol::ALL {
             let value = self.get(symbol);
-            let refuse = || ParameterError { symbol, value: value.to_string() };
+            let refuse = || ParameterError {
+                symbol,
+                value: value.to_string(),
+            };
             self.set(symbol, symbol.checked(value).ok_or_else(refuse)?)?;
         }
         self.check_rules()?;
@@ -103,17 +109,26 @@ impl Parameters {
         let is_modulated = self.modulation_amplitude > 0.0;
         let can_ramp = is_modulated && self.ramp_time > 0.0;
         let rules = [
-            (Symbol::Ns, self.blocks * self.contacts_per_block <= MAX_CONTACTS),
+            (
+                Symbol::Ns,
+                self.blocks * self.contacts_per_block <= MAX_CONTACTS,
+            ),
             (Symbol::Dfs, self.threshold_deviation <= self.mean_threshold),
             (Symbol::V0, typical_interval(self) <= MAX_INTERVAL),
             (Symbol::T, self.modulation_period.is_some() || !is_modulated),
             (Symbol::TTo, self.turning_period.is_none() || can_ramp),
-            (Symbol::DeltaTo, self.turning_amplitude.is_none() || can_ramp),
+            (
+                Symbol::DeltaTo,
+                self.turning_amplitude.is_none() || can_ramp,
+            ),
             (Symbol::RampTime, self.ramp_time <= self.max_ramp_time()),
         ];
         match rules.into_iter().find(|(_, holds)| !holds) {
             None => Ok(()),
-            Some((symbol, _)) => Err(ParameterError { symbol, value: self.get(symbol).to_string() }),
+            Some((symbol, _)) => Err(ParameterError {
+                symbol,
+                value: self.get(symbol).to_string(),
+            }),
         }
     }
 
@@ -122,8 +137,10 @@ impl Parameters {
         if self.turning_period.is_none() && self.turning_amplitude.is_none() {
             return 0.0;
         }
-        let shortest =
-            [self.modulation_period, self.turning_period].into_iter().flatten().fold(f64::INFINITY, f64::min);
+        let shortest = [self.modulation_period, self.turning_period]
+            .into_iter()
+            .flatten()
+            .fold(f64::INFINITY, f64::min);
         (MAX_RAMPED_PERIODS * shortest).min(f64::MAX)
     }
 
@@ -154,18 +171,28 @@ impl Parameters {
 
     /// The largest angular frequency of the modulation on its ramp, in rad/s; 0 when it is off.
     pub fn largest_modulation_frequency(&self) -> f64 {
-        self.turning_period.map_or(0.0, |period| TAU / period).max(self.modulation_frequency())
+        self.turning_period
+            .map_or(0.0, |period| TAU / period)
+            .max(self.modulation_frequency())
     }
 
     /// The frequency of the modulation in Hz as people write it: its period is the reciprocal to the last bit, and the
     /// reciprocal of that to twelve digits is what they wrote. `None` without modulation.
     pub fn frequency(&self) -> Option<f64> {
-        self.modulation_period.map(|period| format!("{:.11e}", 1.0 / period).parse().unwrap_or(1.0 / period))
+        self.modulation_period.map(|period| {
+            format!("{:.11e}", 1.0 / period)
+                .parse()
+                .unwrap_or(1.0 / period)
+        })
     }
 
     /// η of the modulation, see [`eta`](super::theory::eta).
     pub fn eta(&self) -> f64 {
-        eta(self.modulation_frequency(), self.modulation_amplitude, self.drive_velocity)
+        eta(
+            self.modulation_frequency(),
+            self.modulation_amplitude,
+            self.drive_velocity,
+        )
     }
 
     /// The same without modulation, in canonical form.
@@ -184,7 +211,8 @@ impl Parameters {
     /// period 2π sqrt(m/(`K_s` + `K_d`)).
     pub fn wave_crossing_time(&self) -> f64 {
         if self.blocks == 1 {
-            TAU * (self.block_mass() / (self.block_contact_stiffness() + self.drive_stiffness)).sqrt()
+            TAU * (self.block_mass() / (self.block_contact_stiffness() + self.drive_stiffness))
+                .sqrt()
         } else {
             self.blocks as f64 * (self.block_mass() / self.coupling_stiffness()).sqrt()
         }
@@ -212,7 +240,11 @@ mod tests {
             ramp_time: 4.0,
             ..Parameters::default()
         };
-        let mut copy = Parameters { seed: 9, blocks: 3, ..Parameters::default() };
+        let mut copy = Parameters {
+            seed: 9,
+            blocks: 3,
+            ..Parameters::default()
+        };
         for symbol in Symbol::ALL {
             copy.set(symbol, original.get(symbol)).unwrap();
         }
@@ -228,12 +260,22 @@ mod tests {
                 Ok(()) => parameters.validated().expect_err("must be refused").symbol,
             }
         };
-        for symbol in Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::BreakOn) {
+        for symbol in Symbol::ALL
+            .into_iter()
+            .filter(|&symbol| symbol != Symbol::BreakOn)
+        {
             for value in [f64::NAN, f64::INFINITY, -1.0] {
                 assert_eq!(refused(symbol, value), symbol, "{symbol:?} = {value}");
             }
         }
-        for symbol in [Symbol::N, Symbol::Ns, Symbol::M, Symbol::V0, Symbol::T, Symbol::TauR] {
+        for symbol in [
+            Symbol::N,
+            Symbol::Ns,
+            Symbol::M,
+            Symbol::V0,
+            Symbol::T,
+            Symbol::TauR,
+        ] {
             assert_eq!(refused(symbol, 0.0), symbol);
         }
         assert_eq!(refused(Symbol::N, 1.5), Symbol::N);
@@ -255,20 +297,69 @@ mod tests {
             ramp_time: 10.0,
             ..Parameters::default()
         };
-        let refused = |parameters: Parameters| parameters.validated().expect_err("must be refused").symbol;
+        let refused =
+            |parameters: Parameters| parameters.validated().expect_err("must be refused").symbol;
         assert_eq!(ramp.clone().validated().unwrap(), ramp);
-        assert_eq!(refused(Parameters { modulation_amplitude: 0.0, ..ramp.clone() }), Symbol::TTo);
-        assert_eq!(refused(Parameters { ramp_time: 0.0, ..ramp.clone() }), Symbol::TTo);
-        assert_eq!(refused(Parameters { turning_period: None, ramp_time: 0.0, ..ramp.clone() }), Symbol::DeltaTo);
-        assert_eq!(refused(Parameters { turning_period: Some(0.0), ..ramp.clone() }), Symbol::TTo);
-        assert_eq!(refused(Parameters { turning_period: Some(0.9e-8), ..ramp.clone() }), Symbol::RampTime);
-        assert_eq!(refused(Parameters { turning_period: None, turning_amplitude: None, ..ramp }), Symbol::RampTime);
+        assert_eq!(
+            refused(Parameters {
+                modulation_amplitude: 0.0,
+                ..ramp.clone()
+            }),
+            Symbol::TTo
+        );
+        assert_eq!(
+            refused(Parameters {
+                ramp_time: 0.0,
+                ..ramp.clone()
+            }),
+            Symbol::TTo
+        );
+        assert_eq!(
+            refused(Parameters {
+                turning_period: None,
+                ramp_time: 0.0,
+                ..ramp.clone()
+            }),
+            Symbol::DeltaTo
+        );
+        assert_eq!(
+            refused(Parameters {
+                turning_period: Some(0.0),
+                ..ramp.clone()
+            }),
+            Symbol::TTo
+        );
+        assert_eq!(
+            refused(Parameters {
+                turning_period: Some(0.9e-8),
+                ..ramp.clone()
+            }),
+            Symbol::RampTime
+        );
+        assert_eq!(
+            refused(Parameters {
+                turning_period: None,
+                turning_amplitude: None,
+                ..ramp
+            }),
+            Symbol::RampTime
+        );
     }
 
     #[test]
     fn without_modulation_the_period_is_irrelevant() {
-        let with = Parameters { modulation_period: Some(0.5), ..Parameters::default() }.validated().unwrap();
-        let minus_zero = Parameters { modulation_amplitude: -0.0, ..Parameters::default() }.validated().unwrap();
+        let with = Parameters {
+            modulation_period: Some(0.5),
+            ..Parameters::default()
+        }
+        .validated()
+        .unwrap();
+        let minus_zero = Parameters {
+            modulation_amplitude: -0.0,
+            ..Parameters::default()
+        }
+        .validated()
+        .unwrap();
         assert_eq!(with, Parameters::default());
         assert_eq!(minus_zero.modulation_amplitude.to_bits(), 0);
     }

@@ -23,7 +23,11 @@ pub(super) struct Due {
 impl Due {
     #[expect(clippy::cast_possible_truncation, reason = "at most 1e7 contacts")]
     pub fn new(time: f64, block: usize, contact: usize) -> Self {
-        Self { time: time.to_bits(), block: block as u32, contact: contact as u32 }
+        Self {
+            time: time.to_bits(),
+            block: block as u32,
+            contact: contact as u32,
+        }
     }
 
     pub fn time(self) -> f64 {
@@ -111,7 +115,11 @@ impl Reattachments {
     /// Visits them in order until told to stop.
     pub fn look_ahead(&mut self, mut visit: impl FnMut(Due) -> bool) {
         let mut sorted = std::mem::take(&mut self.work_space);
-        let mut goes_on = self.next.into_iter().chain(self.present.iter().rev().copied()).all(&mut visit);
+        let mut goes_on = self
+            .next
+            .into_iter()
+            .chain(self.present.iter().rev().copied())
+            .all(&mut visit);
         let mut ahead = 1;
         while goes_on && let Some(found) = self.occupied_from(ahead) {
             sorted.clear();
@@ -146,27 +154,45 @@ impl Reattachments {
     /// What a bin holds, in no order.
     fn list(&self, bin: usize) -> impl Iterator<Item = Due> {
         let contact = |contact: u32| (contact != NONE).then_some(contact as usize);
-        std::iter::successors(contact(self.first[bin]), move |&last| contact(self.after[last])).map(|at| self.due[at])
+        std::iter::successors(contact(self.first[bin]), move |&last| {
+            contact(self.after[last])
+        })
+        .map(|at| self.due[at])
     }
 
     /// Moves the origin of time: subtracts `shift` s from every one.
     pub fn shift(&mut self, shift: f64) {
-        let mut all: Vec<Due> = self.next.take().into_iter().chain(self.present.drain(..)).collect();
+        let mut all: Vec<Due> = self
+            .next
+            .take()
+            .into_iter()
+            .chain(self.present.drain(..))
+            .collect();
         all.append(&mut self.beyond);
         for word in 0..BINS / BITS {
             while self.occupied[word] != 0 {
-                self.empty(word * BITS + self.occupied[word].trailing_zeros() as usize, |due| all.push(due));
+                self.empty(
+                    word * BITS + self.occupied[word].trailing_zeros() as usize,
+                    |due| all.push(due),
+                );
             }
         }
         self.present_bin = 0;
         for due in all {
             // Not negative, whatever rounding does; see `Due`.
-            self.push(Due { time: (due.time() - shift).max(0.0).to_bits(), ..due });
+            self.push(Due {
+                time: (due.time() - shift).max(0.0).to_bits(),
+                ..due
+            });
         }
     }
 
     /// Number of the bin of a time.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative; saturates far ahead")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "not negative; saturates far ahead"
+    )]
     fn bin(&self, due: Due) -> u64 {
         (due.time() * self.bins_per_second) as u64
     }
@@ -179,7 +205,10 @@ impl Reattachments {
             let place = self.present.partition_point(|other| *other > due);
             self.present.insert(place, due);
         } else if bin - self.present_bin < BINS as u64 {
-            let (bin, contact) = (place_of(bin), due.block() * self.contacts_per_block + due.contact());
+            let (bin, contact) = (
+                place_of(bin),
+                due.block() * self.contacts_per_block + due.contact(),
+            );
             self.due[contact] = due;
             self.after[contact] = self.first[bin];
             #[expect(clippy::cast_possible_truncation, reason = "at most 1e7 contacts")]
@@ -200,7 +229,12 @@ impl Reattachments {
         if !self.beyond.is_empty() {
             // Nothing may stay aside that now lies within the turn.
             if present.is_empty() {
-                self.present_bin = self.beyond.iter().map(|due| self.bin(*due)).min().unwrap_or(0);
+                self.present_bin = self
+                    .beyond
+                    .iter()
+                    .map(|due| self.bin(*due))
+                    .min()
+                    .unwrap_or(0);
             }
             self.present = present;
             for due in std::mem::take(&mut self.beyond) {

@@ -22,7 +22,10 @@ pub struct Selected<S> {
 impl<S> Selected<S> {
     /// The columns of these parameters.
     pub const fn new(parameters: Parameters) -> Self {
-        Self { parameters, selection: PhantomData }
+        Self {
+            parameters,
+            selection: PhantomData,
+        }
     }
 }
 
@@ -37,8 +40,21 @@ impl<S> Deref for Selected<S> {
 impl<S: Selection> Row for Selected<S> {
     fn columns() -> Vec<Column> {
         let column = |symbol: &Symbol| {
-            let Description { key, unit, meaning, kind, nullable, .. } = symbol.description();
-            Column { name: key.into(), unit, meaning, kind, nullable }
+            let Description {
+                key,
+                unit,
+                meaning,
+                kind,
+                nullable,
+                ..
+            } = symbol.description();
+            Column {
+                name: key.into(),
+                unit,
+                meaning,
+                kind,
+                nullable,
+            }
         };
         S::SYMBOLS.iter().map(column).collect()
     }
@@ -56,8 +72,13 @@ impl<S: Selection> FromRow for Selected<S> {
     fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         let mut parameters = Parameters::default();
         for &symbol in S::SYMBOLS {
-            parameters.set(symbol, next()).map_err(|error| error.to_string())?;
+            parameters
+                .set(symbol, next())
+                .map_err(|error| error.to_string())?;
         }
-        parameters.validated().map(Self::new).map_err(|error| error.to_string())
+        parameters
+            .validated()
+            .map(Self::new)
+            .map_err(|error| error.to_string())
     }
 }

@@ -155,7 +155,11 @@ impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
 
     #[inline(always)]
     fn with(mut self, lane: usize, value: f64) -> Self {
-        let (simd, chosen, value) = (self.0, self.0.splat_f64s(lane as f64), self.0.splat_f64s(value));
+        let (simd, chosen, value) = (
+            self.0,
+            self.0.splat_f64s(lane as f64),
+            self.0.splat_f64s(value),
+        );
         let numbers = Self::load(simd, &NUMBERS);
         for k in 0..K {
             self.1[k] = simd.select_f64s(simd.equal_f64s(numbers.1[k], chosen), value, self.1[k]);
@@ -191,20 +195,25 @@ impl Simd for Baseline {
 impl Registers<1> for Baseline {
     #[inline(always)]
     fn reaches(self, [left]: [Self::f64s; 1], [right]: [Self::f64s; 1]) -> u8 {
-        let (left, right): ([f64; LANES], [f64; LANES]) = (bytemuck::cast(left), bytemuck::cast(right));
+        let (left, right): ([f64; LANES], [f64; LANES]) =
+            (bytemuck::cast(left), bytemuck::cast(right));
         (0..LANES).fold(0, |bits, l| bits | (u8::from(left[l] >= right[l]) << l))
     }
 
     #[inline(always)]
     fn to_next_lane(self, registers: [Self::f64s; 1]) -> [Self::f64s; 1] {
         let lanes: [f64; LANES] = bytemuck::cast(registers);
-        bytemuck::cast(array::from_fn::<_, LANES, _>(|l| if l > 0 { lanes[l - 1] } else { 0.0 }))
+        bytemuck::cast(array::from_fn::<_, LANES, _>(|l| {
+            if l > 0 { lanes[l - 1] } else { 0.0 }
+        }))
     }
 
     #[inline(always)]
     fn to_lane_before(self, registers: [Self::f64s; 1]) -> [Self::f64s; 1] {
         let lanes: [f64; LANES] = bytemuck::cast(registers);
-        bytemuck::cast(array::from_fn::<_, LANES, _>(|l| if l + 1 < LANES { lanes[l + 1] } else { 0.0 }))
+        bytemuck::cast(array::from_fn::<_, LANES, _>(|l| {
+            if l + 1 < LANES { lanes[l + 1] } else { 0.0 }
+        }))
     }
 }
 
@@ -220,9 +229,16 @@ mod x86 {
 
     impl Registers<2> for Avx2 {
         #[inline(always)]
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "four bits each")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "four bits each"
+        )]
         fn reaches(self, left: [Self::f64s; 2], right: [Self::f64s; 2]) -> u8 {
-            let bits = |k: usize| self.avx._mm256_movemask_pd(cast!(self.cmp_ge_f64x4(left[k], right[k])));
+            let bits = |k: usize| {
+                self.avx
+                    ._mm256_movemask_pd(cast!(self.cmp_ge_f64x4(left[k], right[k])))
+            };
             (bits(0) | (bits(1) << 4)) as u8
         }
 
@@ -260,12 +276,18 @@ mod x86 {
 
         #[inline(always)]
         fn to_next_lane(self, [register]: [Self::f64s; 1]) -> [Self::f64s; 1] {
-            [cast!(self.avx512f._mm512_alignr_epi64::<7>(cast!(register), self.avx512f._mm512_setzero_si512()))]
+            [cast!(self.avx512f._mm512_alignr_epi64::<7>(
+                cast!(register),
+                self.avx512f._mm512_setzero_si512()
+            ))]
         }
 
         #[inline(always)]
         fn to_lane_before(self, [register]: [Self::f64s; 1]) -> [Self::f64s; 1] {
-            [cast!(self.avx512f._mm512_alignr_epi64::<1>(self.avx512f._mm512_setzero_si512(), cast!(register)))]
+            [cast!(self.avx512f._mm512_alignr_epi64::<1>(
+                self.avx512f._mm512_setzero_si512(),
+                cast!(register)
+            ))]
         }
     }
 }

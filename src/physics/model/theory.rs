@@ -30,7 +30,11 @@ pub fn minimum_phase(eta: f64) -> Option<f64> {
         if middle <= low || middle >= high {
             return Some(high);
         }
-        if middle + eta * libm::cos(middle) < target { low = middle } else { high = middle }
+        if middle + eta * libm::cos(middle) < target {
+            low = middle
+        } else {
+            high = middle
+        }
     }
 }
 
@@ -43,11 +47,14 @@ pub fn minimum_phase_asymptote(eta: f64) -> f64 {
 /// the null model of locking. The load φ + η cos φ grows with the rate 1 - η sin φ, which so is the density of φ: for
 /// η >= 1 from φ_min to `Φ_max`, where the load exceeds its preceding maximum, and else on the whole circle.
 pub fn random_load_mean(eta: f64) -> [f64; 2] {
-    let Some((low, high)) = minimum_phase(eta).zip(load_maximum_phase(eta)) else { return [0.0, -0.5 * eta] };
+    let Some((low, high)) = minimum_phase(eta).zip(load_maximum_phase(eta)) else {
+        return [0.0, -0.5 * eta];
+    };
     let between = |integral: &dyn Fn(f64) -> f64| integral(high) - integral(low);
     let load = between(&|phase| phase + eta * libm::cos(phase));
     let real = between(&|phase| libm::sin(phase) * (1.0 - 0.5 * eta * libm::sin(phase)));
-    let imaginary = between(&|phase| -libm::cos(phase) - 0.25 * eta * (2.0 * phase - libm::sin(2.0 * phase)));
+    let imaginary =
+        between(&|phase| -libm::cos(phase) - 0.25 * eta * (2.0 * phase - libm::sin(2.0 * phase)));
     [real / load, imaginary / load]
 }
 
@@ -86,10 +93,12 @@ const LOADED_SHARE: f64 = 0.2125;
 pub fn typical_interval(parameters: &Parameters) -> f64 {
     let contacts = parameters.block_contact_stiffness();
     // Stiffness at the end of an endless chain, exact also for one block; a short chain moves as one.
-    let endless = 0.5 * contacts + (contacts * (parameters.coupling_stiffness() + 0.25 * contacts)).sqrt();
+    let endless =
+        0.5 * contacts + (contacts * (parameters.coupling_stiffness() + 0.25 * contacts)).sqrt();
     let slider = endless.min(contacts * parameters.blocks as f64);
     let stiffness = 1.0 / (1.0 / parameters.drive_stiffness + 1.0 / slider);
-    let loading = LOADED_SHARE * total_strength(parameters) / (stiffness * parameters.drive_velocity);
+    let loading =
+        LOADED_SHARE * total_strength(parameters) / (stiffness * parameters.drive_velocity);
     loading + parameters.reattachment_time
 }
 
@@ -102,14 +111,19 @@ mod tests {
     fn slips_at_random_loads_have_the_mean_of_their_density() {
         // Known: 0.581, 0.816 and 0.918.
         for eta in [0.3, 0.9, 1.18, 2.4, 4.9, 60.0] {
-            let (low, high) = minimum_phase(eta).zip(load_maximum_phase(eta)).unwrap_or((-PI, PI));
+            let (low, high) = minimum_phase(eta)
+                .zip(load_maximum_phase(eta))
+                .unwrap_or((-PI, PI));
             let steps = 100_000;
             let (mut weight, mut sum) = (0.0, [0.0; 2]);
             for step in 0..steps {
                 let phase = low + (f64::from(step) + 0.5) / f64::from(steps) * (high - low);
                 let density = 1.0 - eta * libm::sin(phase);
                 weight += density;
-                sum = [sum[0] + density * libm::cos(phase), sum[1] + density * libm::sin(phase)];
+                sum = [
+                    sum[0] + density * libm::cos(phase),
+                    sum[1] + density * libm::sin(phase),
+                ];
             }
             let [real, imaginary] = random_load_mean(eta);
             let apart = (real - sum[0] / weight).hypot(imaginary - sum[1] / weight);
@@ -130,11 +144,18 @@ mod tests {
         assert!((finite_resultant(0.0, 100) - 0.088_623).abs() < 1e-6);
         // Known: n = 10, 15, 30 at eta = 0.2.
         for (count, excess) in [(10, 0.19), (15, 0.14), (30, 0.08)] {
-            assert!((finite_resultant(0.1, count) - 0.1 - excess).abs() < 0.006, "{count}");
+            assert!(
+                (finite_resultant(0.1, count) - 0.1 - excess).abs() < 0.006,
+                "{count}"
+            );
         }
-        assert_eq!((finite_resultant(1.0, 7), finite_resultant(0.5, u64::MAX)), (1.0, 0.5));
+        assert_eq!(
+            (finite_resultant(1.0, 7), finite_resultant(0.5, u64::MAX)),
+            (1.0, 0.5)
+        );
         // The two forms meet.
-        let [below, above] = [2999, 3001].map(|count: u64| count as f64 * (finite_resultant(0.5, count) - 0.5));
+        let [below, above] =
+            [2999, 3001].map(|count: u64| count as f64 * (finite_resultant(0.5, count) - 0.5));
         assert!((below / above - 1.0).abs() < 2e-3, "{below} {above}");
     }
 
@@ -147,14 +168,25 @@ mod tests {
     #[test]
     fn the_stiffness_behind_the_interval_is_that_of_the_chain() {
         for (blocks, tolerance) in [(1, 1e-12), (70, 1e-6)] {
-            let parameters = Parameters { blocks, reattachment_time: 1e-300, ..Parameters::default() };
+            let parameters = Parameters {
+                blocks,
+                reattachment_time: 1e-300,
+                ..Parameters::default()
+            };
             let rate = LOADED_SHARE * total_strength(&parameters) / typical_interval(&parameters);
             let predicted = rate / parameters.drive_velocity;
-            let StiffnessMatrix { diagonal, coupling, .. } = StiffnessMatrix::intact(&parameters);
-            let end = diagonal.iter().rev().fold(f64::INFINITY, |pivot, entry| entry - coupling * coupling / pivot);
+            let StiffnessMatrix {
+                diagonal, coupling, ..
+            } = StiffnessMatrix::intact(&parameters);
+            let end = diagonal.iter().rev().fold(f64::INFINITY, |pivot, entry| {
+                entry - coupling * coupling / pivot
+            });
             let chain = end - parameters.drive_stiffness;
             let exact = 1.0 / (1.0 / chain + 1.0 / parameters.drive_stiffness);
-            assert!((predicted / exact - 1.0).abs() < tolerance, "{blocks} blocks: {predicted} against {exact}");
+            assert!(
+                (predicted / exact - 1.0).abs() < tolerance,
+                "{blocks} blocks: {predicted} against {exact}"
+            );
         }
     }
 }

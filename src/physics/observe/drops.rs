@@ -51,8 +51,18 @@ pub(super) struct DropDetector {
 impl DropDetector {
     /// Finds drops of at least `least` newtons.
     pub(super) fn new(parameters: &Parameters, least: f64) -> Self {
-        let top = Instant { time: 0.0, force: 0.0, driven: 0.0 };
-        Self { drive: Drive::new(parameters), least, top, bottom: None, drops: Vec::new() }
+        let top = Instant {
+            time: 0.0,
+            force: 0.0,
+            driven: 0.0,
+        };
+        Self {
+            drive: Drive::new(parameters),
+            least,
+            top,
+            bottom: None,
+            drops: Vec::new(),
+        }
     }
 
     pub(super) fn advance(&mut self, segment: &Segment<'_>) {
@@ -71,7 +81,11 @@ impl DropDetector {
     /// Follows a force that does not turn in between.
     fn follow(&mut self, time: f64, force: f64) {
         self.drive.advance_to(time);
-        let now = Instant { time, force, driven: self.drive.motion(time).0 };
+        let now = Instant {
+            time,
+            force,
+            driven: self.drive.motion(time).0,
+        };
         match &mut self.bottom {
             None if now.force >= self.top.force => self.top = now,
             None if now.force <= self.top.force - self.least => self.bottom = Some(now),
@@ -89,20 +103,31 @@ impl DropDetector {
     fn drop_to(&self, bottom: Instant) -> Option<Drop> {
         let by_drive = self.drive.stiffness * (self.top.driven - bottom.driven).max(0.0);
         let size = self.top.force - bottom.force - by_drive;
-        (size >= self.least).then_some(Drop { start: self.top.time, end: bottom.time, size })
+        (size >= self.least).then_some(Drop {
+            start: self.top.time,
+            end: bottom.time,
+            size,
+        })
     }
 
     /// The drops of slips, given the first and last break of each in order of time. A fall that is under way at the end
     /// counts as far as it went.
     pub(super) fn of_slips(mut self, slips: &[(f64, f64)]) -> Vec<Drops> {
-        self.drops.extend(self.bottom.and_then(|bottom| self.drop_to(bottom)));
+        self.drops
+            .extend(self.bottom.and_then(|bottom| self.drop_to(bottom)));
         let largest = |drops: &[Drop]| drops.iter().map(|drop| drop.size).max_by(f64::total_cmp);
         let mut drops = &self.drops[..];
         let of_slip = |&(first_break, last_break): &(f64, f64)| {
-            let (before, others) = drops.split_at(drops.partition_point(|drop| drop.end < first_break));
-            let (during, later) = others.split_at(others.partition_point(|drop| drop.start <= last_break));
+            let (before, others) =
+                drops.split_at(drops.partition_point(|drop| drop.end < first_break));
+            let (during, later) =
+                others.split_at(others.partition_point(|drop| drop.start <= last_break));
             drops = later;
-            Drops { before: Some(before.len() as u64), largest_before: largest(before), during: largest(during) }
+            Drops {
+                before: Some(before.len() as u64),
+                largest_before: largest(before),
+                during: largest(during),
+            }
         };
         slips.iter().map(of_slip).collect()
     }
@@ -116,10 +141,19 @@ mod tests {
 
     /// The drops of slips when the force runs straight from one value to the next, one every millisecond.
     fn drops(least: f64, forces: &[f64], slips: &[(f64, f64)]) -> Vec<Drops> {
-        let mut detector =
-            DropDetector::new(&Parameters { drive_velocity: CONSTANT_DRIVE, ..Parameters::default() }, least);
+        let mut detector = DropDetector::new(
+            &Parameters {
+                drive_velocity: CONSTANT_DRIVE,
+                ..Parameters::default()
+            },
+            least,
+        );
         for (index, pair) in forces.windows(2).enumerate() {
-            detector.advance(&Segment::polynomial(1e-3 * index as f64, 1e-3, &[pair[0], pair[1] - pair[0]]));
+            detector.advance(&Segment::polynomial(
+                1e-3 * index as f64,
+                1e-3,
+                &[pair[0], pair[1] - pair[0]],
+            ));
         }
         detector.of_slips(slips)
     }
@@ -127,27 +161,57 @@ mod tests {
     #[test]
     fn a_fall_counts_from_the_top_to_the_bottom_and_smaller_rises_do_not_cut_it() {
         let forces = [0.0, 100.0, 60.0, 64.0, 20.0, 80.0];
-        let whole = Drops { before: Some(0), largest_before: None, during: Some(80.0) };
+        let whole = Drops {
+            before: Some(0),
+            largest_before: None,
+            during: Some(80.0),
+        };
         assert_eq!(drops(10.0, &forces, &[(2e-3, 3e-3)]), [whole]);
         // With a least drop of 4 N the rise by 4 N cuts it.
-        let cut = Drops { before: Some(1), largest_before: Some(40.0), during: Some(44.0) };
+        let cut = Drops {
+            before: Some(1),
+            largest_before: Some(40.0),
+            during: Some(44.0),
+        };
         assert_eq!(drops(4.0, &forces, &[(3.5e-3, 4e-3)]), [cut]);
-        assert_eq!(drops(80.1, &forces, &[(2e-3, 3e-3)]), [Drops { during: None, ..whole }]);
+        assert_eq!(
+            drops(80.1, &forces, &[(2e-3, 3e-3)]),
+            [Drops {
+                during: None,
+                ..whole
+            }]
+        );
     }
 
     #[test]
     fn each_drop_belongs_to_one_slip_and_a_fall_under_way_at_the_end_counts() {
         // Drops of 5, 50, 7, 6 and 60 N, the second and the last during slips.
-        let forces = [0.0, 20.0, 15.0, 60.0, 10.0, 30.0, 23.0, 40.0, 34.0, 70.0, 10.0];
-        let first = Drops { before: Some(1), largest_before: Some(5.0), during: Some(50.0) };
-        let second = Drops { before: Some(2), largest_before: Some(7.0), during: Some(60.0) };
-        assert_eq!(drops(5.0, &forces, &[(3.1e-3, 4.2e-3), (9.2e-3, 9.9e-3)]), [first, second]);
+        let forces = [
+            0.0, 20.0, 15.0, 60.0, 10.0, 30.0, 23.0, 40.0, 34.0, 70.0, 10.0,
+        ];
+        let first = Drops {
+            before: Some(1),
+            largest_before: Some(5.0),
+            during: Some(50.0),
+        };
+        let second = Drops {
+            before: Some(2),
+            largest_before: Some(7.0),
+            during: Some(60.0),
+        };
+        assert_eq!(
+            drops(5.0, &forces, &[(3.1e-3, 4.2e-3), (9.2e-3, 9.9e-3)]),
+            [first, second]
+        );
     }
 
     #[test]
     fn the_swing_of_the_drive_is_no_drop_and_a_fall_beyond_it_is_one() {
-        let parameters =
-            Parameters { modulation_amplitude: 1e-6, modulation_period: Some(0.02), ..Parameters::default() };
+        let parameters = Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(0.02),
+            ..Parameters::default()
+        };
         let drive = Drive::new(&parameters);
         let (stiffness, amplitude) = (drive.stiffness, drive.amplitude);
         let swing = |start: f64, duration: f64, slid: f64| Segment {
@@ -165,8 +229,13 @@ mod tests {
         let mut detector = DropDetector::new(&parameters, 5.0);
         detector.advance(&swing(0.0, 0.065, 0.0));
         detector.advance(&swing(0.065, 0.06, 3e-7));
-        let [drops] = detector.of_slips(&[(1.0, 1.0)])[..] else { panic!("one slip") };
+        let [drops] = detector.of_slips(&[(1.0, 1.0)])[..] else {
+            panic!("one slip")
+        };
         assert_eq!((drops.before, drops.during), (Some(1), None));
-        assert!((drops.largest_before.unwrap() - 12.0).abs() < 1e-9, "{drops:?}");
+        assert!(
+            (drops.largest_before.unwrap() - 12.0).abs() < 1e-9,
+            "{drops:?}"
+        );
     }
 }

@@ -29,12 +29,21 @@ impl Measurements {
         let (averages, running_interval) = (observer.averages(), observer.running_interval());
         let (ruptures, has_given_up) = (observer.ruptures, observer.has_given_up);
         let (slips, precursors) = observer.into_rows();
-        Self { slips, precursors, ruptures, averages, running_interval, has_given_up, summary }
+        Self {
+            slips,
+            precursors,
+            ruptures,
+            averages,
+            running_interval,
+            has_given_up,
+            summary,
+        }
     }
 
     /// How the slider moved; `None` without averages.
     pub fn regime(&self) -> Option<Regime> {
-        self.averages.map(|averages| Regime::at(averages.slip_share))
+        self.averages
+            .map(|averages| Regime::at(averages.slip_share))
     }
 }
 
@@ -58,6 +67,10 @@ pub fn measure(
 impl Recording {
     /// The bounds that a recording sets on a simulation.
     pub fn limits<'a>(&self, interrupt: &'a AtomicBool) -> Limits<'a> {
-        Limits { end_time: self.max_time.unwrap_or(f64::INFINITY), events: self.max_events, interrupt: Some(interrupt) }
+        Limits {
+            end_time: self.max_time.unwrap_or(f64::INFINITY),
+            events: self.max_events,
+            interrupt: Some(interrupt),
+        }
     }
 }

@@ -15,7 +15,9 @@ pub use drops::Drops;
 pub use measure::{Measurements, measure};
 pub use phase::{OVERSHOOT, phase};
 pub use recording::{Recording, RecordingKey};
-pub use records::{AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow};
+pub use records::{
+    AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow,
+};
 pub use regime::{Averages, Regime};
 pub use rupture::{Rupture, advance_speed};
 pub use slip::{Energies, Modulation, Precursor, Slip, SlipObserver};

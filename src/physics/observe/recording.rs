@@ -51,7 +51,12 @@ impl Recording {
     pub fn left_out(&self) -> Vec<Cow<'static, str>> {
         let energies = (!self.energies).then(Energies::columns);
         let drops = self.drop_size.is_none().then(Drops::columns);
-        energies.into_iter().chain(drops).flatten().map(|column| column.name).collect()
+        energies
+            .into_iter()
+            .chain(drops)
+            .flatten()
+            .map(|column| column.name)
+            .collect()
     }
 }
 

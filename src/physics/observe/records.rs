@@ -13,12 +13,16 @@ pub struct Observers<'a> {
 impl Observer for Observers<'_> {
     fn advance(&mut self, segment: &Segment<'_>) {
         self.lead.advance(segment);
-        self.others.iter_mut().for_each(|other| other.advance(segment));
+        self.others
+            .iter_mut()
+            .for_each(|other| other.advance(segment));
     }
 
     fn contact(&mut self, event: &ContactEvent) {
         self.lead.contact(event);
-        self.others.iter_mut().for_each(|other| other.contact(event));
+        self.others
+            .iter_mut()
+            .for_each(|other| other.contact(event));
     }
 
     fn spent(&mut self, spent: Spent) {
@@ -27,7 +31,8 @@ impl Observer for Observers<'_> {
     }
 
     fn follows_attachments(&self) -> bool {
-        self.lead.follows_attachments() || self.others.iter().any(|other| other.follows_attachments())
+        self.lead.follows_attachments()
+            || self.others.iter().any(|other| other.follows_attachments())
     }
 
     fn follows_force(&self) -> bool {
@@ -40,7 +45,9 @@ impl Observer for Observers<'_> {
 
     fn end(&mut self, time: f64, displacement: &[f64]) {
         self.lead.end(time, displacement);
-        self.others.iter_mut().for_each(|other| other.end(time, displacement));
+        self.others
+            .iter_mut()
+            .for_each(|other| other.end(time, displacement));
     }
 }
 
@@ -85,7 +92,13 @@ impl Trace {
     pub fn new(parameters: &Parameters, spacing: f64) -> Self {
         let contacts = (parameters.blocks * parameters.contacts_per_block) as f64;
         let drive = Drive::new(parameters);
-        Self { drive, contacts, attached: 0, sampling: Sampling { spacing, next: 0 }, rows: Vec::new() }
+        Self {
+            drive,
+            contacts,
+            attached: 0,
+            sampling: Sampling { spacing, next: 0 },
+            rows: Vec::new(),
+        }
     }
 }
 
@@ -142,11 +155,15 @@ impl AttachedMap {
 impl Observer for AttachedMap {
     fn advance(&mut self, segment: &Segment<'_>) {
         while let Some(time) = self.sampling.within(segment) {
-            let cells = self.attached.iter().zip(1..).map(|(&attached, block)| MapRow {
-                time,
-                block,
-                attached_fraction: f64::from(attached) / self.contacts_per_block,
-            });
+            let cells = self
+                .attached
+                .iter()
+                .zip(1..)
+                .map(|(&attached, block)| MapRow {
+                    time,
+                    block,
+                    attached_fraction: f64::from(attached) / self.contacts_per_block,
+                });
             self.rows.extend(cells);
         }
     }
@@ -180,7 +197,10 @@ pub struct Profile {
 
 impl Profile {
     pub fn new(parameters: &Parameters) -> Self {
-        Self { spacing: parameters.slider_length / parameters.blocks as f64, rows: Vec::new() }
+        Self {
+            spacing: parameters.slider_length / parameters.blocks as f64,
+            rows: Vec::new(),
+        }
     }
 }
 
@@ -217,7 +237,16 @@ columns! {
 impl From<&ContactEvent> for ContactRow {
     fn from(event: &ContactEvent) -> Self {
         let ContactEvent {
-            time, block, contact, generation, change, displacement, force, threshold, stiffness, ..
+            time,
+            block,
+            contact,
+            generation,
+            change,
+            displacement,
+            force,
+            threshold,
+            stiffness,
+            ..
         } = *event;
         Self {
             time,

@@ -52,26 +52,38 @@ impl Rupture {
     /// before and a tenth of all.
     pub fn is_slip(&self, contacts: u64) -> bool {
         let let_go = self.attached_before - self.least_attached;
-        self.extent() == self.broken.len() && 2 * let_go >= self.attached_before && 10 * let_go >= contacts
+        self.extent() == self.broken.len()
+            && 2 * let_go >= self.attached_before
+            && 10 * let_go >= contacts
     }
 
     /// Speed of the front in m/s: slope of the distance from the nucleation against the time of the first break, block by
     /// block, by least squares. `None` below three blocks or without an advance.
     pub fn front_speed(&self, parameters: &Parameters) -> Option<f64> {
         let spacing = parameters.slider_length / parameters.blocks as f64;
-        let points = self.fronts.iter().map(|&(block, time)| (time, spacing * block.abs_diff(self.first_block) as f64));
-        (self.extent() >= 3).then(|| advance_speed(points)).flatten()
+        let points = self
+            .fronts
+            .iter()
+            .map(|&(block, time)| (time, spacing * block.abs_diff(self.first_block) as f64));
+        (self.extent() >= 3)
+            .then(|| advance_speed(points))
+            .flatten()
     }
 }
 
 /// Slope of position against time by least squares; `None` unless it is positive and finite.
 pub fn advance_speed(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<f64> {
     let count = points.clone().count() as f64;
-    let (time, position) = points.clone().fold((0.0, 0.0), |(t, p), point| (t + point.0, p + point.1));
+    let (time, position) = points
+        .clone()
+        .fold((0.0, 0.0), |(t, p), point| (t + point.0, p + point.1));
     let (time, position) = (time / count, position / count);
     let (covariance, variance) = points.fold((0.0, 0.0), |(covariance, variance), point| {
         let late = point.0 - time;
-        (covariance + late * (point.1 - position), variance + late * late)
+        (
+            covariance + late * (point.1 - position),
+            variance + late * late,
+        )
     });
     let speed = covariance / variance;
     (speed.is_finite() && speed > 0.0).then_some(speed)

@@ -28,17 +28,26 @@ columns! {
 
 impl Modulation {
     fn of(drive: &Drive) -> Self {
-        Self { period: (drive.period > 0.0).then_some(drive.period), amplitude: drive.amplitude }
+        Self {
+            period: (drive.period > 0.0).then_some(drive.period),
+            amplitude: drive.amplitude,
+        }
     }
 
     /// η at the onset, under a drive at this velocity in m/s; 0 without modulation.
     pub fn eta(&self, drive_velocity: f64) -> f64 {
-        self.period.map_or(0.0, |period| eta(TAU / period, self.amplitude, drive_velocity))
+        self.period.map_or(0.0, |period| {
+            eta(TAU / period, self.amplitude, drive_velocity)
+        })
     }
 
     /// Number n of periods nearest to an interval in s; `None` without modulation.
     pub fn periods(&self, interval: f64) -> Option<u64> {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "intervals are > 0")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "intervals are > 0"
+        )]
         self.period.map(|period| (interval / period).round() as u64)
     }
 }
@@ -224,7 +233,10 @@ impl Active {
 
 impl SlipObserver {
     pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
-        let start = Peak { time: 0.0, force: 0.0 };
+        let start = Peak {
+            time: 0.0,
+            force: 0.0,
+        };
         let contacts = (parameters.blocks * parameters.contacts_per_block) as u64;
         Self {
             parameters: parameters.clone(),
@@ -232,7 +244,9 @@ impl SlipObserver {
             at_precursor: Drive::new(parameters),
             at_break: Drive::new(parameters),
             recording: *recording,
-            precursor_size: recording.precursor_size.unwrap_or(parameters.contacts_per_block as u64),
+            precursor_size: recording
+                .precursor_size
+                .unwrap_or(parameters.contacts_per_block as u64),
             contacts,
             crossing_time: parameters.wave_crossing_time(),
             give_up_time: recording.give_up_time(parameters),
@@ -258,7 +272,9 @@ impl SlipObserver {
             settled: None,
             has_given_up: false,
             ruptures: 0,
-            drops: recording.drop_size.map(|size| DropDetector::new(parameters, size)),
+            drops: recording
+                .drop_size
+                .map(|size| DropDetector::new(parameters, size)),
             spans: Vec::new(),
         }
     }
@@ -271,7 +287,10 @@ impl SlipObserver {
         if let Some(drops) = self.drops {
             let discarded = self.spans.len() - self.slips.len();
             let of_slips = drops.of_slips(&self.spans).into_iter().skip(discarded);
-            self.slips.iter_mut().zip(of_slips).for_each(|(slip, drops)| slip.drops = drops);
+            self.slips
+                .iter_mut()
+                .zip(of_slips)
+                .for_each(|(slip, drops)| slip.drops = drops);
         }
         (self.slips, self.precursors)
     }
@@ -291,7 +310,8 @@ impl SlipObserver {
         (time > 0.0).then(|| Averages {
             time,
             friction: (end.impulse - start.impulse) / time,
-            attached_fraction: (end.attached_time - start.attached_time) / (time * self.contacts as f64),
+            attached_fraction: (end.attached_time - start.attached_time)
+                / (time * self.contacts as f64),
             slip_share: (end.slipping - start.slipping) / time,
         })
     }
@@ -301,23 +321,38 @@ impl SlipObserver {
     pub fn running_interval(&self) -> Option<f64> {
         let is_past_start_up = self.slips_seen >= self.recording.discard;
         let is_whole = self.slips.len() as u64 >= self.recording.slips;
-        let peak = self.rupture.as_ref().and_then(|active| active.onset).unwrap_or(self.since_slip);
-        let end = if self.has_given_up { self.now.time } else { peak.time };
-        let last = self.last_onset.filter(|_| self.has_given_up || is_past_start_up && !is_whole)?;
+        let peak = self
+            .rupture
+            .as_ref()
+            .and_then(|active| active.onset)
+            .unwrap_or(self.since_slip);
+        let end = if self.has_given_up {
+            self.now.time
+        } else {
+            peak.time
+        };
+        let last = self
+            .last_onset
+            .filter(|_| self.has_given_up || is_past_start_up && !is_whole)?;
         Some(end - last)
     }
 
     /// The present instant with all that is counted, after sliding since the last slip; from the last event on at its rate.
     fn sliding(&self) -> Instant {
         Instant {
-            attached_time: self.at_event.attached_time + self.attached as f64 * (self.now.time - self.at_event.time),
+            attached_time: self.at_event.attached_time
+                + self.attached as f64 * (self.now.time - self.at_event.time),
             slipping: self.slipping + self.now.time - self.last_end.map_or(0.0, |end| end.time),
             ..self.now
         }
     }
 
     fn begin_or_extend(&mut self, event: &ContactEvent) {
-        if self.rupture.as_ref().is_some_and(|active| event.time - active.last.time > self.crossing_time) {
+        if self
+            .rupture
+            .as_ref()
+            .is_some_and(|active| event.time - active.last.time > self.crossing_time)
+        {
             self.finish_rupture();
         }
         let blocks = self.parameters.blocks;
@@ -349,11 +384,16 @@ impl SlipObserver {
         }
         active.least_at_last_break = active.least;
         active.last = here;
-        self.since_break = Peak { time: event.time, force: self.now.force };
+        self.since_break = Peak {
+            time: event.time,
+            force: self.now.force,
+        };
     }
 
     fn finish_rupture(&mut self) {
-        let Some(active) = self.rupture.take() else { return };
+        let Some(active) = self.rupture.take() else {
+            return;
+        };
         self.ruptures += 1;
         if !active.is_recorded(self.precursor_size, self.contacts) {
             return;
@@ -378,14 +418,19 @@ impl SlipObserver {
             let modulation = Modulation::of(drive);
             let interval = self.last_onset.map(|last| onset.time - last);
             let spent = self.last_end.map_or(Spent::default(), |end| end.spent);
-            let energies = self.recording.energies.then(|| Energies::between(spent, last.spent));
+            let energies = self
+                .recording
+                .energies
+                .then(|| Energies::between(spent, last.spent));
             self.slips.push(Slip {
                 number: self.slips_seen - discard,
                 onset: onset.time,
                 interval,
                 modulation,
                 periods: interval.and_then(|interval| modulation.periods(interval)),
-                phase: modulation.period.map(|period| phase(onset.time - drive.cycle_start, period, drive.eta())),
+                phase: modulation
+                    .period
+                    .map(|period| phase(onset.time - drive.cycle_start, period, drive.eta())),
                 peak_force: onset.force,
                 drop: onset.force - active.least_at_last_break,
                 nucleation: first.time,
@@ -410,7 +455,10 @@ impl SlipObserver {
         }
         self.slips_seen += 1;
         self.slipping += last.time - first.time;
-        let end = Instant { slipping: self.slipping, ..last };
+        let end = Instant {
+            slipping: self.slipping,
+            ..last
+        };
         if self.slips_seen == discard.max(1) {
             self.start_up_end = Some(end);
         }
@@ -432,7 +480,12 @@ impl SlipObserver {
     }
 
     fn record_precursor(&mut self, active: &Active) {
-        let Active { rupture, first, last, .. } = active;
+        let Active {
+            rupture,
+            first,
+            last,
+            ..
+        } = active;
         let onset = active.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
             self.at_precursor.advance_to(onset);
@@ -447,13 +500,18 @@ impl SlipObserver {
                 duration: last.time - first.time,
                 size: rupture.size,
                 extent: rupture.extent() as u64,
-                length: rupture.extent() as f64 * self.parameters.slider_length / self.parameters.blocks as f64,
+                length: rupture.extent() as f64 * self.parameters.slider_length
+                    / self.parameters.blocks as f64,
                 reach: rupture.reach as u64 + 1,
                 front_speed: rupture.front_speed(&self.parameters),
             });
         }
-        if self.furthest.is_none_or(|furthest| rupture.reach > furthest) {
-            let position = (rupture.reach + 1) as f64 * self.parameters.slider_length / self.parameters.blocks as f64;
+        if self
+            .furthest
+            .is_none_or(|furthest| rupture.reach > furthest)
+        {
+            let position = (rupture.reach + 1) as f64 * self.parameters.slider_length
+                / self.parameters.blocks as f64;
             self.advances.push((first.time, position));
             self.furthest = Some(rupture.reach);
         }
@@ -468,9 +526,15 @@ impl Observer for SlipObserver {
     fn advance(&mut self, segment: &Segment<'_>) {
         // Each stretch contains the later ones, so a force that raises none of these peaks raises no other. The peak since the
         // last break counts only once its rupture ends, and if that is recorded.
-        let recordable =
-            self.rupture.as_ref().is_some_and(|active| active.is_recorded(self.precursor_size, self.contacts));
-        let floor = if recordable { self.since_break.force } else { self.since_precursor.force };
+        let recordable = self
+            .rupture
+            .as_ref()
+            .is_some_and(|active| active.is_recorded(self.precursor_size, self.contacts));
+        let floor = if recordable {
+            self.since_break.force
+        } else {
+            self.since_precursor.force
+        };
         if let Some((time, force)) = segment.maximum_above(floor) {
             let peak = Peak { time, force };
             self.since_break = peak;
@@ -486,8 +550,17 @@ impl Observer for SlipObserver {
             drops.advance(segment);
         }
         let impulse = self.now.impulse + segment.impulse();
-        self.now = Instant { time: segment.end(), force: segment.end_force(), impulse, ..self.now };
-        if self.rupture.as_ref().is_some_and(|active| self.now.time - active.last.time > self.crossing_time) {
+        self.now = Instant {
+            time: segment.end(),
+            force: segment.end_force(),
+            impulse,
+            ..self.now
+        };
+        if self
+            .rupture
+            .as_ref()
+            .is_some_and(|active| self.now.time - active.last.time > self.crossing_time)
+        {
             self.finish_rupture();
         }
         let since_slip = self.now.time - self.last_end.map_or(0.0, |end| end.time);

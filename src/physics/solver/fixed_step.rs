@@ -60,22 +60,36 @@ impl Motion {
         mass: f64,
     ) {
         let x = &self.displacement[..];
-        let stretched: f64 = x.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
+        let stretched: f64 = x
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]))
+            .sum();
         let pulled = drive.motion(time).0 - x[0];
-        audit.kinetic.set(0.5 * mass * self.velocity.iter().map(|v| v * v).sum::<f64>());
         audit
-            .elastic
-            .set(0.5 * (coupling * stretched + drive.stiffness * pulled * pulled) + interface.elastic_energy(x));
+            .kinetic
+            .set(0.5 * mass * self.velocity.iter().map(|v| v * v).sum::<f64>());
+        audit.elastic.set(
+            0.5 * (coupling * stretched + drive.stiffness * pulled * pulled)
+                + interface.elastic_energy(x),
+        );
     }
 
     /// Whether any block is at or past a break position.
     #[inline(always)]
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches the loop runs in vectors")]
+    #[expect(
+        clippy::needless_bitwise_bool,
+        reason = "without branches the loop runs in vectors"
+    )]
     fn reaches_a_break(&self, interface: &Interface) -> bool {
         let blocks = self.displacement.len();
-        let (x, upper, lower) =
-            (&self.displacement[..blocks], &interface.block_upper[..blocks], &interface.block_lower[..blocks]);
-        (0..blocks).fold(false, |any, j| any | (x[j] >= upper[j]) | (x[j] <= lower[j]))
+        let (x, upper, lower) = (
+            &self.displacement[..blocks],
+            &interface.block_upper[..blocks],
+            &interface.block_lower[..blocks],
+        );
+        (0..blocks).fold(false, |any, j| {
+            any | (x[j] >= upper[j]) | (x[j] <= lower[j])
+        })
     }
 }
 
@@ -107,8 +121,11 @@ fn integrate(
     let (mass, coupling) = (parameters.block_mass(), parameters.coupling_stiffness());
     let mut drive = Drive::new(parameters);
     let mut interface = Interface::new(parameters);
-    let mut motion =
-        Motion { displacement: vec![0.0; blocks], velocity: vec![0.0; blocks], acceleration: vec![0.0; blocks] };
+    let mut motion = Motion {
+        displacement: vec![0.0; blocks],
+        velocity: vec![0.0; blocks],
+        acceleration: vec![0.0; blocks],
+    };
     let mut summary = Summary::default();
     let half = 0.5 * time_step;
     let damp_before = 1.0 - half * parameters.damping_rate;
@@ -128,14 +145,22 @@ fn integrate(
         }
         summary.steps += 1;
         let time = summary.steps as f64 * time_step;
-        for ((x, v), a) in motion.displacement.iter_mut().zip(&mut motion.velocity).zip(&motion.acceleration) {
+        for ((x, v), a) in motion
+            .displacement
+            .iter_mut()
+            .zip(&mut motion.velocity)
+            .zip(&motion.acceleration)
+        {
             *v = *v * damp_before + half * a;
             *x += time_step * *v;
         }
         if let Some(audit) = audit {
             // These velocities are those of the middle of the step.
             let squares = motion.velocity.iter().map(|v| v * v).sum::<f64>();
-            Audit::add(&audit.damping, mass * parameters.damping_rate * time_step * squares);
+            Audit::add(
+                &audit.damping,
+                mass * parameters.damping_rate * time_step * squares,
+            );
         }
         drive.advance_to(time);
         let (driven, drive_velocity) = drive.motion(time);
@@ -145,21 +170,53 @@ fn integrate(
             *v = (*v + half * a) * damp_after;
         }
         let next_rate = drive.stiffness * (drive_velocity - motion.velocity[0]);
-        let coefficients = hermite(force, next_force, time_step * force_rate, time_step * next_rate);
+        let coefficients = hermite(
+            force,
+            next_force,
+            time_step * force_rate,
+            time_step * next_rate,
+        );
         let [constant, linear, square, cube] = coefficients;
         let integral = constant + 0.5 * linear + square / 3.0 + 0.25 * cube;
-        let ends = [ForceAt { force, integral: 0.0 }, ForceAt { force: next_force, integral }];
+        let ends = [
+            ForceAt {
+                force,
+                integral: 0.0,
+            },
+            ForceAt {
+                force: next_force,
+                integral,
+            },
+        ];
         let curvature_bound = polynomial::second_derivative_bound(&coefficients);
-        let path =
-            ForcePath::Polynomial { coefficients: &coefficients, curvature_bound, first: 0.0, scale: time_step, ends };
-        observer.advance(&Segment { start, duration: time_step, path });
+        let path = ForcePath::Polynomial {
+            coefficients: &coefficients,
+            curvature_bound,
+            first: 0.0,
+            scale: time_step,
+            ends,
+        };
+        observer.advance(&Segment {
+            start,
+            duration: time_step,
+            path,
+        });
         (force, force_rate) = (next_force, next_rate);
         summary.end_time = time;
 
         if interface.next_reattachment() <= time || motion.reaches_a_break(&interface) {
-            change_contacts(&mut interface, &motion.displacement, time, &mut summary, observer);
+            change_contacts(
+                &mut interface,
+                &motion.displacement,
+                time,
+                &mut summary,
+                observer,
+            );
             if summary.breaks + summary.reattachments > limits.events {
-                return Err(SimulationError::EventBudget { time, events: limits.events });
+                return Err(SimulationError::EventBudget {
+                    time,
+                    events: limits.events,
+                });
             }
             // The next step starts from the new contacts.
             motion.accelerate(&interface, force, coupling, mass);
@@ -168,13 +225,18 @@ fn integrate(
             if !motion.displacement.iter().sum::<f64>().is_finite() {
                 return Err(SimulationError::NotFinite { time });
             }
-            if limits.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            if limits
+                .interrupt
+                .is_some_and(|flag| flag.load(Ordering::Relaxed))
+            {
                 return Err(SimulationError::Interrupted { time });
             }
         }
     }
     if !motion.displacement.iter().sum::<f64>().is_finite() {
-        return Err(SimulationError::NotFinite { time: summary.end_time });
+        return Err(SimulationError::NotFinite {
+            time: summary.end_time,
+        });
     }
     if let Some(audit) = audit {
         motion.record_final_energy(audit, &interface, &drive, summary.end_time, coupling, mass);
@@ -204,7 +266,10 @@ fn change_contacts(
         if x >= interface.block_upper[block] || x <= interface.block_lower[block] {
             interface.break_reached(block, time, x, |event| {
                 summary.breaks += 1;
-                observer.contact(&ContactEvent { mean_displacement, ..event });
+                observer.contact(&ContactEvent {
+                    mean_displacement,
+                    ..event
+                });
             });
         }
     }
@@ -213,7 +278,12 @@ fn change_contacts(
 /// Coefficients in [0, 1] of the cubic with these values and slopes at its ends.
 fn hermite(start: f64, end: f64, start_slope: f64, end_slope: f64) -> [f64; 4] {
     let rise = end - start;
-    [start, start_slope, 3.0 * rise - 2.0 * start_slope - end_slope, start_slope + end_slope - 2.0 * rise]
+    [
+        start,
+        start_slope,
+        3.0 * rise - 2.0 * start_slope - end_slope,
+        start_slope + end_slope - 2.0 * rise,
+    ]
 }
 
 #[cfg(test)]
@@ -248,7 +318,9 @@ mod tests {
     /// The features for which the loops can be compiled and that this processor has.
     fn available() -> Vec<Arch> {
         #[cfg(target_arch = "x86_64")]
-        let more = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)].into_iter().flatten();
+        let more = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)]
+            .into_iter()
+            .flatten();
         #[cfg(not(target_arch = "x86_64"))]
         let more = [Arch::new()];
         [Arch::Scalar].into_iter().chain(more).collect()
@@ -266,7 +338,11 @@ mod tests {
         };
         for parameters in [Parameters::default(), modulated] {
             let runs = available().into_iter().map(|features| {
-                let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };
+                let limits = Limits {
+                    end_time: 0.25,
+                    events: u64::MAX,
+                    interrupt: None,
+                };
                 let mut told = Told::default();
                 let audited = ledger::audited(&parameters, &mut told, |observer, audit| {
                     run(features, &parameters, 2e-6, limits, observer, Some(audit))

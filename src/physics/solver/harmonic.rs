@@ -22,14 +22,21 @@ pub struct Harmonic {
 impl Harmonic {
     pub fn value(&self, elapsed: f64) -> f64 {
         let ramp = self.start + self.rate * elapsed;
-        if self.amplitude == 0.0 { ramp } else { ramp + self.amplitude * libm::cos(self.angle(elapsed)) }
+        if self.amplitude == 0.0 {
+            ramp
+        } else {
+            ramp + self.amplitude * libm::cos(self.angle(elapsed))
+        }
     }
 
     /// Value and slope after `elapsed` s.
     pub(super) fn value_and_slope(&self, elapsed: f64) -> (f64, f64) {
         let (sine, cosine) = libm::sincos(self.angle(elapsed));
         let ramp = self.start + self.rate * elapsed;
-        (ramp + self.amplitude * cosine, self.rate - self.amplitude * self.angular_frequency * sine)
+        (
+            ramp + self.amplitude * cosine,
+            self.rate - self.amplitude * self.angular_frequency * sine,
+        )
     }
 
     /// Argument of the cosine after `elapsed` s, in rad.
@@ -60,7 +67,11 @@ impl Harmonic {
             return [None; 2];
         }
         // With A < 0 the cosine is shifted by half a turn.
-        let shift = if self.amplitude < 0.0 { self.phase + PI } else { self.phase };
+        let shift = if self.amplitude < 0.0 {
+            self.phase + PI
+        } else {
+            self.phase
+        };
         let crest = libm::asin(self.rate / speed);
         let period = TAU / self.angular_frequency;
         let first = (crest - shift).rem_euclid(TAU) / self.angular_frequency;
@@ -73,6 +84,11 @@ impl Harmonic {
 
     /// The same multiplied by `sign`.
     pub(super) fn times(&self, sign: f64) -> Self {
-        Self { start: sign * self.start, rate: sign * self.rate, amplitude: sign * self.amplitude, ..*self }
+        Self {
+            start: sign * self.start,
+            rate: sign * self.rate,
+            amplitude: sign * self.amplitude,
+            ..*self
+        }
     }
 }

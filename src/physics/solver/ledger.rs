@@ -37,7 +37,11 @@ impl Ledger {
     /// What does not balance, relative to the work of the drive. Zero for an exact solution; 0 if no work was done.
     pub fn residual(&self) -> f64 {
         let spent = self.elastic + self.kinetic + self.damping + self.broken;
-        if self.work == 0.0 { 0.0 } else { (self.work - spent) / self.work }
+        if self.work == 0.0 {
+            0.0
+        } else {
+            (self.work - spent) / self.work
+        }
     }
 }
 
@@ -63,7 +67,13 @@ impl Audit {
     fn new() -> Self {
         let zero = || Cell::new(0.0);
         let quadrature = Quadrature::new();
-        Self { quadrature, damping: zero(), left_out: zero(), elastic: zero(), kinetic: zero() }
+        Self {
+            quadrature,
+            damping: zero(),
+            left_out: zero(),
+            elastic: zero(),
+            kinetic: zero(),
+        }
     }
 
     /// Adds to an entry, in J.
@@ -83,16 +93,26 @@ struct Meter<'a> {
 
 impl Meter<'_> {
     fn so_far(&self) -> Spent {
-        let Self { audit, work, broken, .. } = self;
+        let Self {
+            audit,
+            work,
+            broken,
+            ..
+        } = self;
         let damping = audit.damping.get() + audit.left_out.get();
-        Spent { work: *work, damping, broken: *broken }
+        Spent {
+            work: *work,
+            damping,
+            broken: *broken,
+        }
     }
 }
 
 impl Observer for Meter<'_> {
     fn advance(&mut self, segment: &Segment<'_>) {
         // Rounding may put the ends of a segment beyond those of its cycle, but not its middle.
-        self.drive.advance_to(segment.start + 0.5 * segment.duration);
+        self.drive
+            .advance_to(segment.start + 0.5 * segment.duration);
         self.work += work(&self.drive, &self.audit.quadrature, segment);
         self.observer.advance(segment);
     }
@@ -121,11 +141,32 @@ pub(super) fn audited(
     run: impl FnOnce(&mut dyn Observer, &Audit) -> Result<Summary, SimulationError>,
 ) -> Result<(Summary, Ledger), SimulationError> {
     let audit = Audit::new();
-    let mut meter = Meter { observer, audit: &audit, drive: Drive::new(parameters), work: 0.0, broken: 0.0 };
+    let mut meter = Meter {
+        observer,
+        audit: &audit,
+        drive: Drive::new(parameters),
+        work: 0.0,
+        broken: 0.0,
+    };
     let summary = run(&mut meter, &audit)?;
-    let Spent { work, damping, broken } = meter.so_far();
-    let [elastic, kinetic, left_out] = [&audit.elastic, &audit.kinetic, &audit.left_out].map(Cell::get);
-    Ok((summary, Ledger { work, elastic, kinetic, damping, left_out, broken }))
+    let Spent {
+        work,
+        damping,
+        broken,
+    } = meter.so_far();
+    let [elastic, kinetic, left_out] =
+        [&audit.elastic, &audit.kinetic, &audit.left_out].map(Cell::get);
+    Ok((
+        summary,
+        Ledger {
+            work,
+            elastic,
+            kinetic,
+            damping,
+            left_out,
+            broken,
+        },
+    ))
 }
 
 /// Work of the drive along a segment, in J.
@@ -140,10 +181,20 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
                 let elapsed = s * segment.duration;
                 segment.force_after(elapsed) * drive.motion(segment.start + elapsed).1
             };
-            segment.duration * nodes.iter().map(|&(s, weight)| weight * power(s)).sum::<f64>()
+            segment.duration
+                * nodes
+                    .iter()
+                    .map(|&(s, weight)| weight * power(s))
+                    .sum::<f64>()
         }
         ForcePath::Harmonic(harmonic) => {
-            let Harmonic { start, rate, amplitude, phase, angular_frequency } = harmonic;
+            let Harmonic {
+                start,
+                rate,
+                amplitude,
+                phase,
+                angular_frequency,
+            } = harmonic;
             // ∫ (start + rate τ + amplitude cos(ωτ + phase)) (-Δω sin(ωτ + drive_phase)) dτ, term by term.
             let drive_phase = drive.phase(segment.start);
             let angle = harmonic.turn(segment.duration);
@@ -152,9 +203,11 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
             let ramp = (start + rate * segment.duration) * cosine
                 - start * cosine_before
                 - rate / angular_frequency * (sine - sine_before);
-            let beat = 0.25 * (libm::cos(2.0 * angle + phase + drive_phase) - libm::cos(phase + drive_phase));
+            let beat = 0.25
+                * (libm::cos(2.0 * angle + phase + drive_phase) - libm::cos(phase + drive_phase));
             let drift = 0.5 * angular_frequency * segment.duration * libm::sin(drive_phase - phase);
-            drive.velocity * segment.impulse() + drive.amplitude * (ramp + amplitude * (beat - drift))
+            drive.velocity * segment.impulse()
+                + drive.amplitude * (ramp + amplitude * (beat - drift))
         }
         ForcePath::Grid { .. } => unreachable!("a ledger is kept along Taylor steps"),
     }
@@ -166,8 +219,11 @@ mod tests {
 
     /// A modulated drive, and the rule to check the closed form against.
     fn modulated() -> (Drive, Quadrature) {
-        let parameters =
-            Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };
+        let parameters = Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(1.0 / 58.0),
+            ..Parameters::default()
+        };
         (Drive::new(&parameters), Quadrature::new())
     }
 
@@ -175,31 +231,65 @@ mod tests {
     fn work_over_a_leap_is_that_of_many_short_quadratures() {
         let (drive, quadrature) = modulated();
         let angular_frequency = drive.angular_frequency;
-        let path =
-            ForcePath::Harmonic(Harmonic { start: 120.0, rate: 3e3, amplitude: 38.0, phase: 0.7, angular_frequency });
-        let segment = Segment { start: 0.3, duration: 0.07, path };
+        let path = ForcePath::Harmonic(Harmonic {
+            start: 120.0,
+            rate: 3e3,
+            amplitude: 38.0,
+            phase: 0.7,
+            angular_frequency,
+        });
+        let segment = Segment {
+            start: 0.3,
+            duration: 0.07,
+            path,
+        };
         let pieces = 200;
         let width = segment.duration / f64::from(pieces);
-        let power = |elapsed: f64| segment.force_after(elapsed) * drive.motion(segment.start + elapsed).1;
+        let power =
+            |elapsed: f64| segment.force_after(elapsed) * drive.motion(segment.start + elapsed).1;
         let numeric: f64 = (0..pieces)
-            .flat_map(|piece| quadrature.nodes(8).iter().map(move |(s, weight)| (f64::from(piece) + s, weight)))
+            .flat_map(|piece| {
+                quadrature
+                    .nodes(8)
+                    .iter()
+                    .map(move |(s, weight)| (f64::from(piece) + s, weight))
+            })
             .map(|(s, weight)| weight * width * power(s * width))
             .sum();
         let closed = work(&drive, &quadrature, &segment);
-        assert!((closed - numeric).abs() < 1e-12 * numeric.abs(), "{closed} against {numeric}");
+        assert!(
+            (closed - numeric).abs() < 1e-12 * numeric.abs(),
+            "{closed} against {numeric}"
+        );
     }
 
     #[test]
     fn work_along_a_polynomial_is_that_of_its_halves() {
         let (drive, quadrature) = modulated();
         let coefficients = [100.0, 20.0, -7.0, 3.0];
-        let whole = work(&drive, &quadrature, &Segment::polynomial(0.2, 0.01, &coefficients));
+        let whole = work(
+            &drive,
+            &quadrature,
+            &Segment::polynomial(0.2, 0.01, &coefficients),
+        );
         let halved = [50.0 * 2.0, 20.0 / 2.0, -7.0 / 4.0, 3.0 / 8.0];
-        let moved = [100.0 + 10.0 - 1.75 + 0.375, 10.0 - 3.5 + 1.125, -1.75 + 1.125, 0.375];
+        let moved = [
+            100.0 + 10.0 - 1.75 + 0.375,
+            10.0 - 3.5 + 1.125,
+            -1.75 + 1.125,
+            0.375,
+        ];
         let half = |start: f64, coefficients: &[f64]| {
-            work(&drive, &quadrature, &Segment::polynomial(start, 0.005, coefficients))
+            work(
+                &drive,
+                &quadrature,
+                &Segment::polynomial(start, 0.005, coefficients),
+            )
         };
         let parts = half(0.2, &halved) + half(0.205, &moved);
-        assert!((whole - parts).abs() < 1e-13 * whole.abs(), "{whole} against {parts}");
+        assert!(
+            (whole - parts).abs() < 1e-13 * whole.abs(),
+            "{whole} against {parts}"
+        );
     }
 }

@@ -78,7 +78,10 @@ impl Default for Solver {
 impl Solver {
     /// From contact event to contact event with this tolerance, resolved as it is best.
     pub const fn event_driven(tolerance: f64) -> Self {
-        Self::EventDriven { tolerance, resolve: Resolve::Auto }
+        Self::EventDriven {
+            tolerance,
+            resolve: Resolve::Auto,
+        }
     }
 
     /// Checks that the setting fits the parameters.
@@ -91,7 +94,11 @@ impl Solver {
             Self::FixedStep { time_step } => {
                 let limit = stability_limit(parameters);
                 let is_stable = time_step > 0.0 && time_step < limit;
-                if is_stable { Ok(()) } else { Err(SimulationError::UnstableStep { time_step, limit }) }
+                if is_stable {
+                    Ok(())
+                } else {
+                    Err(SimulationError::UnstableStep { time_step, limit })
+                }
             }
         }
     }
@@ -162,7 +169,9 @@ pub struct Summary {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulationError {
     /// The time step is not stable.
-    #[error("dt = {time_step:e} s: must be below the stability limit 2/omega_max = {limit:.4e} s of these parameters")]
+    #[error(
+        "dt = {time_step:e} s: must be below the stability limit 2/omega_max = {limit:.4e} s of these parameters"
+    )]
     UnstableStep {
         /// The refused step, in s.
         time_step: f64,
@@ -233,7 +242,9 @@ pub fn simulate_audited(
     limits: Limits<'_>,
     observer: &mut dyn Observer,
 ) -> Result<(Summary, Ledger), SimulationError> {
-    ledger::audited(parameters, observer, |observer, audit| run(parameters, solver, limits, observer, Some(audit)))
+    ledger::audited(parameters, observer, |observer, audit| {
+        run(parameters, solver, limits, observer, Some(audit))
+    })
 }
 
 fn run(
@@ -248,6 +259,8 @@ fn run(
         Solver::EventDriven { tolerance, resolve } => {
             event_driven::run(parameters, tolerance, resolve, limits, observer, audit)
         }
-        Solver::FixedStep { time_step } => fixed_step::run(Arch::new(), parameters, time_step, limits, observer, audit),
+        Solver::FixedStep { time_step } => {
+            fixed_step::run(Arch::new(), parameters, time_step, limits, observer, audit)
+        }
     }
 }

@@ -40,8 +40,9 @@ pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
     let square = s * s;
     let pairs = coefficients.chunks_exact(2);
     let last = pairs.remainder().first().copied().unwrap_or(0.0);
-    let (even, odd) =
-        pairs.rev().fold((last, 0.0), |(even, odd), pair| (even * square + pair[0], odd * square + pair[1]));
+    let (even, odd) = pairs.rev().fold((last, 0.0), |(even, odd), pair| {
+        (even * square + pair[0], odd * square + pair[1])
+    });
     even + s * odd
 }
 
@@ -68,7 +69,9 @@ pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
             sums[i] += factors[i] * pair[i].abs();
         }
     }
-    let last = rest.first().map_or(0.0, |c| SECOND_DERIVATIVE[coefficients.len() - 1] * c.abs());
+    let last = rest
+        .first()
+        .map_or(0.0, |c| SECOND_DERIVATIVE[coefficients.len() - 1] * c.abs());
     (sums[0] + last) + sums[1]
 }
 
@@ -137,17 +140,33 @@ pub(crate) fn maximum(coefficients: &[f64], first: f64, last: f64) -> (f64, f64)
 
 /// Where the derivative changes its sign on [`first`, `last`], in order. Nowhere, if a coefficient is not finite:
 /// halving would not end before its last depth.
-pub(crate) fn for_each_turn(coefficients: &[f64], first: f64, last: f64, found: &mut impl FnMut(f64)) {
+pub(crate) fn for_each_turn(
+    coefficients: &[f64],
+    first: f64,
+    last: f64,
+    found: &mut impl FnMut(f64),
+) {
     let order = coefficients.len() - 1;
     let mut derivative = [0.0; MAX_COEFFICIENTS];
     for p in 1..=order {
         derivative[p - 1] = p as f64 * coefficients[p];
     }
     // Nor is a sum that overflows.
-    if !derivative.iter().map(|coefficient| coefficient.abs()).sum::<f64>().is_finite() {
+    if !derivative
+        .iter()
+        .map(|coefficient| coefficient.abs())
+        .sum::<f64>()
+        .is_finite()
+    {
         return;
     }
-    for_each_root(&derivative[..order.max(1)], first, last, MAX_HALVINGS, found);
+    for_each_root(
+        &derivative[..order.max(1)],
+        first,
+        last,
+        MAX_HALVINGS,
+        found,
+    );
 }
 
 /// The same polynomial in the variable r, which runs from -1 to 1 as s does from `low` to `high`.
@@ -174,7 +193,13 @@ fn shifted(coefficients: &[f64], centre: f64) -> [f64; MAX_COEFFICIENTS] {
     about
 }
 
-fn for_each_root(coefficients: &[f64], low: f64, high: f64, depth: u32, found: &mut impl FnMut(f64)) {
+fn for_each_root(
+    coefficients: &[f64],
+    low: f64,
+    high: f64,
+    depth: u32,
+    found: &mut impl FnMut(f64),
+) {
     let middle = 0.5 * (low + high);
     let about = &rescaled(coefficients, low, high)[..coefficients.len()];
     let (value_spread, slope_spread) = beyond_linear(about);
@@ -213,8 +238,17 @@ const CUBIC: f64 = 1e-7;
 
 /// Root of a polynomial that rises through zero once between `low` and `high`, sought from `first`: Halley's steps,
 /// else as [`safeguarded_newton`].
-pub(crate) fn safeguarded_halley(coefficients: &[f64], mut low: f64, mut high: f64, first: f64) -> f64 {
-    let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
+pub(crate) fn safeguarded_halley(
+    coefficients: &[f64],
+    mut low: f64,
+    mut high: f64,
+    first: f64,
+) -> f64 {
+    let mut s = if first > low && first < high {
+        first
+    } else {
+        0.5 * (low + high)
+    };
     loop {
         let [height, slope, half_curvature] = expanded(coefficients, s);
         if height >= 0.0 {
@@ -223,10 +257,15 @@ pub(crate) fn safeguarded_halley(coefficients: &[f64], mut low: f64, mut high: f
             low = s;
         }
         let halley = s - height * slope / (slope * slope - height * half_curvature);
-        if (low..=high).contains(&halley) && (halley - s).abs() <= CUBIC * high.abs().max(low.abs()) {
+        if (low..=high).contains(&halley) && (halley - s).abs() <= CUBIC * high.abs().max(low.abs())
+        {
             return halley;
         }
-        let next = if halley > low && halley < high { halley } else { 0.5 * (low + high) };
+        let next = if halley > low && halley < high {
+            halley
+        } else {
+            0.5 * (low + high)
+        };
         if next <= low || next >= high {
             return next;
         }
@@ -237,8 +276,17 @@ pub(crate) fn safeguarded_halley(coefficients: &[f64], mut low: f64, mut high: f
 /// Root of a function that rises through zero once between `low` and `high`: Newton's steps, bisection where they leave
 /// the bracket. A step so small that its square is rounding is the last. Returns the last iterate, never a stale end of
 /// the bracket.
-pub(crate) fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
+pub(crate) fn safeguarded_newton(
+    mut low: f64,
+    mut high: f64,
+    first: f64,
+    function: impl Fn(f64) -> (f64, f64),
+) -> f64 {
+    let mut s = if first > low && first < high {
+        first
+    } else {
+        0.5 * (low + high)
+    };
     loop {
         let (height, slope) = function(s);
         if height >= 0.0 {
@@ -247,11 +295,17 @@ pub(crate) fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, functi
             low = s;
         }
         let newton = s - height / slope;
-        if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high.abs().max(low.abs()) {
+        if (low..=high).contains(&newton)
+            && (newton - s).abs() <= QUADRATIC * high.abs().max(low.abs())
+        {
             return newton;
         }
         // Strictly inside, or Newton's steps might alternate between the ends for ever.
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
         if next <= low || next >= high {
             return next;
         }
@@ -268,7 +322,9 @@ mod tests {
     fn turns_of_what_is_not_finite_end_at_once() {
         for bad in [f64::NAN, f64::INFINITY, f64::MAX] {
             let coefficients = [1.0, bad, -bad, bad, 0.5 * bad];
-            for_each_turn(&coefficients, 0.0, 1.0, &mut |_| panic!("there is no turn to find"));
+            for_each_turn(&coefficients, 0.0, 1.0, &mut |_| {
+                panic!("there is no turn to find")
+            });
         }
     }
 
@@ -277,8 +333,13 @@ mod tests {
         // A narrow bump inside the interval, of which the ends show nothing.
         let coefficients = [0.0, -0.1, 0.0, 0.0, 16.0 * 0.5, -40.0 * 0.5, 24.5 * 0.5];
         let (at, largest) = maximum(&coefficients, 0.0, 1.0);
-        let sampled = (0..=100_000).map(|i| value(&coefficients, f64::from(i) * 1e-5)).fold(f64::MIN, f64::max);
-        assert!((largest - sampled).abs() < 1e-9, "{largest} at {at}, sampled {sampled}");
+        let sampled = (0..=100_000)
+            .map(|i| value(&coefficients, f64::from(i) * 1e-5))
+            .fold(f64::MIN, f64::max);
+        assert!(
+            (largest - sampled).abs() < 1e-9,
+            "{largest} at {at}, sampled {sampled}"
+        );
     }
 
     #[test]

@@ -15,7 +15,9 @@ pub(super) struct Quadrature {
 
 impl Quadrature {
     pub fn new() -> Self {
-        Self { rules: (1..=MAX_NODES).map(rule).collect() }
+        Self {
+            rules: (1..=MAX_NODES).map(rule).collect(),
+        }
     }
 
     /// Nodes in (0, 1) and weights, which sum to 1, of the rule with `count` nodes, limited to 1 to [`MAX_NODES`].
@@ -34,7 +36,10 @@ fn rule(count: usize) -> Vec<(f64, f64)> {
             let (mut before, mut value) = (1.0, z);
             for k in 2..=count {
                 let k = k as f64;
-                (before, value) = (value, ((2.0 * k - 1.0) * z * value - (k - 1.0) * before) / k);
+                (before, value) = (
+                    value,
+                    ((2.0 * k - 1.0) * z * value - (k - 1.0) * before) / k,
+                );
             }
             slope = order * (before - z * value) / (1.0 - z * z);
             z -= value / slope;
@@ -53,11 +58,16 @@ mod tests {
         let quadrature = Quadrature::new();
         for count in 1..=MAX_NODES {
             for degree in 0..2 * count {
-                let terms =
-                    quadrature.nodes(count).iter().map(|(s, weight)| weight * s.powi(i32::try_from(degree).unwrap()));
+                let terms = quadrature
+                    .nodes(count)
+                    .iter()
+                    .map(|(s, weight)| weight * s.powi(i32::try_from(degree).unwrap()));
                 let error = terms.sum::<f64>() * (degree + 1) as f64 - 1.0;
                 // Rounding, times the degree by which the integral is scaled.
-                assert!(error.abs() < 1e-15 * (degree + 4) as f64, "{count} nodes, degree {degree}: {error:e}");
+                assert!(
+                    error.abs() < 1e-15 * (degree + 4) as f64,
+                    "{count} nodes, degree {degree}: {error:e}"
+                );
             }
         }
     }

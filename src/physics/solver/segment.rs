@@ -49,7 +49,10 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    pub(super) const NONE: Self = Self { largest: (0.0, f64::NEG_INFINITY), least: (0.0, f64::INFINITY) };
+    pub(super) const NONE: Self = Self {
+        largest: (0.0, f64::NEG_INFINITY),
+        least: (0.0, f64::INFINITY),
+    };
 
     #[inline(always)]
     fn include(&mut self, at: f64, value: f64) {
@@ -85,7 +88,12 @@ impl CubicStep {
     #[inline(always)]
     fn coefficients(&self) -> [f64; 4] {
         let ([start, end], [from, to]) = (self.force, self.bend);
-        [start, (end - start) - (2.0 * from + to) / 6.0, 0.5 * from, (to - from) / 6.0]
+        [
+            start,
+            (end - start) - (2.0 * from + to) / 6.0,
+            0.5 * from,
+            (to - from) / 6.0,
+        ]
     }
 
     /// F_S at s, in N.
@@ -101,7 +109,11 @@ impl CubicStep {
         let [_, slope, half, cube] = self.coefficients().map(|coefficient| sign * coefficient);
         // The root of slope + 2 half s + 3 cube s² at which it falls, without cancellation.
         let root = (half * half - 3.0 * slope * cube).sqrt();
-        if half < 0.0 { slope / (root - half) } else { -(half + root) / (3.0 * cube) }
+        if half < 0.0 {
+            slope / (root - half)
+        } else {
+            -(half + root) / (3.0 * cube)
+        }
     }
 
     /// Where `sign` · F_S is largest between `from` and `to`, and its value there.
@@ -122,7 +134,11 @@ impl CubicStep {
             return at_end;
         }
         let at_crest = value(crest);
-        if at_crest.1 > at_end.1 { at_crest } else { at_end }
+        if at_crest.1 > at_end.1 {
+            at_crest
+        } else {
+            at_end
+        }
     }
 
     /// Integral of F_S by s over the step, in N.
@@ -150,7 +166,10 @@ impl CubicStep {
         let ([start, end], [from, to]) = (self.force, self.bend);
         let largest = |a: f64, b: f64| if a > b { a } else { b };
         let spread = 0.125 * largest(from.abs(), to.abs());
-        [-largest(-start, -end) - spread, largest(start, end) + spread]
+        [
+            -largest(-start, -end) - spread,
+            largest(start, end) + spread,
+        ]
     }
 }
 
@@ -190,7 +209,13 @@ impl<'a> Segment<'a> {
         Self {
             start,
             duration,
-            path: ForcePath::Polynomial { coefficients, curvature_bound, first: 0.0, scale: duration, ends },
+            path: ForcePath::Polynomial {
+                coefficients,
+                curvature_bound,
+                first: 0.0,
+                scale: duration,
+                ends,
+            },
         }
     }
 }
@@ -213,13 +238,25 @@ impl Segment<'_> {
     /// F_S in N, at a time in s after the start.
     pub fn force_after(&self, elapsed: f64) -> f64 {
         match self.path {
-            ForcePath::Polynomial { coefficients, first, scale, .. } => {
-                polynomial::value(coefficients, first + elapsed / scale)
-            }
+            ForcePath::Polynomial {
+                coefficients,
+                first,
+                scale,
+                ..
+            } => polynomial::value(coefficients, first + elapsed / scale),
             ForcePath::Harmonic(harmonic) => harmonic.value(elapsed),
-            ForcePath::Grid { steps, first, spacing, .. } => {
+            ForcePath::Grid {
+                steps,
+                first,
+                spacing,
+                ..
+            } => {
                 let at = first + elapsed / spacing;
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not before the start")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "not before the start"
+                )]
                 let step = (at as usize).min(steps.len() - 1);
                 steps[step].value(at - step as f64)
             }
@@ -240,17 +277,33 @@ impl Segment<'_> {
     /// Lower and upper bound on F_S, in N; not the tightest.
     pub fn bounds(&self) -> (f64, f64) {
         match self.path {
-            ForcePath::Polynomial { curvature_bound, scale, ends, .. } => {
+            ForcePath::Polynomial {
+                curvature_bound,
+                scale,
+                ends,
+                ..
+            } => {
                 let width = self.duration / scale;
                 let spread = 0.125 * curvature_bound * width * width;
                 let [start, end] = ends.map(|end| end.force);
                 (start.min(end) - spread, start.max(end) + spread)
             }
-            ForcePath::Harmonic(Harmonic { start, rate, amplitude, .. }) => {
+            ForcePath::Harmonic(Harmonic {
+                start,
+                rate,
+                amplitude,
+                ..
+            }) => {
                 let end = start + rate * self.duration;
-                (start.min(end) - amplitude.abs(), start.max(end) + amplitude.abs())
+                (
+                    start.min(end) - amplitude.abs(),
+                    start.max(end) + amplitude.abs(),
+                )
             }
-            ForcePath::Grid { bounds: [low, high], .. } => (low, high),
+            ForcePath::Grid {
+                bounds: [low, high],
+                ..
+            } => (low, high),
         }
     }
 
@@ -259,31 +312,55 @@ impl Segment<'_> {
     /// as well.
     pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
         match self.path {
-            ForcePath::Polynomial { coefficients, first, scale, .. } => {
+            ForcePath::Polynomial {
+                coefficients,
+                first,
+                scale,
+                ..
+            } => {
                 let last = first + self.duration / scale;
                 let (_, slope_spread) = polynomial::beyond_linear(coefficients);
-                if coefficients.get(1).is_none_or(|slope| slope.abs() >= slope_spread) {
+                if coefficients
+                    .get(1)
+                    .is_none_or(|slope| slope.abs() >= slope_spread)
+                {
                     return;
                 }
                 polynomial::for_each_turn(coefficients, first, last, &mut |s| {
-                    visit(self.start + (s - first) * scale, polynomial::value(coefficients, s));
+                    visit(
+                        self.start + (s - first) * scale,
+                        polynomial::value(coefficients, s),
+                    );
                 });
             }
             ForcePath::Harmonic(harmonic) => {
                 let crests = |sign: f64| harmonic.times(sign).crests(self.duration);
-                let mut turns: Vec<f64> = [crests(1.0), crests(-1.0)].concat().into_iter().flatten().collect();
+                let mut turns: Vec<f64> = [crests(1.0), crests(-1.0)]
+                    .concat()
+                    .into_iter()
+                    .flatten()
+                    .collect();
                 turns.sort_by(f64::total_cmp);
                 for elapsed in turns {
                     visit(self.start + elapsed, self.force_after(elapsed));
                 }
             }
-            ForcePath::Grid { steps, spacing, first, .. } => {
+            ForcePath::Grid {
+                steps,
+                spacing,
+                first,
+                ..
+            } => {
                 for (begin, cubic, [from, to]) in self.cubics() {
                     let mut turns = [1.0, -1.0].map(|sign| cubic.crest(sign));
                     turns.sort_by(f64::total_cmp);
                     // Where cubics join, their slopes need not have the same sign.
                     let joint = (begin + 1.0 < steps.len() as f64).then_some(to);
-                    for s in turns.into_iter().filter(|s| *s > from && *s < to).chain(joint) {
+                    for s in turns
+                        .into_iter()
+                        .filter(|s| *s > from && *s < to)
+                        .chain(joint)
+                    {
                         visit(self.start + (begin + s - first) * spacing, cubic.value(s));
                     }
                 }
@@ -294,16 +371,27 @@ impl Segment<'_> {
     /// Integral of F_S over the segment, in N s.
     pub fn impulse(&self) -> f64 {
         match self.path {
-            ForcePath::Polynomial { scale, ends: [start, end], .. } => scale * (end.integral - start.integral),
+            ForcePath::Polynomial {
+                scale,
+                ends: [start, end],
+                ..
+            } => scale * (end.integral - start.integral),
             ForcePath::Harmonic(harmonic) => harmonic.integral(self.duration),
-            ForcePath::Grid { spacing, integral, .. } => spacing * integral,
+            ForcePath::Grid {
+                spacing, integral, ..
+            } => spacing * integral,
         }
     }
 
     /// The cubics of a grid in order: how many steps in each begins, and from where to where it counts.
     fn cubics(&self) -> impl DoubleEndedIterator<Item = (f64, &CubicStep, [f64; 2])> {
         let (steps, first, spacing) = match self.path {
-            ForcePath::Grid { steps, first, spacing, .. } => (steps, first, spacing),
+            ForcePath::Grid {
+                steps,
+                first,
+                spacing,
+                ..
+            } => (steps, first, spacing),
             _ => (&[][..], 0.0, 1.0),
         };
         let count = steps.len();
@@ -318,19 +406,30 @@ impl Segment<'_> {
     /// The largest `sign` · F_S and its time, if it lies above `floor`.
     fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
         let (elapsed, extreme) = match self.path {
-            ForcePath::Polynomial { coefficients, curvature_bound, first, scale, ends } => {
+            ForcePath::Polynomial {
+                coefficients,
+                curvature_bound,
+                first,
+                scale,
+                ends,
+            } => {
                 let [at_first, at_last] = ends.map(|at| sign * at.force);
                 let width = self.duration / scale;
                 let last = first + width;
-                let (s, extreme) = if at_last > at_first { (last, at_last) } else { (first, at_first) };
+                let (s, extreme) = if at_last > at_first {
+                    (last, at_last)
+                } else {
+                    (first, at_first)
+                };
                 // The second derivative bounds both how far the ends are exceeded and how much the slope turns.
                 if extreme + 0.125 * curvature_bound * width * width <= floor {
                     return None;
                 }
-                let is_monotone = (at_last - at_first).abs() >= curvature_bound * width * width || {
-                    let (_, slope_spread) = polynomial::beyond_linear(coefficients);
-                    coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_spread
-                };
+                let is_monotone = (at_last - at_first).abs() >= curvature_bound * width * width
+                    || {
+                        let (_, slope_spread) = polynomial::beyond_linear(coefficients);
+                        coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_spread
+                    };
                 let (s, extreme) = if is_monotone {
                     (s, extreme)
                 } else {
@@ -344,31 +443,61 @@ impl Segment<'_> {
             }
             ForcePath::Harmonic(harmonic) => {
                 let turns = harmonic.times(sign).crests(self.duration);
-                [Some(0.0), Some(self.duration)].into_iter().chain(turns).flatten().fold(
-                    (0.0, f64::NEG_INFINITY),
-                    |best: (f64, f64), elapsed| {
+                [Some(0.0), Some(self.duration)]
+                    .into_iter()
+                    .chain(turns)
+                    .flatten()
+                    .fold((0.0, f64::NEG_INFINITY), |best: (f64, f64), elapsed| {
                         let value = sign * self.force_after(elapsed);
-                        if value > best.1 { (elapsed, value) } else { best }
-                    },
-                )
+                        if value > best.1 {
+                            (elapsed, value)
+                        } else {
+                            best
+                        }
+                    })
             }
-            ForcePath::Grid { bounds: [low, high], .. } if (if sign > 0.0 { high } else { -low }) <= floor => {
+            ForcePath::Grid {
+                bounds: [low, high],
+                ..
+            } if (if sign > 0.0 { high } else { -low }) <= floor => {
                 return None;
             }
-            ForcePath::Grid { steps, count, first, spacing, inner, .. } => {
-                let (at, value) = if sign > 0.0 { inner.largest } else { inner.least };
+            ForcePath::Grid {
+                steps,
+                count,
+                first,
+                spacing,
+                inner,
+                ..
+            } => {
+                let (at, value) = if sign > 0.0 {
+                    inner.largest
+                } else {
+                    inner.least
+                };
                 let (mut at, mut extreme) = (at, sign * value);
                 let mut offer = |begin: f64, cubic: &CubicStep, from: f64, to: f64| {
                     let [low, high] = cubic.bounds();
-                    if (if sign > 0.0 { high } else { -low }) > if extreme > floor { extreme } else { floor } {
+                    if (if sign > 0.0 { high } else { -low })
+                        > if extreme > floor { extreme } else { floor }
+                    {
                         let (s, value) = cubic.maximum(sign, from, to);
-                        (at, extreme) = if value > extreme { (begin + s, value) } else { (at, extreme) };
+                        (at, extreme) = if value > extreme {
+                            (begin + s, value)
+                        } else {
+                            (at, extreme)
+                        };
                     }
                 };
                 // The last first, since the force mostly rises.
                 let begin = (count - 1) as f64;
                 let to = (first + self.duration / spacing - begin).min(1.0);
-                offer(begin, &steps[steps.len() - 1], if begin > 0.0 { 0.0 } else { first }, to);
+                offer(
+                    begin,
+                    &steps[steps.len() - 1],
+                    if begin > 0.0 { 0.0 } else { first },
+                    to,
+                );
                 if begin > 0.0 {
                     offer(0.0, &steps[0], first, 1.0);
                 }
@@ -392,12 +521,21 @@ mod tests {
         let (low, high) = segment.bounds();
         for pair in turns.windows(2) {
             assert!(pair[0] <= pair[1], "{turns:?}");
-            let force =
-                |step: u32| segment.force_after(pair[0] - segment.start + f64::from(step) / 50.0 * (pair[1] - pair[0]));
+            let force = |step: u32| {
+                segment.force_after(
+                    pair[0] - segment.start + f64::from(step) / 50.0 * (pair[1] - pair[0]),
+                )
+            };
             let sign = (force(50) - force(0)).signum();
             for step in 0..50 {
-                assert!(sign * (force(step + 1) - force(step)) >= -1e-12, "{turns:?}");
-                assert!((low - 1e-12..=high + 1e-12).contains(&force(step)), "{low} {high}");
+                assert!(
+                    sign * (force(step + 1) - force(step)) >= -1e-12,
+                    "{turns:?}"
+                );
+                assert!(
+                    (low - 1e-12..=high + 1e-12).contains(&force(step)),
+                    "{low} {high}"
+                );
             }
         }
     }

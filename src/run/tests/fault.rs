@@ -49,7 +49,10 @@ impl Operation {
 
     /// Whether a full disk can refuse it.
     pub const fn needs_space(self) -> bool {
-        !matches!(self, Self::Remove | Self::Lock | Self::List | Self::Read | Self::LookUp)
+        !matches!(
+            self,
+            Self::Remove | Self::Lock | Self::List | Self::Read | Self::LookUp
+        )
     }
 }
 

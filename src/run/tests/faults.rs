@@ -16,9 +16,13 @@ pub fn small_sweep(seeds: u64) -> Sweep {
 
 /// The same jobs, but run in rounds: some seeds first, then the others.
 pub fn small_sweep_in_rounds(first: u64, seeds: u64) -> Sweep {
-    let precision =
-        format!("[precision]\nof = \"tau_mean\"\nrelative = 0.01\nseeds = {{ from = {first}, to = {seeds} }}\n");
-    let text = small_sweep(seeds).text().replace(&format!("seed = {{ count = {seeds} }}\n"), "") + &precision;
+    let precision = format!(
+        "[precision]\nof = \"tau_mean\"\nrelative = 0.01\nseeds = {{ from = {first}, to = {seeds} }}\n"
+    );
+    let text = small_sweep(seeds)
+        .text()
+        .replace(&format!("seed = {{ count = {seeds} }}\n"), "")
+        + &precision;
     Sweep::parse(&text, Path::new("small.toml")).unwrap()
 }
 
@@ -59,22 +63,52 @@ const FIRST_RUN: Scenario = Scenario {
 };
 const SCENARIOS: [Scenario; 5] = [
     FIRST_RUN,
-    Scenario { name: "extension of a killed run", before: Before::KilledRun, seeds: 5, ..FIRST_RUN },
-    Scenario { name: "retry of failed jobs", before: Before::FailingRun, retry_failed: true, ..FIRST_RUN },
-    Scenario { name: "reduction", before: Before::FirstRun, reduces: true, ..FIRST_RUN },
-    Scenario { name: "rounds", in_rounds: true, ..FIRST_RUN },
+    Scenario {
+        name: "extension of a killed run",
+        before: Before::KilledRun,
+        seeds: 5,
+        ..FIRST_RUN
+    },
+    Scenario {
+        name: "retry of failed jobs",
+        before: Before::FailingRun,
+        retry_failed: true,
+        ..FIRST_RUN
+    },
+    Scenario {
+        name: "reduction",
+        before: Before::FirstRun,
+        reduces: true,
+        ..FIRST_RUN
+    },
+    Scenario {
+        name: "rounds",
+        in_rounds: true,
+        ..FIRST_RUN
+    },
 ];
 
 /// Runs with one thread, and reduces.
 fn attempt(layout: &Layout<'_>, scenario: &Scenario, faults: bool) -> Result<RunReport, String> {
     let stop = AtomicBool::new(false);
-    let options = Options { retry_failed: scenario.retry_failed, ..options(&stop, 1) };
+    let options = Options {
+        retry_failed: scenario.retry_failed,
+        ..options(&stop, 1)
+    };
     let kernel = |job: &Job, _: &AtomicBool| match job.parameters.seed {
-        1 if faults => Err(SimulationError::EventBudget { time: 0.5, events: 10 }),
+        1 if faults => Err(SimulationError::EventBudget {
+            time: 0.5,
+            events: 10,
+        }),
         _ => Ok(measure(&job.parameters)),
     };
-    let sweep = if scenario.in_rounds { small_sweep_in_rounds(2, scenario.seeds) } else { small_sweep(scenario.seeds) };
-    let report = run(layout, &sweep, options, &kernel, &mut |_| ()).map_err(|error| error.to_string())?;
+    let sweep = if scenario.in_rounds {
+        small_sweep_in_rounds(2, scenario.seeds)
+    } else {
+        small_sweep(scenario.seeds)
+    };
+    let report =
+        run(layout, &sweep, options, &kernel, &mut |_| ()).map_err(|error| error.to_string())?;
     if scenario.reduces {
         let results = Results::read(layout).map_err(|error| error.to_string())?;
         reduce(&results).map_err(|error| error.to_string())?;
@@ -85,11 +119,21 @@ fn attempt(layout: &Layout<'_>, scenario: &Scenario, faults: bool) -> Result<Run
 /// Tables, reduced data and extensions, without logs, locks and leftovers.
 pub fn results(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<&Path, &[u8]> {
     let is_result = |path: &Path| {
-        !["run/log", "run/lock", "run/staging", "run/workers", "run/claims"]
-            .iter()
-            .any(|folder| path.starts_with(folder))
+        ![
+            "run/log",
+            "run/lock",
+            "run/staging",
+            "run/workers",
+            "run/claims",
+        ]
+        .iter()
+        .any(|folder| path.starts_with(folder))
     };
-    files.iter().filter(|(path, _)| is_result(path)).map(|(path, bytes)| (path.as_path(), bytes.as_slice())).collect()
+    files
+        .iter()
+        .filter(|(path, _)| is_result(path))
+        .map(|(path, bytes)| (path.as_path(), bytes.as_slice()))
+        .collect()
 }
 
 pub fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -100,7 +144,10 @@ pub fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
             if path.is_dir() {
                 folders.push(path);
             } else {
-                files.insert(path.strip_prefix(folder).unwrap().to_owned(), fs::read(&path).unwrap());
+                files.insert(
+                    path.strip_prefix(folder).unwrap().to_owned(),
+                    fs::read(&path).unwrap(),
+                );
             }
         }
     }
@@ -112,7 +159,10 @@ fn committed_jobs(root: &Path) -> u64 {
     if !root.join("tables/jobs").exists() {
         return 0;
     }
-    texts(root, "jobs", "outcome").iter().filter(|outcome| *outcome != "failed").count() as u64
+    texts(root, "jobs", "outcome")
+        .iter()
+        .filter(|outcome| *outcome != "failed")
+        .count() as u64
 }
 
 /// A scenario, ready to begin, and how it ends.
@@ -133,14 +183,35 @@ impl Trial {
         }
         let ended_before = match scenario.before {
             Before::Nothing => None,
-            before => Some(attempt(&Layout::new(&prepared, &root), &FIRST_RUN, matches!(before, Before::FailingRun))),
+            before => Some(attempt(
+                &Layout::new(&prepared, &root),
+                &FIRST_RUN,
+                matches!(before, Before::FailingRun),
+            )),
         };
-        assert_eq!(prepared.reboot(), ended_before.is_some_and(|ended| ended.is_err()));
+        assert_eq!(
+            prepared.reboot(),
+            ended_before.is_some_and(|ended| ended.is_err())
+        );
         let good = prepared.copy();
         attempt(&Layout::new(&good, &root), &scenario, false).unwrap();
         let (before, after) = (prepared.files(&root), good.files(&root));
-        assert!(after.keys().filter(|path| path.starts_with("tables/jobs")).count() >= 2, "{:?}", after.keys());
-        Self { scenario, root, prepared, before, after }
+        assert!(
+            after
+                .keys()
+                .filter(|path| path.starts_with("tables/jobs"))
+                .count()
+                >= 2,
+            "{:?}",
+            after.keys()
+        );
+        Self {
+            scenario,
+            root,
+            prepared,
+            before,
+            after,
+        }
     }
 
     /// Goes through with a fault at the n-th operation of a kind; `false` if there are fewer.
@@ -152,22 +223,34 @@ impl Trial {
             assert!(ended.is_ok(), "{ended:?}");
             return false;
         }
-        let case = format!("{}: {fault:?} at {operation:?} {n}, {ended:?}", self.scenario.name);
+        let case = format!(
+            "{}: {fault:?} at {operation:?} {n}, {ended:?}",
+            self.scenario.name
+        );
         let left = disk.files(&self.root);
         match fault {
             Fault::ShortWrite => assert!(ended.is_ok(), "{case}"),
             Fault::Killed | Fault::PowerCut | Fault::PowerCutTorn => {}
-            _ => assert!(ended.is_err() || results(&left) == results(&self.after), "{case}"),
+            _ => assert!(
+                ended.is_err() || results(&left) == results(&self.after),
+                "{case}"
+            ),
         }
         // Nothing was damaged, so no message may say to move files away.
-        assert!(!ended.is_err_and(|error| error.contains("damaged")), "{case}");
+        assert!(
+            !ended.is_err_and(|error| error.contains("damaged")),
+            "{case}"
+        );
         self.is_whole(&left, &case);
         self.resumes(&disk, &left, &case);
 
         // What a run reported as done survives a power cut, whatever happened before it.
         attempt(&Layout::new(&disk, &self.root), &self.scenario, false).expect(&case);
         disk.cut_power();
-        assert!(results(&disk.files(&self.root)) == results(&self.after), "{case}: resumed, then a power cut");
+        assert!(
+            results(&disk.files(&self.root)) == results(&self.after),
+            "{case}: resumed, then a power cut"
+        );
         true
     }
 
@@ -188,7 +271,9 @@ impl Trial {
     /// The same command with the real storage resumes, runs nothing twice, and ends with the same bytes.
     fn resumes(&self, disk: &FaultyDisk, left: &BTreeMap<PathBuf, Vec<u8>>, case: &str) {
         // Where syncs cost nothing, if there is such a place.
-        let folder = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap();
+        let folder = tempfile::tempdir_in("/dev/shm")
+            .or_else(|_| tempfile::tempdir())
+            .unwrap();
         let real = folder.path().join("small");
         for path in disk.folders(&self.root) {
             fs::create_dir_all(real.join(path)).unwrap();
@@ -199,9 +284,21 @@ impl Trial {
         let done = committed_jobs(&real);
         let report = attempt(&Layout::new(&Disk, &real), &self.scenario, false).expect(case);
         let jobs_run = committed_jobs(&real) - done;
-        assert_eq!((report.jobs_run, report.jobs_failed, report.jobs_left), (jobs_run, 0, 0), "{case}");
-        assert!(results(&files_below(&real)) == results(&self.after), "{case}: resumed with the real store");
-        assert!(Disk.list(&real.join("run/staging/shard-1-of-1")).unwrap().is_empty(), "{case}");
+        assert_eq!(
+            (report.jobs_run, report.jobs_failed, report.jobs_left),
+            (jobs_run, 0, 0),
+            "{case}"
+        );
+        assert!(
+            results(&files_below(&real)) == results(&self.after),
+            "{case}: resumed with the real store"
+        );
+        assert!(
+            Disk.list(&real.join("run/staging/shard-1-of-1"))
+                .unwrap()
+                .is_empty(),
+            "{case}"
+        );
     }
 }
 
@@ -210,7 +307,10 @@ fn try_all(scenario: Scenario) -> BTreeMap<(Operation, Fault), usize> {
     let trial = Trial::new(scenario);
     let mut tried = BTreeMap::new();
     for operation in Operation::ALL {
-        for fault in Fault::ALL.into_iter().filter(|fault| fault.befalls(operation)) {
+        for fault in Fault::ALL
+            .into_iter()
+            .filter(|fault| fault.befalls(operation))
+        {
             let mut n = 0;
             while trial.befalls(operation, n, fault) {
                 n += 1;
@@ -231,8 +331,14 @@ fn every_fault_at_every_operation_leaves_whole_files_and_the_next_run_ends_with_
     for (pair, count) in each.into_iter().flatten() {
         *tried.entry(pair).or_default() += count;
     }
-    assert!(tried.values().all(|&count| count > 0), "a fault that can befall an operation was not tried: {tried:?}");
+    assert!(
+        tried.values().all(|&count| count > 0),
+        "a fault that can befall an operation was not tried: {tried:?}"
+    );
     let total: usize = tried.values().sum();
     let page = include_str!("../../../docs/development.md");
-    assert!(page.contains(&format!(" {total} faults")), "docs/development.md has another number: {total}, {tried:?}");
+    assert!(
+        page.contains(&format!(" {total} faults")),
+        "docs/development.md has another number: {total}, {tried:?}"
+    );
 }

@@ -83,10 +83,18 @@ impl FaultyDisk {
             Node::Folder => Node::Folder,
             Node::File(bytes) => {
                 let bytes = bytes.lock().unwrap().seen.clone();
-                Node::File(Arc::new(Mutex::new(Bytes { on_disk: bytes.clone(), seen: bytes })))
+                Node::File(Arc::new(Mutex::new(Bytes {
+                    on_disk: bytes.clone(),
+                    seen: bytes,
+                })))
             }
         };
-        let names: BTreeMap<_, _> = self.state().seen.iter().map(|(path, node)| (path.clone(), synced(node))).collect();
+        let names: BTreeMap<_, _> = self
+            .state()
+            .seen
+            .iter()
+            .map(|(path, node)| (path.clone(), synced(node)))
+            .collect();
         copy.state().on_disk.clone_from(&names);
         copy.state().seen = names;
         copy
@@ -117,8 +125,10 @@ impl FaultyDisk {
     /// Loses all that is not synced.
     pub fn cut_power(&self) {
         let mut state = self.state();
-        let is_reached =
-            |path: &Path| path.ancestors().all(|above| !above.starts_with(MOUNT) || state.on_disk.contains_key(above));
+        let is_reached = |path: &Path| {
+            path.ancestors()
+                .all(|above| !above.starts_with(MOUNT) || state.on_disk.contains_key(above))
+        };
         let left: BTreeMap<_, _> = state
             .on_disk
             .iter()
@@ -154,7 +164,10 @@ impl FaultyDisk {
     pub fn files(&self, folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         let state = self.state();
         let files = state.seen.iter().filter_map(|(path, node)| match node {
-            Node::File(bytes) => Some((path.strip_prefix(folder).ok()?.to_owned(), bytes.lock().unwrap().seen.clone())),
+            Node::File(bytes) => Some((
+                path.strip_prefix(folder).ok()?.to_owned(),
+                bytes.lock().unwrap().seen.clone(),
+            )),
             Node::Folder => None,
         });
         files.collect()
@@ -163,8 +176,13 @@ impl FaultyDisk {
     /// All folders below a folder, by their paths within it.
     pub fn folders(&self, folder: &Path) -> Vec<PathBuf> {
         let state = self.state();
-        let folders = state.seen.iter().filter(|(_, node)| matches!(node, Node::Folder));
-        folders.filter_map(|(path, _)| Some(path.strip_prefix(folder).ok()?.to_owned())).collect()
+        let folders = state
+            .seen
+            .iter()
+            .filter(|(_, node)| matches!(node, Node::Folder));
+        folders
+            .filter_map(|(path, _)| Some(path.strip_prefix(folder).ok()?.to_owned()))
+            .collect()
     }
 
     /// An operation on a path.
@@ -174,10 +192,15 @@ impl FaultyDisk {
         path: &Path,
         act: impl FnOnce(&mut State) -> io::Result<T>,
     ) -> Result<T, StorageError> {
-        self.act(operation, act).map_err(StorageError::at(operation.name(), path))
+        self.act(operation, act)
+            .map_err(StorageError::at(operation.name(), path))
     }
 
-    fn act<T>(&self, operation: Operation, act: impl FnOnce(&mut State) -> io::Result<T>) -> io::Result<T> {
+    fn act<T>(
+        &self,
+        operation: Operation,
+        act: impl FnOnce(&mut State) -> io::Result<T>,
+    ) -> io::Result<T> {
         let mut state = self.state();
         match state.meet(operation) {
             Verdict::Done => act(&mut state),
@@ -202,7 +225,10 @@ impl State {
             Mode::Full if operation.needs_space() => return Verdict::Refused(libc::ENOSPC),
             _ => {}
         }
-        let Some((_, _, fault)) = self.armed.filter(|(armed, _, _)| *armed == operation && !is_beat) else {
+        let Some((_, _, fault)) = self
+            .armed
+            .filter(|(armed, _, _)| *armed == operation && !is_beat)
+        else {
             return Verdict::Done;
         };
         if self.left > 0 {
@@ -245,7 +271,10 @@ impl State {
     /// A file, created if needed.
     fn touch(&mut self, path: &Path) -> io::Result<Arc<Mutex<Bytes>>> {
         self.is_folder(path.parent().unwrap())?;
-        let node = self.seen.entry(path.to_owned()).or_insert_with(|| Node::File(Arc::default()));
+        let node = self
+            .seen
+            .entry(path.to_owned())
+            .or_insert_with(|| Node::File(Arc::default()));
         match node {
             Node::File(bytes) => Ok(Arc::clone(bytes)),
             Node::Folder => Err(io::ErrorKind::IsADirectory.into()),
@@ -312,7 +341,13 @@ impl Storage for FaultyDisk {
         self.on(Operation::Create, file, |state| {
             let bytes = state.touch(file)?;
             bytes.lock().unwrap().seen.clear();
-            Ok(StoredFile::new(file, FaultyFile { disk: self.clone(), bytes }))
+            Ok(StoredFile::new(
+                file,
+                FaultyFile {
+                    disk: self.clone(),
+                    bytes,
+                },
+            ))
         })
     }
 
@@ -342,15 +377,23 @@ impl Storage for FaultyDisk {
             let is_in = |path: &Path| path.parent() == Some(folder);
             state.on_disk.retain(|path, _| !is_in(path));
             let seen = state.seen.iter().filter(|(path, _)| is_in(path));
-            state.on_disk.extend(seen.map(|(path, node)| (path.clone(), node.clone())));
+            state
+                .on_disk
+                .extend(seen.map(|(path, node)| (path.clone(), node.clone())));
             Ok(())
         })
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
         self.on(Operation::List, folder, |state| {
-            let names = state.seen.keys().filter(|path| path.parent() == Some(folder));
-            Ok(names.filter_map(|path| path.file_name()).map(ToOwned::to_owned).collect())
+            let names = state
+                .seen
+                .keys()
+                .filter(|path| path.parent() == Some(folder));
+            Ok(names
+                .filter_map(|path| path.file_name())
+                .map(ToOwned::to_owned)
+                .collect())
         })
     }
 
@@ -370,7 +413,9 @@ impl Storage for FaultyDisk {
     }
 
     fn exists(&self, file: &Path) -> Result<bool, StorageError> {
-        self.on(Operation::LookUp, file, |state| Ok(state.seen.contains_key(file)))
+        self.on(Operation::LookUp, file, |state| {
+            Ok(state.seen.contains_key(file))
+        })
     }
 
     fn remove(&self, file: &Path) -> Result<(), StorageError> {
@@ -394,7 +439,10 @@ impl Storage for FaultyDisk {
             if !state.locks.insert(file.to_owned()) {
                 return Ok(Lock::Taken);
             }
-            Ok(Lock::Ours(Box::new(Held { disk: self.clone(), file: file.to_owned() })))
+            Ok(Lock::Ours(Box::new(Held {
+                disk: self.clone(),
+                file: file.to_owned(),
+            })))
         })
     }
 }

@@ -37,13 +37,21 @@ pub struct Host<'a> {
 
 impl<'a> Host<'a> {
     pub fn new(schedule: &'a Schedule, process: usize, has_caches: bool) -> Self {
-        Self { schedule, process, beliefs: has_caches.then(Mutex::default) }
+        Self {
+            schedule,
+            process,
+            beliefs: has_caches.then(Mutex::default),
+        }
     }
 
     /// Waits for the turn of this process. The beats of a worker come when they like.
     fn turn(&self, action: &'static str, path: &Path) -> Result<(), StorageError> {
         let is_beat = std::thread::current().name() == Some(BEAT_THREAD);
-        let turn = if is_beat { self.schedule.outside(self.process) } else { self.schedule.turn(self.process, action) };
+        let turn = if is_beat {
+            self.schedule.outside(self.process)
+        } else {
+            self.schedule.turn(self.process, action)
+        };
         turn.map_err(StorageError::at(action, path))
     }
 
@@ -61,7 +69,11 @@ impl<'a> Host<'a> {
     fn believed<T>(&self, path: &Path, of: impl FnOnce(&Belief) -> Option<T>) -> Option<T> {
         let beliefs = self.beliefs()?;
         let (since, belief) = beliefs.get(path)?;
-        if self.schedule.now() - since < STALE { of(belief) } else { None }
+        if self.schedule.now() - since < STALE {
+            of(belief)
+        } else {
+            None
+        }
     }
 
     fn forget(&self, path: &Path) {
@@ -114,11 +126,17 @@ impl Storage for Host<'_> {
 
     fn open(&self, file: &Path) -> Result<File, StorageError> {
         self.turn("open", file)?;
-        let gone = || Err(StorageError::at("read", file)(io::ErrorKind::NotFound.into()));
+        let gone = || {
+            Err(StorageError::at("read", file)(
+                io::ErrorKind::NotFound.into(),
+            ))
+        };
         let stale = self.believed(file, |belief| match belief {
             Belief::Absent => Some(gone()),
             Belief::Present => None,
-            Belief::Read(handle) => Some(Disk.open(Path::new(&format!("/proc/self/fd/{}", handle.as_raw_fd())))),
+            Belief::Read(handle) => {
+                Some(Disk.open(Path::new(&format!("/proc/self/fd/{}", handle.as_raw_fd()))))
+            }
         });
         // A server is asked whether what is opened is still there.
         if let Some(stale) = stale.filter(|stale| stale.is_err() || file.exists()) {
@@ -130,7 +148,9 @@ impl Storage for Host<'_> {
                 let handle = handle.try_clone().map_err(StorageError::at("read", file))?;
                 self.believe(file, Belief::Read(handle));
             }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => self.believe(file, Belief::Absent),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                self.believe(file, Belief::Absent)
+            }
             Err(_) => (),
         }
         opened
@@ -142,7 +162,14 @@ impl Storage for Host<'_> {
             return Ok(stale);
         }
         let exists = Disk.exists(file)?;
-        self.believe(file, if exists { Belief::Present } else { Belief::Absent });
+        self.believe(
+            file,
+            if exists {
+                Belief::Present
+            } else {
+                Belief::Absent
+            },
+        );
         Ok(exists)
     }
 
@@ -157,6 +184,10 @@ impl Storage for Host<'_> {
     /// Network file systems are often mounted without locks.
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
         self.turn("lock", file)?;
-        if self.beliefs.is_some() { Ok(Lock::Unknown) } else { Disk.lock(file) }
+        if self.beliefs.is_some() {
+            Ok(Lock::Unknown)
+        } else {
+            Disk.lock(file)
+        }
     }
 }

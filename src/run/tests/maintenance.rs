@@ -26,13 +26,18 @@ struct Dying {
 
 impl Dying {
     fn after(changes: u64) -> Self {
-        Self { changes_left: Arc::new(AtomicU64::new(changes)) }
+        Self {
+            changes_left: Arc::new(AtomicU64::new(changes)),
+        }
     }
 }
 
 fn change(left: &AtomicU64) -> io::Result<()> {
-    let left = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
-    left.map(|_| ()).map_err(|_| io::Error::other("the disk died"))
+    let left = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+        left.checked_sub(1)
+    });
+    left.map(|_| ())
+        .map_err(|_| io::Error::other("the disk died"))
 }
 
 struct DyingFile(File, Arc<AtomicU64>);
@@ -56,7 +61,11 @@ impl Sink for DyingFile {
 
 impl OverDisk for Dying {
     fn before(&self, access: Access) -> io::Result<()> {
-        if access == Access::Change { change(&self.changes_left) } else { Ok(()) }
+        if access == Access::Change {
+            change(&self.changes_left)
+        } else {
+            Ok(())
+        }
     }
     fn wrap(&self, file: File) -> Box<dyn Sink> {
         Box::new(DyingFile(file, Arc::clone(&self.changes_left)))
@@ -77,7 +86,11 @@ impl OverDisk for Blind {
         }
         let left = self.looks_left.fetch_sub(1, Ordering::Relaxed);
         let fails = left == 0 || (self.stays && left < 0);
-        if fails { Err(io::Error::from_raw_os_error(self.error)) } else { Ok(()) }
+        if fails {
+            Err(io::Error::from_raw_os_error(self.error))
+        } else {
+            Ok(())
+        }
     }
 }
 
@@ -86,18 +99,31 @@ fn a_disk_that_cannot_be_read_is_not_damaged_and_its_repair_moves_nothing() {
     let root = super::schedules::folder();
     run_all(root.path(), FEWER);
     let before = tables_of(root.path());
-    for (stays, error) in [(false, libc::EIO), (true, libc::EMFILE), (true, libc::EACCES)] {
+    for (stays, error) in [
+        (false, libc::EIO),
+        (true, libc::EMFILE),
+        (true, libc::EACCES),
+    ] {
         for looks in 0.. {
-            let disk = Blind { looks_left: AtomicI64::new(looks), stays, error };
+            let disk = Blind {
+                looks_left: AtomicI64::new(looks),
+                stays,
+                error,
+            };
             let layout = Layout::new(&disk, root.path());
             let repaired = Results::repair(&layout);
             let has_failed = disk.looks_left.load(Ordering::Relaxed) < 0;
             let case = format!("{error} at look {looks}");
             match repaired {
-                Ok(verification) => assert!(verification.whole, "{case}: {:?}", verification.problems),
+                Ok(verification) => {
+                    assert!(verification.whole, "{case}: {:?}", verification.problems)
+                }
                 Err(error) => assert!(matches!(error.kind, ErrorKind::Disk(_)), "{case}: {error}"),
             }
-            assert!(tables_of(root.path()) == before && !layout.quarantine().exists(), "{case}");
+            assert!(
+                tables_of(root.path()) == before && !layout.quarantine().exists(),
+                "{case}"
+            );
             if !has_failed {
                 break;
             }
@@ -119,17 +145,39 @@ const SEEDS: u64 = 60;
 
 #[expect(clippy::unnecessary_wraps, reason = "a kernel")]
 fn kernel(job: &Job, _: &AtomicBool) -> Result<Measurements, SimulationError> {
-    let summary = Summary { end_time: job.parameters.drive_velocity, satisfied: true, ..Summary::default() };
-    Ok(Measurements { ruptures: job.parameters.seed, summary, ..Measurements::default() })
+    let summary = Summary {
+        end_time: job.parameters.drive_velocity,
+        satisfied: true,
+        ..Summary::default()
+    };
+    Ok(Measurements {
+        ruptures: job.parameters.seed,
+        summary,
+        ..Measurements::default()
+    })
 }
 
 fn options(stop: &AtomicBool) -> Options<'_> {
-    Options { threads: NonZeroUsize::new(1), stop, retry_failed: false, shard: Shard::default(), walltime: None }
+    Options {
+        threads: NonZeroUsize::new(1),
+        stop,
+        retry_failed: false,
+        shard: Shard::default(),
+        walltime: None,
+    }
 }
 
 fn run_all(root: &Path, seeds: u64) -> u64 {
     let stop = AtomicBool::new(false);
-    run(&Layout::new(&Disk, root), &sweep(seeds), options(&stop), &kernel, &mut |_| ()).unwrap().jobs_run
+    run(
+        &Layout::new(&Disk, root),
+        &sweep(seeds),
+        options(&stop),
+        &kernel,
+        &mut |_| (),
+    )
+    .unwrap()
+    .jobs_run
 }
 
 /// The ids of all jobs in the tables, as a reader finds them.
@@ -147,7 +195,10 @@ fn tables_of(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     for table in ["slips", "jobs"] {
         for entry in fs::read_dir(root.join("tables").join(table)).unwrap() {
             let path = entry.unwrap().path();
-            files.insert(path.strip_prefix(root).unwrap().to_owned(), fs::read(&path).unwrap());
+            files.insert(
+                path.strip_prefix(root).unwrap().to_owned(),
+                fs::read(&path).unwrap(),
+            );
         }
     }
     files
@@ -166,22 +217,41 @@ fn an_export_that_ends_at_any_operation_leaves_no_half_a_file_and_can_be_done_ag
     let root = extended();
     let before = tables_of(root.path());
     let export = |disk: &dyn Storage, to: &Path| {
-        Results::read(&Layout::new(disk, root.path())).unwrap().export(to, Format::Csv, &mut |_, _| ())
+        Results::read(&Layout::new(disk, root.path()))
+            .unwrap()
+            .export(to, Format::Csv, &mut |_, _| ())
     };
     let files = |folder: &Path| super::faults::files_below(folder);
     let whole = tempfile::tempdir().unwrap();
     assert_eq!(export(&Disk, whole.path()).unwrap().jobs, 2 * SEEDS);
     let expected = files(whole.path());
-    assert_eq!(expected.keys().map(|path| path.to_str().unwrap()).collect::<Vec<_>>(), ["jobs.csv", "slips.csv"]);
+    assert_eq!(
+        expected
+            .keys()
+            .map(|path| path.to_str().unwrap())
+            .collect::<Vec<_>>(),
+        ["jobs.csv", "slips.csv"]
+    );
     let error = export(&Disk, whole.path()).unwrap_err();
-    assert!(error.kind == ErrorKind::Refused && error.to_string().contains("is not empty"), "{error}");
+    assert!(
+        error.kind == ErrorKind::Refused && error.to_string().contains("is not empty"),
+        "{error}"
+    );
     for changes in 0.. {
         let folder = tempfile::tempdir().unwrap();
         let to = folder.path().join("a/b");
         let ended = export(&Dying::after(changes), &to);
-        let mut left = if to.exists() { files(&to) } else { BTreeMap::new() };
+        let mut left = if to.exists() {
+            files(&to)
+        } else {
+            BTreeMap::new()
+        };
         left.retain(|path, _| !path.starts_with(".unfinished") && path.components().count() == 1);
-        assert!(left.iter().all(|(path, bytes)| expected.get(path) == Some(bytes)), "after {changes} changes");
+        assert!(
+            left.iter()
+                .all(|(path, bytes)| expected.get(path) == Some(bytes)),
+            "after {changes} changes"
+        );
         if left.is_empty() {
             export(&Disk, &to).unwrap();
             assert!(files(&to) == expected, "after {changes} changes");
@@ -210,11 +280,27 @@ fn a_repair_that_ends_at_any_operation_can_be_done_again() {
         let ended = Results::repair(&Layout::new(&Dying::after(changes), root.path()));
         Results::repair(&Layout::new(&Disk, root.path())).unwrap();
         let verification = Results::verify(&Layout::new(&Disk, root.path())).unwrap();
-        assert!(verification.whole, "after {changes} changes: {:?}", verification.problems);
+        assert!(
+            verification.whole,
+            "after {changes} changes: {:?}",
+            verification.problems
+        );
         run_all(root.path(), SEEDS);
-        assert!(tables_of(root.path()) == expected, "after {changes} changes");
-        assert_eq!(ids(root.path()).len() as u64, 2 * SEEDS, "after {changes} changes");
-        assert!(Results::verify(&Layout::new(&Disk, root.path())).unwrap().whole, "after {changes} changes");
+        assert!(
+            tables_of(root.path()) == expected,
+            "after {changes} changes"
+        );
+        assert_eq!(
+            ids(root.path()).len() as u64,
+            2 * SEEDS,
+            "after {changes} changes"
+        );
+        assert!(
+            Results::verify(&Layout::new(&Disk, root.path()))
+                .unwrap()
+                .whole,
+            "after {changes} changes"
+        );
         if ended.is_ok() {
             assert!(changes > 10, "{changes} operations");
             break;
@@ -226,13 +312,29 @@ fn a_repair_that_ends_at_any_operation_can_be_done_again() {
 fn a_retry_that_ends_at_any_operation_keeps_every_good_row() {
     let stop = AtomicBool::new(false);
     let retry = |disk: &dyn Storage, root: &Path| {
-        let options = Options { retry_failed: true, ..options(&stop) };
-        run(&Layout::new(disk, root), &super::sweep(FEWER, ""), options, &fine, &mut |_| ())
+        let options = Options {
+            retry_failed: true,
+            ..options(&stop)
+        };
+        run(
+            &Layout::new(disk, root),
+            &super::sweep(FEWER, ""),
+            options,
+            &fine,
+            &mut |_| (),
+        )
     };
     let once = || {
         let root = tempfile::tempdir().unwrap();
         let kernel: &Kernel<'_> = &|job, _| faulty(job, true);
-        run(&Layout::new(&Disk, root.path()), &super::sweep(FEWER, ""), options(&stop), kernel, &mut |_| ()).unwrap();
+        run(
+            &Layout::new(&Disk, root.path()),
+            &super::sweep(FEWER, ""),
+            options(&stop),
+            kernel,
+            &mut |_| (),
+        )
+        .unwrap();
         root
     };
     let good = |root: &Path| {
@@ -248,10 +350,22 @@ fn a_retry_that_ends_at_any_operation_keeps_every_good_row() {
         let root = once();
         let before = good(root.path());
         let ended = retry(&Dying::after(changes), root.path());
-        assert!(good(root.path()).is_superset(&before), "after {changes} changes");
-        assert!(Results::verify(&Layout::new(&Disk, root.path())).unwrap().whole || ended.is_err());
+        assert!(
+            good(root.path()).is_superset(&before),
+            "after {changes} changes"
+        );
+        assert!(
+            Results::verify(&Layout::new(&Disk, root.path()))
+                .unwrap()
+                .whole
+                || ended.is_err()
+        );
         retry(&Disk, root.path()).unwrap();
-        assert_eq!(good(root.path()).len() as u64, 2 * FEWER, "after {changes} changes");
+        assert_eq!(
+            good(root.path()).len() as u64,
+            2 * FEWER,
+            "after {changes} changes"
+        );
         if ended.is_ok() {
             assert!(changes > 20, "{changes} operations");
             break;

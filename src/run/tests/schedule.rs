@@ -32,7 +32,12 @@ impl State {
         }
         let is_alone = self.running.len() == 1;
         self.frozen.take_if(|_| is_alone);
-        let awake = || self.waiting.iter().copied().filter(|process| Some(*process) != self.frozen);
+        let awake = || {
+            self.waiting
+                .iter()
+                .copied()
+                .filter(|process| Some(*process) != self.frozen)
+        };
         let total: u64 = awake().map(|process| self.weights[process]).sum();
         let mut left = self.random.next_u64() % total;
         self.turn = awake().find(|&process| {
@@ -56,10 +61,22 @@ pub struct Schedule {
 impl Schedule {
     /// Schedules `processes`. With `kill_before`, one of them is killed at one of its first operations, this number at most;
     /// with `freeze_before`, the first is suspended likewise, for so long that others take it for dead.
-    pub fn new(seed: u64, processes: usize, kill_before: Option<u64>, freeze_before: Option<u64>) -> Self {
+    pub fn new(
+        seed: u64,
+        processes: usize,
+        kill_before: Option<u64>,
+        freeze_before: Option<u64>,
+    ) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let weights = (0..processes).map(|_| 1 << (random.next_u64() % 8)).collect();
-        let kill = kill_before.map(|below| (random_index(&mut random, processes), random.next_u64() % below));
+        let weights = (0..processes)
+            .map(|_| 1 << (random.next_u64() % 8))
+            .collect();
+        let kill = kill_before.map(|below| {
+            (
+                random_index(&mut random, processes),
+                random.next_u64() % below,
+            )
+        });
         let freeze = freeze_before.map(|below| (0, random.next_u64() % below));
         let state = State {
             random,
@@ -73,7 +90,10 @@ impl Schedule {
             frozen: None,
             log: Vec::new(),
         };
-        Self { state: Mutex::new(state), turned: Condvar::new() }
+        Self {
+            state: Mutex::new(state),
+            turned: Condvar::new(),
+        }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -84,7 +104,11 @@ impl Schedule {
     pub fn turn(&self, process: usize, action: &'static str) -> io::Result<()> {
         self.outside(process)?;
         let mut state = self.state();
-        if let Some((_, left)) = state.freeze.as_mut().filter(|(victim, _)| *victim == process) {
+        if let Some((_, left)) = state
+            .freeze
+            .as_mut()
+            .filter(|(victim, _)| *victim == process)
+        {
             if *left == 0 {
                 (state.freeze, state.frozen) = (None, Some(process));
                 lose(std::thread::current().id());
@@ -95,7 +119,10 @@ impl Schedule {
         state.waiting.insert(process);
         state.choose();
         self.turned.notify_all();
-        let mut state = self.turned.wait_while(state, |state| state.turn != Some(process)).unwrap();
+        let mut state = self
+            .turned
+            .wait_while(state, |state| state.turn != Some(process))
+            .unwrap();
         state.turn = None;
         state.waiting.remove(&process);
         state.log.push((process, action));
@@ -113,7 +140,11 @@ impl Schedule {
 
     /// Whether a process may still do something outside its turns.
     pub fn outside(&self, process: usize) -> io::Result<()> {
-        if self.state().killed.contains(&process) { Err(io::Error::other("the process was killed")) } else { Ok(()) }
+        if self.state().killed.contains(&process) {
+            Err(io::Error::other("the process was killed"))
+        } else {
+            Ok(())
+        }
     }
 
     /// A process has ended; says whether it was killed.

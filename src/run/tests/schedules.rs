@@ -78,24 +78,38 @@ impl Process {
     fn act(self, layout: &Layout<'_>, in_rounds: bool, runs: &Runs) -> anyhow::Result<()> {
         match self {
             Self::Run => run_some(layout, (SEEDS, in_rounds), None, runs).map(|_| ()),
-            Self::StoppedRun => run_some(layout, (SEEDS, in_rounds), Some(STOP_AFTER), runs).map(|_| ()),
+            Self::StoppedRun => {
+                run_some(layout, (SEEDS, in_rounds), Some(STOP_AFTER), runs).map(|_| ())
+            }
             Self::RunFewer => run_some(layout, (FEWER, in_rounds), None, runs).map(|_| ()),
             Self::Export => {
-                let folder = layout.root().with_file_name(format!("export-{:016x}", own_number()));
-                Ok(Results::read(layout)?.export(&folder, Format::Arrow, &mut |_, _| ()).map(|_| ())?)
+                let folder = layout
+                    .root()
+                    .with_file_name(format!("export-{:016x}", own_number()));
+                Ok(Results::read(layout)?
+                    .export(&folder, Format::Arrow, &mut |_, _| ())
+                    .map(|_| ())?)
             }
             Self::Repair => assert_sound(&Results::repair(layout)?),
             Self::Verify => assert_sound(&Results::verify(layout)?),
             Self::Reduce => Ok(reduce(&Results::read(layout)?).map(|_| ())?),
-            Self::Read => Ok(layout.dataset("jobs")?.rows::<Names>().try_for_each(|batch| batch.map(drop))?),
+            Self::Read => Ok(layout
+                .dataset("jobs")?
+                .rows::<Names>()
+                .try_for_each(|batch| batch.map(drop))?),
         }
     }
 }
 
 /// Nothing is damaged; at worst, what was reduced is to be reduced again.
 fn assert_sound(verification: &Verification) -> anyhow::Result<()> {
-    let mut problems = verification.problems.iter().filter(|problem| problem.remedy != Remedy::Reduce);
-    problems.next().map_or(Ok(()), |problem| Err(anyhow::anyhow!("{problem:?}")))
+    let mut problems = verification
+        .problems
+        .iter()
+        .filter(|problem| problem.remedy != Remedy::Reduce);
+    problems
+        .next()
+        .map_or(Ok(()), |problem| Err(anyhow::anyhow!("{problem:?}")))
 }
 
 /// Runs the sweep with this number of seeds, in rounds or not.
@@ -105,7 +119,11 @@ fn run_some(
     stop_after: Option<u64>,
     runs: &Runs,
 ) -> anyhow::Result<RunReport> {
-    let sweep = if in_rounds { small_sweep_in_rounds(AT_FIRST, seeds) } else { small_sweep(seeds) };
+    let sweep = if in_rounds {
+        small_sweep_in_rounds(AT_FIRST, seeds)
+    } else {
+        small_sweep(seeds)
+    };
     let (stop, begun) = (AtomicBool::new(false), AtomicU64::new(0));
     let kernel = |job: &Job, interrupt: &AtomicBool| {
         if stop_after.is_some_and(|most| begun.fetch_add(1, Ordering::Relaxed) >= most) {
@@ -121,20 +139,30 @@ fn run_some(
     let mut done = 0;
     let report = run(layout, &sweep, options(&stop, 1), &kernel, &mut |event| {
         done += u64::from(matches!(event, RunEvent::JobDone { .. }));
-        stop.store(stop_after.is_some_and(|most| done >= most), Ordering::Relaxed);
+        stop.store(
+            stop_after.is_some_and(|most| done >= most),
+            Ordering::Relaxed,
+        );
     })?;
     Ok(report)
 }
 
 impl There {
-    const ALL: [Self; 4] = [Self::Nothing, Self::StoppedRun, Self::FewerJobs, Self::AllJobs];
+    const ALL: [Self; 4] = [
+        Self::Nothing,
+        Self::StoppedRun,
+        Self::FewerJobs,
+        Self::AllJobs,
+    ];
 
     fn prepare(self, layout: &Layout<'_>, in_rounds: bool) -> anyhow::Result<()> {
         let runs = Runs::default();
         match self {
             Self::Nothing => (),
             Self::StoppedRun => {
-                assert!(run_some(layout, (SEEDS, in_rounds), Some(STOP_AFTER), &runs)?.jobs_spilled > 0);
+                assert!(
+                    run_some(layout, (SEEDS, in_rounds), Some(STOP_AFTER), &runs)?.jobs_spilled > 0
+                );
             }
             Self::FewerJobs => {
                 run_some(layout, (FEWER, in_rounds), None, &runs)?;
@@ -149,7 +177,9 @@ impl There {
 
 /// A folder where syncs cost nothing, if there is such a place.
 pub(super) fn folder() -> tempfile::TempDir {
-    tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap()
+    tempfile::tempdir_in("/dev/shm")
+        .or_else(|_| tempfile::tempdir())
+        .unwrap()
 }
 
 fn write_files(root: &Path, files: &BTreeMap<PathBuf, Vec<u8>>) {
@@ -160,10 +190,17 @@ fn write_files(root: &Path, files: &BTreeMap<PathBuf, Vec<u8>>) {
 }
 
 /// Completes a directory alone: runs, reduces; its files, and the jobs that were missing.
-fn complete(root: &Path, in_rounds: bool, runs: &Runs) -> anyhow::Result<BTreeMap<PathBuf, Vec<u8>>> {
+fn complete(
+    root: &Path,
+    in_rounds: bool,
+    runs: &Runs,
+) -> anyhow::Result<BTreeMap<PathBuf, Vec<u8>>> {
     let layout = Layout::new(&Disk, root);
     let report = run_some(&layout, (SEEDS, in_rounds), None, runs)?;
-    anyhow::ensure!((report.jobs_failed, report.jobs_left) == (0, 0), "{report:?}");
+    anyhow::ensure!(
+        (report.jobs_failed, report.jobs_left) == (0, 0),
+        "{report:?}"
+    );
     let results = Results::read(&layout)?;
     reduce(&results)?;
     anyhow::ensure!(Results::verify(&layout)?.whole, "it is not whole");
@@ -183,17 +220,39 @@ static TRIALS: LazyLock<BTreeMap<(There, bool), Trial>> = LazyLock::new(|| {
         let (folder, runs) = (folder(), Runs::default());
         let root = folder.path().join("small");
         fs::create_dir(&root).unwrap();
-        there.prepare(&Layout::new(&Disk, &root), in_rounds).unwrap();
+        there
+            .prepare(&Layout::new(&Disk, &root), in_rounds)
+            .unwrap();
         let before = files_below(&root);
         let after = complete(&root, in_rounds, &runs).unwrap();
-        ((there, in_rounds), Trial { before, after, missing: runs.into_inner().unwrap() })
+        (
+            (there, in_rounds),
+            Trial {
+                before,
+                after,
+                missing: runs.into_inner().unwrap(),
+            },
+        )
     };
-    There::ALL.into_iter().flat_map(|there| [(there, false), (there, true)]).map(trial).collect()
+    There::ALL
+        .into_iter()
+        .flat_map(|there| [(there, false), (there, true)])
+        .map(trial)
+        .collect()
 });
 
 /// Whether a process of these may end with this error, though nothing has befallen it.
-fn is_allowed(error: &anyhow::Error, process: Process, processes: &[Process], there: There, is_frozen: bool) -> bool {
-    let is_run = matches!(process, Process::Run | Process::StoppedRun | Process::RunFewer);
+fn is_allowed(
+    error: &anyhow::Error,
+    process: Process,
+    processes: &[Process],
+    there: There,
+    is_frozen: bool,
+) -> bool {
+    let is_run = matches!(
+        process,
+        Process::Run | Process::StoppedRun | Process::RunFewer
+    );
     if let Some(error) = error.downcast_ref::<ResultsError>() {
         let has_other_sweep = processes.contains(&Process::RunFewer);
         return match error.kind {
@@ -216,20 +275,29 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
     let there = There::ALL[below(There::ALL.len())];
     let mut processes = vec![Process::Run];
     processes.extend((0..=below(2)).map(|_| Process::ALL[below(Process::ALL.len())]));
-    let (has_caches, is_killing, in_rounds, is_freezing) = (below(2) == 0, below(3) == 0, below(3) == 0, below(3) == 0);
+    let (has_caches, is_killing, in_rounds, is_freezing) =
+        (below(2) == 0, below(3) == 0, below(3) == 0, below(3) == 0);
     let case = format!(
         "{WANTED}=1:{seed}: {processes:?} on {there:?}{}{}{}{}",
         if has_caches { ", with caches" } else { "" },
         if is_killing { ", one is killed" } else { "" },
-        if is_freezing { ", the first is suspended" } else { "" },
+        if is_freezing {
+            ", the first is suspended"
+        } else {
+            ""
+        },
         if in_rounds { ", in rounds" } else { "" }
     );
     let trial = &TRIALS[&(there, in_rounds)];
     let (folder, runs) = (folder(), Runs::default());
     let root = folder.path().join("small");
     write_files(&root, &trial.before);
-    let schedule =
-        Schedule::new(seed, processes.len(), is_killing.then_some(KILL_BEFORE), is_freezing.then_some(FREEZE_BEFORE));
+    let schedule = Schedule::new(
+        seed,
+        processes.len(),
+        is_killing.then_some(KILL_BEFORE),
+        is_freezing.then_some(FREEZE_BEFORE),
+    );
     let is_any_killed = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..processes.len())
             .map(|number| {
@@ -237,8 +305,9 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
                 scope.spawn(move || {
                     KNOWN_NUMBER.set(Some(seed.wrapping_mul(31) + number as u64));
                     let host = Host::new(schedule, number, has_caches);
-                    let acted =
-                        catch_unwind(AssertUnwindSafe(|| process.act(&Layout::new(&host, root), in_rounds, runs)));
+                    let acted = catch_unwind(AssertUnwindSafe(|| {
+                        process.act(&Layout::new(&host, root), in_rounds, runs)
+                    }));
                     (acted, schedule.end(number))
                 })
             })
@@ -253,15 +322,17 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
             {
                 let is_frozen = is_freezing && number == 0;
                 // One that is suspended keeps its locks.
-                let is_locked = is_freezing && format!("{error:#}").contains("another process holds it");
-                let is_allowed = is_locked || is_allowed(&error, *process, &processes, there, is_frozen);
+                let is_locked =
+                    is_freezing && format!("{error:#}").contains("another process holds it");
+                let is_allowed =
+                    is_locked || is_allowed(&error, *process, &processes, there, is_frozen);
                 assert!(is_allowed, "{case}: {process:?} ends with: {error:#}");
             }
         }
         is_any_killed
     });
-    let completed =
-        complete(&root, in_rounds, &runs).unwrap_or_else(|error| panic!("{case}: cannot be completed: {error:#}"));
+    let completed = complete(&root, in_rounds, &runs)
+        .unwrap_or_else(|error| panic!("{case}: cannot be completed: {error:#}"));
     let ids = |of: &BTreeMap<PathBuf, Vec<u8>>| {
         let folder = self::folder();
         write_files(folder.path(), of);
@@ -274,9 +345,14 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
         // Extensions are others, but every job is there once.
         assert!(ids(&completed) == ids(&trial.after), "{case}");
     } else {
-        let differing = completed.iter().filter(|(path, bytes)| trial.after.get(*path) != Some(bytes));
+        let differing = completed
+            .iter()
+            .filter(|(path, bytes)| trial.after.get(*path) != Some(bytes));
         let differing: Vec<_> = differing.map(|(path, _)| path).collect();
-        assert!(results(&completed) == results(&trial.after), "{case}: {differing:?}");
+        assert!(
+            results(&completed) == results(&trial.after),
+            "{case}: {differing:?}"
+        );
         if !is_any_killed && !is_freezing {
             assert_eq!(runs, trial.missing, "{case}");
         }
@@ -307,7 +383,10 @@ fn whatever_the_order_of_operations_of_several_processes_nothing_is_lost_or_done
                         break;
                     }
                     // Says what is wrong as it panics.
-                    failures.fetch_add(u64::from(catch_unwind(|| go_through(seed)).is_err()), Ordering::Relaxed);
+                    failures.fetch_add(
+                        u64::from(catch_unwind(|| go_through(seed)).is_err()),
+                        Ordering::Relaxed,
+                    );
                 }
             });
         }

@@ -20,12 +20,26 @@ const MISSING: &str = "grid_steps";
 /// Makes a directory that of another version of the model and the plan, without a column.
 fn make_older(root: &Path) {
     let path = root.join("run/extension-000.json");
-    fs::write(&path, of_other_versions(&fs::read_to_string(&path).unwrap(), MISSING)).unwrap();
-    for file in Layout::new(&Disk, root).dataset("jobs").unwrap().files().cloned().collect::<Vec<_>>() {
-        let batches: Vec<_> = Dataset::new(&Disk, vec![file.clone()]).batches().map(Result::unwrap).collect();
+    fs::write(
+        &path,
+        of_other_versions(&fs::read_to_string(&path).unwrap(), MISSING),
+    )
+    .unwrap();
+    for file in Layout::new(&Disk, root)
+        .dataset("jobs")
+        .unwrap()
+        .files()
+        .cloned()
+        .collect::<Vec<_>>()
+    {
+        let batches: Vec<_> = Dataset::new(&Disk, vec![file.clone()])
+            .batches()
+            .map(Result::unwrap)
+            .collect();
         fs::remove_file(&file).unwrap();
         let created = Disk.create(&file).unwrap();
-        let mut writer = TableWriter::<JobRow>::without(&[MISSING.into()], created, &Footer::default()).unwrap();
+        let mut writer =
+            TableWriter::<JobRow>::without(&[MISSING.into()], created, &Footer::default()).unwrap();
         for batch in &batches {
             writer.copy(batch, 0..batch.rows.num_rows()).unwrap();
         }
@@ -45,20 +59,49 @@ fn a_directory_of_another_version_is_reduced_and_exported_as_it_is_and_not_run()
     let expected = sets();
     make_older(root.path());
     assert_eq!(sets(), expected);
-    let (own, out) = (Results::read(&layout).unwrap(), tempfile::tempdir().unwrap());
+    let (own, out) = (
+        Results::read(&layout).unwrap(),
+        tempfile::tempdir().unwrap(),
+    );
     let exported = own.export(out.path(), Format::Csv, &mut |_, _| ()).unwrap();
     assert_eq!((exported.jobs, exported.jobs_missing), (2 * SEEDS, 0));
     let jobs = fs::read_to_string(out.path().join("jobs.csv")).unwrap();
-    let place = jobs.lines().next().unwrap().split(',').position(|column| column == MISSING).unwrap();
-    assert!(jobs.lines().skip(1).all(|row| row.split(',').nth(place) == Some("")), "{jobs}");
+    let place = jobs
+        .lines()
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|column| column == MISSING)
+        .unwrap();
+    assert!(
+        jobs.lines()
+            .skip(1)
+            .all(|row| row.split(',').nth(place) == Some("")),
+        "{jobs}"
+    );
     let errors = [
         Results::read_plan(&layout).unwrap_err(),
-        run(&layout, &sweep(SEEDS, ""), options(&AtomicBool::new(false), 2), &fine, &mut |_| ()).unwrap_err(),
+        run(
+            &layout,
+            &sweep(SEEDS, ""),
+            options(&AtomicBool::new(false), 2),
+            &fine,
+            &mut |_| (),
+        )
+        .unwrap_err(),
     ];
     for error in errors {
-        let differences = ["model version: 0 -> ", "plan version: 0 -> ", "with [\"grid_steps\"]"];
+        let differences = [
+            "model version: 0 -> ",
+            "plan version: 0 -> ",
+            "with [\"grid_steps\"]",
+        ];
         let text = error.to_string();
-        assert!(error.kind == ErrorKind::Refused && differences.iter().all(|words| text.contains(words)), "{text}");
+        assert!(
+            error.kind == ErrorKind::Refused
+                && differences.iter().all(|words| text.contains(words)),
+            "{text}"
+        );
     }
     // Ids of its jobs are those of its version.
     let ids: Vec<String> = layout
@@ -68,8 +111,12 @@ fn a_directory_of_another_version_is_reduced_and_exported_as_it_is_and_not_run()
         .flat_map(|names| names.unwrap())
         .map(|names| names.job_id)
         .collect();
-    let own_ids =
-        |sweep: &crate::sweep::Sweep| sweep.jobs().map(|job| sweep.job_id(&job.parameters)).collect::<Vec<_>>();
+    let own_ids = |sweep: &crate::sweep::Sweep| {
+        sweep
+            .jobs()
+            .map(|job| sweep.job_id(&job.parameters))
+            .collect::<Vec<_>>()
+    };
     assert_eq!(own_ids(&sweep(SEEDS, "")), ids);
     assert!(own_ids(own.sweep()).iter().all(|id| !ids.contains(id)));
 }

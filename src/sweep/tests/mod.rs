@@ -11,7 +11,11 @@ use std::collections::HashSet;
 use std::path::Path;
 
 fn sweep(text: &str) -> Sweep {
-    let text = if text.contains("name =") { text.to_owned() } else { format!("name = \"test\"\n{text}") };
+    let text = if text.contains("name =") {
+        text.to_owned()
+    } else {
+        format!("name = \"test\"\n{text}")
+    };
     Sweep::parse(&text, Path::new("test.toml")).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
@@ -20,7 +24,13 @@ fn values(sweep: &Sweep, symbol: Symbol) -> Vec<Value> {
 }
 
 fn counts(sweep: &Sweep, symbol: Symbol) -> Vec<u64> {
-    let count = |value| if let Value::Count(count) = value { count } else { panic!("{value} is no count") };
+    let count = |value| {
+        if let Value::Count(count) = value {
+            count
+        } else {
+            panic!("{value} is no count")
+        }
+    };
     values(sweep, symbol).into_iter().map(count).collect()
 }
 
@@ -28,7 +38,10 @@ fn counts(sweep: &Sweep, symbol: Symbol) -> Vec<u64> {
 fn a_file_with_a_name_alone_is_one_job_of_the_defaults() {
     let sweep = sweep("");
     let jobs: Vec<Job> = sweep.jobs().collect();
-    assert_eq!((sweep.name(), sweep.point_count(), sweep.text()), ("test", 1, "name = \"test\"\n"));
+    assert_eq!(
+        (sweep.name(), sweep.point_count(), sweep.text()),
+        ("test", 1, "name = \"test\"\n")
+    );
     assert_eq!(jobs.len(), 1);
     assert_eq!(jobs[0].parameters, Parameters::default());
 }
@@ -43,21 +56,43 @@ fn all_sections_are_read() {
     );
     let parameters = sweep.jobs().next().unwrap().parameters;
     assert_eq!((parameters.blocks, parameters.slider_stiffness), (20, 2e8));
-    assert_eq!((parameters.break_on, parameters.modulation_period), (BreakOn::Tension, Some(1.0)));
+    assert_eq!(
+        (parameters.break_on, parameters.modulation_period),
+        (BreakOn::Tension, Some(1.0))
+    );
     let recording = sweep.recording();
-    assert_eq!((recording.slips, recording.discard, recording.max_time), (7, 0, Some(2.0)));
-    assert_eq!((recording.max_events, recording.precursor_size, recording.precursors), (1000, Some(3), true));
+    assert_eq!(
+        (recording.slips, recording.discard, recording.max_time),
+        (7, 0, Some(2.0))
+    );
+    assert_eq!(
+        (
+            recording.max_events,
+            recording.precursor_size,
+            recording.precursors
+        ),
+        (1000, Some(3), true)
+    );
     assert_eq!(recording.drop_size, Some(5.0));
     assert_eq!(sweep.solver(), Solver::FixedStep { time_step: 2e-6 });
 }
 
 #[test]
 fn the_last_axis_of_the_file_moves_fastest() {
-    let sweep = sweep("[axes]\nseed = { count = 2, first = 5 }\nN = [2, 1]\nbreak_on = [\"tension\", \"magnitude\"]");
+    let sweep = sweep(
+        "[axes]\nseed = { count = 2, first = 5 }\nN = [2, 1]\nbreak_on = [\"tension\", \"magnitude\"]",
+    );
     assert_eq!(counts(&sweep, Symbol::Seed), [5, 5, 5, 5, 6, 6, 6, 6]);
     assert_eq!(counts(&sweep, Symbol::N), [2, 2, 1, 1, 2, 2, 1, 1]);
     let axes: Vec<_> = sweep.axes().collect();
-    assert_eq!(axes, [("seed".to_owned(), 2), ("N".to_owned(), 2), ("break_on".to_owned(), 2)]);
+    assert_eq!(
+        axes,
+        [
+            ("seed".to_owned(), 2),
+            ("N".to_owned(), 2),
+            ("break_on".to_owned(), 2)
+        ]
+    );
 }
 
 #[test]
@@ -67,7 +102,10 @@ fn eta_and_frequency_fix_the_period() {
         assert!((job.parameters.eta() / eta - 1.0).abs() < 1e-15);
     }
     let by_frequency = sweep("[model]\nDelta = 1e-6\n[axes]\nfrequency = [29, 58]");
-    assert_eq!(values(&by_frequency, Symbol::T), [Value::Real(1.0 / 29.0), Value::Real(1.0 / 58.0)]);
+    assert_eq!(
+        values(&by_frequency, Symbol::T),
+        [Value::Real(1.0 / 29.0), Value::Real(1.0 / 58.0)]
+    );
 }
 
 #[test]
@@ -78,7 +116,9 @@ fn a_range_holds_the_numbers_that_people_write() {
          frequency = {{ linear = [0.1, 99.9], points = 999 }}\n{in_common}"
     ));
     let velocities = "3.16227766017e-6, 1e-5, 3.16227766017e-5, 1e-4, 3.16227766017e-4, 1e-3";
-    let frequencies: Vec<String> = (1..=999).map(|tenths| format!("{}.{}", tenths / 10, tenths % 10)).collect();
+    let frequencies: Vec<String> = (1..=999)
+        .map(|tenths| format!("{}.{}", tenths / 10, tenths % 10))
+        .collect();
     let listed = sweep(&format!(
         "where = \"V0 == 1e-4 or frequency == 30\"\n[axes]\nV0 = [1e-6, {velocities}]\nfrequency = [{}]\n{in_common}",
         frequencies.join(", ")
@@ -87,29 +127,52 @@ fn a_range_holds_the_numbers_that_people_write() {
     for (ranged, listed) in ranged.jobs().zip(listed.jobs()) {
         assert_eq!(ranged, listed);
     }
-    let sample = |range: &str| values(&sweep(&format!("[axes.sobol]\npoints = 9\nV0 = {{ {range} }}")), Symbol::V0);
-    for value in [sample("log = [1e-6, 1e-3]"), sample("linear = [1e-6, 1e-3]")].concat() {
-        let Value::Real(value) = value else { panic!("{value}") };
+    let sample = |range: &str| {
+        values(
+            &sweep(&format!("[axes.sobol]\npoints = 9\nV0 = {{ {range} }}")),
+            Symbol::V0,
+        )
+    };
+    for value in [
+        sample("log = [1e-6, 1e-3]"),
+        sample("linear = [1e-6, 1e-3]"),
+    ]
+    .concat()
+    {
+        let Value::Real(value) = value else {
+            panic!("{value}")
+        };
         assert_eq!(format!("{value:.11e}").parse(), Ok(value));
     }
     assert!(
-        Sweep::parse("name = \"a\"\n[axes]\nV0 = { linear = [1, 1.00000000001], points = 9 }", Path::new("a.toml"))
-            .unwrap_err()
-            .to_string()
-            .contains("repeats value 1 of this axis")
+        Sweep::parse(
+            "name = \"a\"\n[axes]\nV0 = { linear = [1, 1.00000000001], points = 9 }",
+            Path::new("a.toml")
+        )
+        .unwrap_err()
+        .to_string()
+        .contains("repeats value 1 of this axis")
     );
 }
 
 #[test]
 fn whole_quantities_take_rounded_values_of_a_range() {
-    assert_eq!(counts(&sweep("[axes]\nN = { log = [1, 1000], points = 5 }"), Symbol::N), [1, 6, 32, 178, 1000]);
+    assert_eq!(
+        counts(
+            &sweep("[axes]\nN = { log = [1, 1000], points = 5 }"),
+            Symbol::N
+        ),
+        [1, 6, 32, 178, 1000]
+    );
 }
 
 #[test]
 fn without_modulation_one_point_stands_for_all_periods() {
     let sweep = sweep("[axes]\nDelta = [0, 1e-6]\neta = [1, 2, 3]\nseed = { count = 2 }");
-    let seen: Vec<(f64, u64)> =
-        sweep.jobs().map(|job| (job.parameters.modulation_amplitude, job.parameters.seed)).collect();
+    let seen: Vec<(f64, u64)> = sweep
+        .jobs()
+        .map(|job| (job.parameters.modulation_amplitude, job.parameters.seed))
+        .collect();
     assert_eq!(sweep.point_count(), 12);
     assert_eq!(seen.len(), 2 + 6);
     assert_eq!(seen[..2], [(0.0, 0), (0.0, 1)]);
@@ -137,16 +200,25 @@ fn samples_fill_their_ranges() {
              V0 = {{ log = [1e-5, 1e-3] }}\nN = {{ linear = [2, 40] }}"
         );
         let sweep = sweep(&text);
-        let below = sweep.jobs().filter(|job| job.parameters.drive_velocity < 1e-4).count();
+        let below = sweep
+            .jobs()
+            .filter(|job| job.parameters.drive_velocity < 1e-4)
+            .count();
         assert_eq!((sweep.jobs().count(), below), (128, 64), "{kind}");
-        assert!(sweep.jobs().all(|job| (2..=40).contains(&job.parameters.blocks)));
+        assert!(
+            sweep
+                .jobs()
+                .all(|job| (2..=40).contains(&job.parameters.blocks))
+        );
     }
 }
 
 #[test]
 fn differences_are_reported_except_in_axes_and_conditions() {
     let before = sweep("[model]\nK = 1e8\n[axes]\nV0 = [1e-4]");
-    let same = sweep("where = \"V0 > 0\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 3 }\nDelta = [0, 1]\neta = [1]");
+    let same = sweep(
+        "where = \"V0 > 0\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 3 }\nDelta = [0, 1]\neta = [1]",
+    );
     assert!(before.differences(&same).is_empty());
     let other = sweep(
         "name = \"b\"\n[model]\nK = 2e8\nDelta = 1\nT = 2\n[record]\nmax_time = 1\nslips = 3\n[solver]\ntolerance = 1e-7",
@@ -186,7 +258,10 @@ fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
             "[record]\nmax_time = {}\n[solver]\nmethod = \"fixed-step\"\ndt = 1e-12\n[axes]\nseed = {{ count = {seeds} }}",
             steps * 1e-12
         );
-        Plan::new(&extensions([&sweep(&text)])).parts().map(|part| part.jobs.len()).collect()
+        Plan::new(&extensions([&sweep(&text)]))
+            .parts()
+            .map(|part| part.jobs.len())
+            .collect()
     };
     // Two parts at least, then 5 s each; dear jobs alone; more than 5 s where parts would be too many.
     assert_eq!(sizes(10, 0.6), [5, 5]);
@@ -194,26 +269,58 @@ fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
     assert_eq!(sizes(20, 6.0), [1; 20]);
     assert_eq!(sizes(20_000, 12.0)[..2], [1, 1]);
     assert_eq!(sizes(100_000, 3.0)[..2], [5, 5]);
-    assert_eq!(sizes(10_000, 1e-5), [PART_JOBS, PART_JOBS, 10_000 - 2 * PART_JOBS]);
+    assert_eq!(
+        sizes(10_000, 1e-5),
+        [PART_JOBS, PART_JOBS, 10_000 - 2 * PART_JOBS]
+    );
 }
 
 #[test]
 fn what_an_earlier_sweep_did_is_kept_and_the_rest_belongs_to_the_new_one() {
     // Dear enough for a part each.
     let record = "[record]\nslips = 10000";
-    let wide = sweep(&format!("[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = 4 }}\n{record}"));
-    let narrow = sweep(&format!("[axes]\nV0 = [1e-4]\nseed = {{ count = 4 }}\n{record}"));
+    let wide = sweep(&format!(
+        "[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = 4 }}\n{record}"
+    ));
+    let narrow = sweep(&format!(
+        "[axes]\nV0 = [1e-4]\nseed = {{ count = 4 }}\n{record}"
+    ));
     let mut all = extensions([&wide]);
     all[0].kept = Some(Plan::new(&all).ranges(0, |part| [1, 2, 5].contains(&part.index)));
-    let parts: Vec<usize> = Plan::new(&all).parts().map(|part| part.jobs.len()).collect();
-    assert_eq!((parts, &all[0].kept), (vec![1; 3], &Some(vec![1..=2, 5..=5])));
+    let parts: Vec<usize> = Plan::new(&all)
+        .parts()
+        .map(|part| part.jobs.len())
+        .collect();
+    assert_eq!(
+        (parts, &all[0].kept),
+        (vec![1; 3], &Some(vec![1..=2, 5..=5]))
+    );
     all.push(Extension::new(&narrow, &all));
     let jobs: Vec<(usize, u64, f64, u64)> = Plan::new(&all)
         .parts()
-        .flat_map(|Part { outline, jobs }| jobs.into_iter().map(move |job| (outline.extension, outline.index, job)))
-        .map(|(extension, index, job)| (extension, index, job.parameters.drive_velocity, job.parameters.seed))
+        .flat_map(|Part { outline, jobs }| {
+            jobs.into_iter()
+                .map(move |job| (outline.extension, outline.index, job))
+        })
+        .map(|(extension, index, job)| {
+            (
+                extension,
+                index,
+                job.parameters.drive_velocity,
+                job.parameters.seed,
+            )
+        })
         .collect();
-    assert_eq!(jobs, [(0, 1, 1e-4, 1), (0, 2, 1e-4, 2), (0, 5, 2e-4, 1), (1, 0, 1e-4, 0), (1, 1, 1e-4, 3)]);
+    assert_eq!(
+        jobs,
+        [
+            (0, 1, 1e-4, 1),
+            (0, 2, 1e-4, 2),
+            (0, 5, 2e-4, 1),
+            (1, 0, 1e-4, 0),
+            (1, 1, 1e-4, 3)
+        ]
+    );
 }
 
 #[test]
@@ -234,14 +341,18 @@ fn an_extended_sweep_owns_its_new_jobs_alone() {
 
 #[test]
 fn the_sweeps_of_the_figures_are_read_and_take_minutes_at_most() {
-    for (text, name) in
-        [(include_str!("../../../sweeps/fig2.toml"), "fig2"), (include_str!("../../../sweeps/fig3.toml"), "fig3")]
-    {
+    for (text, name) in [
+        (include_str!("../../../sweeps/fig2.toml"), "fig2"),
+        (include_str!("../../../sweeps/fig3.toml"), "fig3"),
+    ] {
         let sweep = sweep(text);
         let totals = Plan::new(&extensions([&sweep])).totals();
         assert_eq!(sweep.name(), name);
         assert!((5.0..300.0).contains(&totals.cost), "{name}: {totals:?}");
-        let jobs: HashSet<String> = sweep.jobs().map(|job| sweep.job_id(&job.parameters)).collect();
+        let jobs: HashSet<String> = sweep
+            .jobs()
+            .map(|job| sweep.job_id(&job.parameters))
+            .collect();
         assert_eq!(jobs.len() as u64, totals.jobs);
     }
 }
@@ -253,7 +364,10 @@ fn ten_million_jobs_are_planned_in_seconds() {
     let text = "where = \"frequency < 1e9\"\n[axes]\nV0 = { log = [3e-5, 2e-4], points = 100 }\n\
                 Delta = { log = [3e-7, 1e-6], points = 10 }\neta = { log = [0.2, 1000], points = 100 }\n\
                 seed = { count = 99 }";
-    let [first, more] = [sweep(text), sweep(&text.replace("count = 99", "count = 100"))];
+    let [first, more] = [
+        sweep(text),
+        sweep(&text.replace("count = 99", "count = 100")),
+    ];
     let start = std::time::Instant::now();
     let before = extensions([&first]);
     println!("begun in {:?}", start.elapsed());
@@ -262,10 +376,16 @@ fn ten_million_jobs_are_planned_in_seconds() {
     println!("{totals:?} in {:?}", start.elapsed());
     let start = std::time::Instant::now();
     let all = extensions([&first, &more]);
-    let new: usize = Plan::new(&all).parts_of(1).map(|part| part.jobs.len()).sum();
+    let new: usize = Plan::new(&all)
+        .parts_of(1)
+        .map(|part| part.jobs.len())
+        .sum();
     println!("{new} new jobs found in {:?}", start.elapsed());
     let start = std::time::Instant::now();
-    let hashed = first.jobs().take(1_000_000).filter(|job| !first.job_id(&job.parameters).starts_with("00"));
+    let hashed = first
+        .jobs()
+        .take(1_000_000)
+        .filter(|job| !first.job_id(&job.parameters).starts_with("00"));
     println!("{} of 1e6 ids in {:?}", hashed.count(), start.elapsed());
     assert_eq!((totals.jobs, new), (9_900_000, 100_000));
 }

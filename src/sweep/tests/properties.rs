@@ -9,49 +9,83 @@ use proptest::prelude::*;
 use std::collections::HashSet;
 
 /// A random axis as a file writes it: its lines below `[axes]`, or a table of its own.
-fn list(key: &'static str, values: impl Strategy<Value = Vec<f64>>) -> impl Strategy<Value = String> {
+fn list(
+    key: &'static str,
+    values: impl Strategy<Value = Vec<f64>>,
+) -> impl Strategy<Value = String> {
     values.prop_map(move |values| format!("{key} = {}\n", listed(&values)))
 }
 
 fn listed(values: &[f64]) -> String {
-    let values: Vec<String> = values.iter().map(|value| Shortest(*value).to_string()).collect();
+    let values: Vec<String> = values
+        .iter()
+        .map(|value| Shortest(*value).to_string())
+        .collect();
     format!("[{}]", values.join(", "))
 }
 
 /// Distinct positive numbers, in no order.
 fn numbers(max: usize) -> impl Strategy<Value = Vec<f64>> {
     btree_set(1_u32..4000, 1..=max)
-        .prop_map(|set| set.into_iter().map(|n| f64::from(n) * 1e-7).collect::<Vec<_>>())
+        .prop_map(|set| {
+            set.into_iter()
+                .map(|n| f64::from(n) * 1e-7)
+                .collect::<Vec<_>>()
+        })
         .prop_shuffle()
 }
 
 fn range(key: &'static str) -> impl Strategy<Value = String> {
-    (prop_oneof![Just("linear"), Just("log")], 1e-6..1e-3, 1.1..100.0, 2_u64..9).prop_map(
-        move |(kind, low, ratio, points): (_, f64, f64, _)| {
-            format!("{key} = {{ {kind} = [{}, {}], points = {points} }}\n", Shortest(low), Shortest(low * ratio))
-        },
+    (
+        prop_oneof![Just("linear"), Just("log")],
+        1e-6..1e-3,
+        1.1..100.0,
+        2_u64..9,
     )
+        .prop_map(move |(kind, low, ratio, points): (_, f64, f64, _)| {
+            format!(
+                "{key} = {{ {kind} = [{}, {}], points = {points} }}\n",
+                Shortest(low),
+                Shortest(low * ratio)
+            )
+        })
 }
 
 /// What fixes the period, with amplitudes that include 0: an axis of its own, in a zip or in a sample.
 fn modulation() -> impl Strategy<Value = String> {
     let key = || prop_oneof![Just("T"), Just("eta"), Just("frequency")];
     let amplitudes = prop_oneof![Just("[0, 3e-7, 1e-6]"), Just("[2e-7, 0]"), Just("[1e-6]")];
-    let own = (key(), amplitudes.clone(), numbers(5))
-        .prop_map(|(key, amplitudes, values)| format!("{key} = {}\nDelta = {amplitudes}\n", listed(&values)));
-    let zip = (key(), amplitudes.clone(), numbers(6)).prop_map(|(key, _, values)| {
-        let amplitudes: Vec<f64> = (0..values.len()).map(|row| if row % 3 == 1 { 1e-6 } else { 0.0 }).collect();
-        let amplitudes = if values.len() < 2 { vec![1e-6; values.len()] } else { amplitudes };
-        format!("[[axes.zip]]\n{key} = {}\nDelta = {}\n", listed(&values), listed(&amplitudes))
+    let own = (key(), amplitudes.clone(), numbers(5)).prop_map(|(key, amplitudes, values)| {
+        format!("{key} = {}\nDelta = {amplitudes}\n", listed(&values))
     });
-    let sample = (key(), amplitudes, prop_oneof![Just("sobol"), Just("latin")], 1..20, any::<u32>()).prop_map(
-        |(key, amplitudes, kind, points, seed)| {
+    let zip = (key(), amplitudes.clone(), numbers(6)).prop_map(|(key, _, values)| {
+        let amplitudes: Vec<f64> = (0..values.len())
+            .map(|row| if row % 3 == 1 { 1e-6 } else { 0.0 })
+            .collect();
+        let amplitudes = if values.len() < 2 {
+            vec![1e-6; values.len()]
+        } else {
+            amplitudes
+        };
+        format!(
+            "[[axes.zip]]\n{key} = {}\nDelta = {}\n",
+            listed(&values),
+            listed(&amplitudes)
+        )
+    });
+    let sample = (
+        key(),
+        amplitudes,
+        prop_oneof![Just("sobol"), Just("latin")],
+        1..20,
+        any::<u32>(),
+    )
+        .prop_map(|(key, amplitudes, kind, points, seed)| {
             format!(
                 "Delta = {amplitudes}\n[axes.{kind}]\npoints = {points}\nseed = {seed}\n\
                  {key} = {{ log = [0.01, 50] }}\nKd = {{ linear = [1e6, 1e8] }}\n"
             )
-        },
-    );
+        });
     prop_oneof![Just(String::new()), own, zip, sample]
 }
 
@@ -60,14 +94,22 @@ fn texts() -> impl Strategy<Value = String> {
     let velocity = prop_oneof![Just(String::new()), list("V0", numbers(4)), range("V0")];
     let seeds = prop_oneof![
         Just(String::new()),
-        (1_u64..5, 0_u64..9).prop_map(|(count, first)| format!("seed = {{ count = {count}, first = {first} }}\n"))
+        (1_u64..5, 0_u64..9)
+            .prop_map(|(count, first)| format!("seed = {{ count = {count}, first = {first} }}\n"))
     ];
-    let blocks =
-        prop_oneof![Just(String::new()), Just("N = [3, 70, 1]\nbreak_on = [\"tension\", \"magnitude\"]\n".to_owned())];
-    let condition = prop_oneof![Just(""), Just("where = \"V0 > 1e-5 or N >= 1 and (eta < 5 or T < 2)\"\n")];
-    (condition, velocity, seeds, blocks, modulation()).prop_map(|(condition, velocity, seeds, blocks, modulation)| {
-        format!("name = \"random\"\n{condition}[axes]\n{velocity}{seeds}{blocks}{modulation}")
-    })
+    let blocks = prop_oneof![
+        Just(String::new()),
+        Just("N = [3, 70, 1]\nbreak_on = [\"tension\", \"magnitude\"]\n".to_owned())
+    ];
+    let condition = prop_oneof![
+        Just(""),
+        Just("where = \"V0 > 1e-5 or N >= 1 and (eta < 5 or T < 2)\"\n")
+    ];
+    (condition, velocity, seeds, blocks, modulation()).prop_map(
+        |(condition, velocity, seeds, blocks, modulation)| {
+            format!("name = \"random\"\n{condition}[axes]\n{velocity}{seeds}{blocks}{modulation}")
+        },
+    )
 }
 
 /// Parameters that differ in the last bit, or by one.

@@ -36,48 +36,63 @@ pub trait OverDisk: Sync {
 
 impl<T: OverDisk> Storage for T {
     fn create_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        self.before(Access::Change).map_err(StorageError::at("create", folder))?;
+        self.before(Access::Change)
+            .map_err(StorageError::at("create", folder))?;
         Disk.create_folder(folder)
     }
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
-        let created = self.before(Access::Change).and_then(|()| File::create(file));
+        let created = self
+            .before(Access::Change)
+            .and_then(|()| File::create(file));
         let sink = self.wrap(created.map_err(StorageError::at("create", file))?);
-        Ok(StoredFile { path: file.to_owned(), sink })
+        Ok(StoredFile {
+            path: file.to_owned(),
+            sink,
+        })
     }
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
-        self.before(Access::Change).map_err(StorageError::at("move a file here", to))?;
+        self.before(Access::Change)
+            .map_err(StorageError::at("move a file here", to))?;
         Disk.rename(from, to)
     }
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
-        self.before(Access::Change).map_err(StorageError::at("create", to))?;
+        self.before(Access::Change)
+            .map_err(StorageError::at("create", to))?;
         Disk.link_new(from, to)
     }
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        self.before(Access::Change).map_err(StorageError::at("sync", folder))?;
+        self.before(Access::Change)
+            .map_err(StorageError::at("sync", folder))?;
         Disk.sync_folder(folder)
     }
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
-        self.before(Access::Look).map_err(StorageError::at("list", folder))?;
+        self.before(Access::Look)
+            .map_err(StorageError::at("list", folder))?;
         Disk.list(folder)
     }
     fn open(&self, file: &Path) -> Result<File, StorageError> {
-        self.before(Access::Look).map_err(StorageError::at("read", file))?;
+        self.before(Access::Look)
+            .map_err(StorageError::at("read", file))?;
         self.open_file(file)
     }
     fn exists(&self, file: &Path) -> Result<bool, StorageError> {
-        self.before(Access::Look).map_err(StorageError::at("look up", file))?;
+        self.before(Access::Look)
+            .map_err(StorageError::at("look up", file))?;
         Disk.exists(file)
     }
     fn remove(&self, file: &Path) -> Result<(), StorageError> {
-        self.before(Access::Change).map_err(StorageError::at("remove", file))?;
+        self.before(Access::Change)
+            .map_err(StorageError::at("remove", file))?;
         Disk.remove(file)
     }
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        self.before(Access::Change).map_err(StorageError::at("remove", folder))?;
+        self.before(Access::Change)
+            .map_err(StorageError::at("remove", folder))?;
         Disk.remove_folder(folder)
     }
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        self.before(Access::Look).map_err(StorageError::at("lock", file))?;
+        self.before(Access::Look)
+            .map_err(StorageError::at("lock", file))?;
         self.try_lock(file)
     }
 }

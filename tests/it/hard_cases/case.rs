@@ -10,7 +10,9 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 use stickslip::model::{ParameterError, Parameters, Symbol, Value};
 use stickslip::observe::{Recording, SlipObserver};
-use stickslip::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited};
+use stickslip::solver::{
+    Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited,
+};
 
 /// Contact events after which a case is given up.
 const EVENT_BUDGET: u64 = 5_000_000;
@@ -79,7 +81,11 @@ impl HardCase {
                 "slips" if value == "all" => case.slips = u64::MAX,
                 "slips" => case.slips = value.parse().ok()?,
                 "chaotic" => case.is_chaotic = true,
-                "dt" => case.solver = Solver::FixedStep { time_step: value.parse().ok()? },
+                "dt" => {
+                    case.solver = Solver::FixedStep {
+                        time_step: value.parse().ok()?,
+                    }
+                }
                 "tolerance" => case.solver = Solver::event_driven(value.parse().ok()?),
                 REFUSED | "stopped" => case.failure = Some((key, value)),
                 _ => {
@@ -97,15 +103,30 @@ impl HardCase {
 
     /// What differs from the defaults, in words.
     pub fn name(&self) -> String {
-        let words: Vec<String> =
-            self.settings.iter().map(|(symbol, value)| format!("{} = {value}", symbol.key())).collect();
-        if words.is_empty() { "defaults".to_owned() } else { words.join(", ") }
+        let words: Vec<String> = self
+            .settings
+            .iter()
+            .map(|(symbol, value)| format!("{} = {value}", symbol.key()))
+            .collect();
+        if words.is_empty() {
+            "defaults".to_owned()
+        } else {
+            words.join(", ")
+        }
     }
 
     /// Runs it within its budgets: with an audit, and, if it is event-driven and not refused, as a job.
     pub fn run(&self) -> Vec<Outcome> {
-        let Solver::EventDriven { tolerance, .. } = self.solver else { return vec![self.row(self.solver, None)] };
-        let audited = self.row(Solver::EventDriven { tolerance, resolve: Resolve::Taylor }, None);
+        let Solver::EventDriven { tolerance, .. } = self.solver else {
+            return vec![self.row(self.solver, None)];
+        };
+        let audited = self.row(
+            Solver::EventDriven {
+                tolerance,
+                resolve: Resolve::Taylor,
+            },
+            None,
+        );
         if self.failure.is_some_and(|(how, _)| how == REFUSED) {
             return vec![audited];
         }
@@ -125,20 +146,31 @@ impl HardCase {
         };
         match self.simulate(solver, self.parameters(), audited.is_none()) {
             Ok((summary, residual)) => {
-                let is_balanced = residual.is_none_or(|residual| residual.abs() <= self.max_residual());
+                let is_balanced =
+                    residual.is_none_or(|residual| residual.abs() <= self.max_residual());
                 let is_alike = audited.is_none_or(|audited| {
-                    if self.is_chaotic { self.means_are_alike() } else { are_alike(audited.breaks, summary.breaks) }
+                    if self.is_chaotic {
+                        self.means_are_alike()
+                    } else {
+                        are_alike(audited.breaks, summary.breaks)
+                    }
                 });
                 let how = match (is_balanced, is_alike) {
                     (true, true) => "done",
                     (false, _) => "done, but energy does not balance",
                     (_, false) => "done, but with too many or too few breaks",
                 };
-                outcome(self.failure.is_none() && is_balanced && is_alike, how, summary.breaks, residual)
+                outcome(
+                    self.failure.is_none() && is_balanced && is_alike,
+                    how,
+                    summary.breaks,
+                    residual,
+                )
             }
             Err(how) => {
-                let is_as_expected =
-                    |(begin, words): (&str, &str)| how.starts_with(begin) && how.contains(&words.replace('-', " "));
+                let is_as_expected = |(begin, words): (&str, &str)| {
+                    how.starts_with(begin) && how.contains(&words.replace('-', " "))
+                };
                 outcome(self.failure.is_some_and(is_as_expected), &how, 0, None)
             }
         }
@@ -146,22 +178,33 @@ impl HardCase {
 
     /// Whether the breaks on the grid and in Taylor steps have the same mean over seeds.
     fn means_are_alike(&self) -> bool {
-        let Solver::EventDriven { tolerance, .. } = self.solver else { return true };
+        let Solver::EventDriven { tolerance, .. } = self.solver else {
+            return true;
+        };
         let breaks = [Resolve::Grid, Resolve::Taylor].map(|resolve| {
             let solver = Solver::EventDriven { tolerance, resolve };
             let runs = (1..=SEEDS).map(|seed| {
-                let parameters = self.parameters().map(|parameters| Parameters { seed, ..parameters });
-                self.simulate(solver, parameters, false).map(|(summary, _)| summary.breaks as f64)
+                let parameters = self
+                    .parameters()
+                    .map(|parameters| Parameters { seed, ..parameters });
+                self.simulate(solver, parameters, false)
+                    .map(|(summary, _)| summary.breaks as f64)
             });
             runs.collect::<Result<Vec<f64>, _>>()
         });
-        let [Ok(grid), Ok(taylor)] = breaks else { return false };
+        let [Ok(grid), Ok(taylor)] = breaks else {
+            return false;
+        };
         let [(left, left_spread), (right, right_spread)] = [grid, taylor].map(|breaks| {
             let mean = breaks.iter().sum::<f64>() / SEEDS as f64;
-            let squares = breaks.iter().map(|breaks| (breaks - mean) * (breaks - mean)).sum::<f64>();
+            let squares = breaks
+                .iter()
+                .map(|breaks| (breaks - mean) * (breaks - mean))
+                .sum::<f64>();
             (mean, (squares / (SEEDS - 1) as f64).sqrt())
         });
-        (left - right).abs() <= ALIKE_MEANS * left_spread.hypot(right_spread) / (SEEDS as f64).sqrt()
+        (left - right).abs()
+            <= ALIKE_MEANS * left_spread.hypot(right_spread) / (SEEDS as f64).sqrt()
     }
 
     /// Largest residual of the ledger that passes.
@@ -188,10 +231,18 @@ impl HardCase {
         has_audit: bool,
     ) -> Result<(Summary, Option<f64>), String> {
         let parameters = parameters.map_err(|error| format!("{REFUSED}: {error}"))?;
-        let recording = Recording { slips: self.slips, discard: 0, ..Recording::default() };
+        let recording = Recording {
+            slips: self.slips,
+            discard: 0,
+            ..Recording::default()
+        };
         let mut observer = SlipObserver::new(&parameters, &recording);
         interrupted_after(TIME_BUDGET, |interrupt| {
-            let limits = Limits { end_time: self.end_time, events: EVENT_BUDGET, interrupt: Some(interrupt) };
+            let limits = Limits {
+                end_time: self.end_time,
+                events: EVENT_BUDGET,
+                interrupt: Some(interrupt),
+            };
             if has_audit {
                 let audited = simulate_audited(&parameters, solver, limits, &mut observer);
                 audited.map(|(summary, ledger)| (summary, Some(ledger.residual())))
@@ -236,7 +287,10 @@ const TABLE: &str = include_str!("table.txt");
 /// Every case, group by group.
 pub fn hard_cases() -> Vec<HardCase> {
     let (mut cases, mut threat) = (Vec::new(), "");
-    for line in TABLE.lines().filter(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#')) {
+    for line in TABLE
+        .lines()
+        .filter(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'))
+    {
         if line.starts_with(' ') {
             cases.push(HardCase::parsed(threat, line).expect(line));
         } else {

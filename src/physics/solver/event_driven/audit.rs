@@ -19,35 +19,65 @@ impl Audit {
         [first, last]: [f64; 2],
         length: f64,
     ) {
-        let mut probe = State { displacement: chain.layout.filled(0.0), velocity: chain.layout.filled(0.0) };
+        let mut probe = State {
+            displacement: chain.layout.filled(0.0),
+            velocity: chain.layout.filled(0.0),
+        };
         let nodes = self.quadrature.nodes(series.order);
         let mean_square: f64 = nodes
             .iter()
             .map(|&(s, weight)| {
                 kernels.evaluate(series, first + s * (last - first), length, &mut probe);
-                weight * probe.velocity.iter().flat_map(|row| row.iter()).map(|v| v * v).sum::<f64>()
+                weight
+                    * probe
+                        .velocity
+                        .iter()
+                        .flat_map(|row| row.iter())
+                        .map(|v| v * v)
+                        .sum::<f64>()
             })
             .sum();
-        Self::add(&self.damping, chain.mass * chain.damping_rate * (last - first) * length * mean_square);
+        Self::add(
+            &self.damping,
+            chain.mass * chain.damping_rate * (last - first) * length * mean_square,
+        );
     }
 
     /// Enters a leap of `elapsed` s from `state`: the damping loss along the driven solution, in closed form, and
     /// the energy of the free motion that is dropped at its start.
-    pub(super) fn follow_leap(&self, chain: &Chain, drive: &Harmonic, split: &Split, state: &State, elapsed: f64) {
+    pub(super) fn follow_leap(
+        &self,
+        chain: &Chain,
+        drive: &Harmonic,
+        split: &Split,
+        state: &State,
+        elapsed: f64,
+    ) {
         let frequency = drive.angular_frequency;
         let coupling = chain.coupling[0][0];
         // Σ p1², Σ p1 q, Σ |q|² and Σ q²: the velocity is p1 - ω Im(q e^{iωt}).
         let (mut ramp, mut mixed, mut size, mut square) = (0.0, [0.0; 2], 0.0, [0.0; 2]);
         let (mut dropped, mut before) = (0.0, [0.0; 2]);
         for j in 0..chain.layout.blocks {
-            let BlockMotion { start, rate, wave: [real, imaginary], .. } = split.driven(chain, j);
+            let BlockMotion {
+                start,
+                rate,
+                wave: [real, imaginary],
+                ..
+            } = split.driven(chain, j);
             ramp += rate * rate;
             mixed = [mixed[0] + rate * real, mixed[1] + rate * imaginary];
             size += real * real + imaginary * imaginary;
-            square = [square[0] + real * real - imaginary * imaginary, square[1] + 2.0 * real * imaginary];
+            square = [
+                square[0] + real * real - imaginary * imaginary,
+                square[1] + 2.0 * real * imaginary,
+            ];
             // E(x_p + y) - E(x_p) = yᵀ (S (x_p + y/2) - b - drive) + m w (v_p + w/2), with the forces per mass.
             let (x, v) = (start + real, rate - frequency * imaginary);
-            let (y, w) = (chain.at(&state.displacement, j) - x, chain.at(&state.velocity, j) - v);
+            let (y, w) = (
+                chain.at(&state.displacement, j) - x,
+                chain.at(&state.velocity, j) - v,
+            );
             let middle = x + 0.5 * y;
             let mut force = chain.at(&chain.diagonal, j) * middle - chain.at(&chain.pull, j);
             if j == 0 {
@@ -74,14 +104,24 @@ impl Audit {
 
     /// Enters the energies at the end, with the drive at `driven` m.
     pub(super) fn record_final_energy(&self, slider: &Slider, driven: f64) {
-        let Slider { interface, chain, state } = slider;
+        let Slider {
+            interface,
+            chain,
+            state,
+        } = slider;
         let displacements: Vec<f64> = slider.displacements().collect();
         let speeds = (0..chain.layout.blocks).map(|j| chain.at(&state.velocity, j));
-        let stretched: f64 = displacements.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
-        let sprung = chain.drive_stiffness * (driven - displacements[0]) * (driven - displacements[0]);
-        self.kinetic.set(0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>());
+        let stretched: f64 = displacements
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]))
+            .sum();
+        let sprung =
+            chain.drive_stiffness * (driven - displacements[0]) * (driven - displacements[0]);
+        self.kinetic
+            .set(0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>());
         let chained = chain.mass * chain.coupling[0][0] * stretched;
-        self.elastic.set(0.5 * (chained + sprung) + interface.elastic_energy(&displacements));
+        self.elastic
+            .set(0.5 * (chained + sprung) + interface.elastic_energy(&displacements));
     }
 }
 

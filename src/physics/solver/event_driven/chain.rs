@@ -63,7 +63,8 @@ impl Chain {
     /// Updates the coefficients of a block whose contacts have changed.
     pub fn update(&mut self, block: usize, interface: &Interface) {
         let (row, lane) = self.layout.slot(block);
-        self.diagonal[row][lane] = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
+        self.diagonal[row][lane] =
+            (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
         self.pull[row][lane] = interface.block_pull[block] / self.mass;
         self.upper[row][lane] = interface.block_upper[block];
         self.lower[row][lane] = interface.block_lower[block];

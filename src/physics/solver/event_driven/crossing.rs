@@ -5,7 +5,9 @@
 //! throughout.
 
 use crate::solver::harmonic::Harmonic;
-use crate::solver::polynomial::{beyond_linear, expanded, rescaled, safeguarded_halley, safeguarded_newton, value};
+use crate::solver::polynomial::{
+    beyond_linear, expanded, rescaled, safeguarded_halley, safeguarded_newton, value,
+};
 use std::f64::consts::{PI, TAU};
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
@@ -13,7 +15,12 @@ const MAX_HALVINGS: u32 = 40;
 
 /// First s in [`from`, `end`], within [0, 1], at which the polynomial leaves the open interval between two levels. The
 /// coefficients are changed.
-pub(super) fn first_exit(coefficients: &mut [f64], [lower, upper]: [f64; 2], from: f64, end: f64) -> Option<f64> {
+pub(super) fn first_exit(
+    coefficients: &mut [f64],
+    [lower, upper]: [f64; 2],
+    from: f64,
+    end: f64,
+) -> Option<f64> {
     let (start, slope) = (coefficients[0], coefficients[1]);
     let (value_spread, slope_spread) = beyond_linear(coefficients);
     let mut first = None;
@@ -34,15 +41,27 @@ pub(super) fn first_exit(coefficients: &mut [f64], [lower, upper]: [f64; 2], fro
 /// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the
 /// slope by at most `slope_spread`.
 fn first_reach(coefficients: &[f64], slope_spread: f64, from: f64, end: f64) -> Option<f64> {
-    let [here, slope, half_curvature] =
-        if from > 0.0 { expanded(coefficients, from) } else { [coefficients[0], coefficients[1], coefficients[2]] };
+    let [here, slope, half_curvature] = if from > 0.0 {
+        expanded(coefficients, from)
+    } else {
+        [coefficients[0], coefficients[1], coefficients[2]]
+    };
     if here >= 0.0 {
         return Some(from);
     }
     if coefficients[1].abs() > slope_spread {
         // Start where the parabola crosses.
-        let guess = from - 2.0 * here / (slope + (slope * slope - 4.0 * here * half_curvature).max(0.0).sqrt());
-        return if slope > 0.0 { rising_root(coefficients, from, end, guess) } else { None };
+        let guess = from
+            - 2.0 * here
+                / (slope
+                    + (slope * slope - 4.0 * here * half_curvature)
+                        .max(0.0)
+                        .sqrt());
+        return if slope > 0.0 {
+            rising_root(coefficients, from, end, guess)
+        } else {
+            None
+        };
     }
     first_in(coefficients, from, end, MAX_HALVINGS)
 }
@@ -60,13 +79,18 @@ fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64
         if value(about, -1.0) >= 0.0 {
             return Some(low);
         }
-        let root = if slope > 0.0 { rising_root(about, -1.0, 1.0, -about[0] / slope) } else { None };
+        let root = if slope > 0.0 {
+            rising_root(about, -1.0, 1.0, -about[0] / slope)
+        } else {
+            None
+        };
         return root.map(|r| (middle + half * r).clamp(low, high));
     }
     if depth == 0 {
         return (about[0] >= 0.0).then_some(middle);
     }
-    first_in(coefficients, low, middle, depth - 1).or_else(|| first_in(coefficients, middle, high, depth - 1))
+    first_in(coefficients, low, middle, depth - 1)
+        .or_else(|| first_in(coefficients, middle, high, depth - 1))
 }
 
 /// The root of a polynomial that rises from below zero throughout [low, high], sought from `first`; `None` if it stays
@@ -82,7 +106,11 @@ impl Harmonic {
             return from;
         }
         if self.amplitude == 0.0 {
-            return if self.rate > 0.0 { ((level - self.start) / self.rate).max(from) } else { f64::INFINITY };
+            return if self.rate > 0.0 {
+                ((level - self.start) / self.rate).max(from)
+            } else {
+                f64::INFINITY
+            };
         }
         let newton = |low: f64, high: f64| {
             safeguarded_newton(low, high, high, |elapsed| {
@@ -111,7 +139,11 @@ impl Harmonic {
         let high = first + skipped * period;
         // The branch that rises to a maximum begins at the minimum before it: π + 2 asin(p1/Aω) earlier in phase.
         let low = (high - (PI + 2.0 * crest) / self.angular_frequency).max(from);
-        if self.value(high) < level { high } else { newton(low, high) }
+        if self.value(high) < level {
+            high
+        } else {
+            newton(low, high)
+        }
     }
 
     /// First instant at or after `from` at which the motion is not above `level`; infinite if never. Minima grow too,
@@ -149,11 +181,31 @@ mod tests {
     fn a_bump_that_just_reaches_the_level_is_not_missed() {
         // -(s - 0.3)² + 1e-10: above zero for 2e-5 of the step only.
         let coefficients = [-0.09 + 1e-10, 0.6, -1.0];
-        let reached = first_exit(&mut coefficients.clone(), [f64::NEG_INFINITY, 0.0], 0.0, 1.0).unwrap();
+        let reached = first_exit(
+            &mut coefficients.clone(),
+            [f64::NEG_INFINITY, 0.0],
+            0.0,
+            1.0,
+        )
+        .unwrap();
         assert!((reached - (0.3 - 1e-5)).abs() < 1e-9, "{reached}");
-        assert_eq!(first_exit(&mut [-0.09 - 1e-10, 0.6, -1.0], [f64::NEG_INFINITY, 0.0], 0.0, 1.0), None);
+        assert_eq!(
+            first_exit(
+                &mut [-0.09 - 1e-10, 0.6, -1.0],
+                [f64::NEG_INFINITY, 0.0],
+                0.0,
+                1.0
+            ),
+            None
+        );
         // The same from above, past its foot.
-        let reached = first_exit(&mut coefficients.map(|c| -c), [0.0, f64::INFINITY], 0.2, 1.0).unwrap();
+        let reached = first_exit(
+            &mut coefficients.map(|c| -c),
+            [0.0, f64::INFINITY],
+            0.2,
+            1.0,
+        )
+        .unwrap();
         assert!((reached - (0.3 - 1e-5)).abs() < 1e-9, "{reached}");
     }
 

@@ -148,13 +148,31 @@ pub(super) struct Elimination<const C: usize> {
 impl<const C: usize> Elimination<C> {
     pub fn new(rows: usize) -> Self {
         let zero = [Row::filled(0.0); C];
-        let row = Eliminated { inverse: zero, ratio: zero, own: zero, after: zero, before: zero };
-        Self { rows: vec![row; rows], carried: zero, coupling: zero, reductions: [[zero; 2]; 3], gain: zero }
+        let row = Eliminated {
+            inverse: zero,
+            ratio: zero,
+            own: zero,
+            after: zero,
+            before: zero,
+        };
+        Self {
+            rows: vec![row; rows],
+            carried: zero,
+            coupling: zero,
+            reductions: [[zero; 2]; 3],
+            gain: zero,
+        }
     }
 
     /// Eliminates S/m plus `shift`, in 1/s². False if a real matrix is not positive definite.
     #[inline(always)]
-    pub fn eliminate<S: Simd>(&mut self, simd: S, chain: &Chain, fixed: &[Row], shift: [f64; C]) -> bool {
+    pub fn eliminate<S: Simd>(
+        &mut self,
+        simd: S,
+        chain: &Chain,
+        fixed: &[Row],
+        shift: [f64; C],
+    ) -> bool {
         let rows = chain.layout.rows;
         let (entries, couplings) = (&mut self.rows[..rows], &chain.coupling[..rows]);
         let (zero, shift) = (Number::splat(simd, [0.0; C]), Number::splat(simd, shift));
@@ -164,9 +182,13 @@ impl<const C: usize> Elimination<C> {
         let (mut least, mut positive) = (simd.splat(0.0), u8::MAX);
         for r in 0..rows {
             let mut entry = shift;
-            entry.1[0] = entry.1[0].plus(simd.load(&chain.diagonal[r])).plus(simd.load(&fixed[r]));
+            entry.1[0] = entry.1[0]
+                .plus(simd.load(&chain.diagonal[r]))
+                .plus(simd.load(&fixed[r]));
             pivot = entry.plus_scaled(ratio, simd.splat(0.0).minus(simd.load(&couplings[r])));
-            least = entry.1[0].abs().mul_add(simd.splat(MIN_PIVOT), simd.splat(f64::MIN_POSITIVE));
+            least = entry.1[0]
+                .abs()
+                .mul_add(simd.splat(MIN_PIVOT), simd.splat(f64::MIN_POSITIVE));
             positive &= pivot.1[0].reaches(least);
             along.store(&mut entries[r].after);
             if r + 1 < rows {
@@ -186,7 +208,8 @@ impl<const C: usize> Elimination<C> {
                 before = before.times(ratio);
             }
             own.store(&mut entry.own);
-            own.times(Number::load(simd, &entry.after)).store(&mut entry.after);
+            own.times(Number::load(simd, &entry.after))
+                .store(&mut entry.after);
             before.store(&mut entry.before);
         }
         let outer = outer(simd, chain);
@@ -198,9 +221,17 @@ impl<const C: usize> Elimination<C> {
             let lanes = 1 << step;
             positive &= diagonal.1[0].reaches(least);
             let inverse = diagonal.inverse();
-            let [before, after] = [coupling.times(inverse.on(lanes)), coupling.times(inverse).back(lanes)];
-            let taken = before.times(coupling).plus_product(after, coupling.back(lanes));
-            (diagonal, coupling) = (diagonal.plus_scaled(taken, minus), before.times(coupling.on(lanes)));
+            let [before, after] = [
+                coupling.times(inverse.on(lanes)),
+                coupling.times(inverse).back(lanes),
+            ];
+            let taken = before
+                .times(coupling)
+                .plus_product(after, coupling.back(lanes));
+            (diagonal, coupling) = (
+                diagonal.plus_scaled(taken, minus),
+                before.times(coupling.on(lanes)),
+            );
             before.store(from_before);
             after.store(from_after);
         }
@@ -232,7 +263,9 @@ impl<const C: usize> Elimination<C> {
         let before = force.plus_scaled(cut.on(1), outer(simd, chain));
         for (entry, solution) in self.rows.iter().zip(solution) {
             let from_before = before.times(Number::load(simd, &entry.after));
-            from_before.plus_product(cut, Number::load(simd, &entry.before)).store(solution);
+            from_before
+                .plus_product(cut, Number::load(simd, &entry.before))
+                .store(solution);
         }
     }
 }
@@ -240,5 +273,7 @@ impl<const C: usize> Elimination<C> {
 /// Coupling of the first row to the block before, which lies in the last row of the lane before.
 #[inline(always)]
 pub(super) fn outer<S: Simd>(simd: S, chain: &Chain) -> S::Vector {
-    simd.load(&chain.coupling[0]).to_lane_before().to_next_lane()
+    simd.load(&chain.coupling[0])
+        .to_lane_before()
+        .to_next_lane()
 }

@@ -73,7 +73,11 @@ impl Frame {
     #[inline]
     pub fn absolute(&self, event: ContactEvent) -> ContactEvent {
         let time = self.absolute_time(event.time);
-        ContactEvent { time, displacement: self.absolute_displacement(event.displacement), ..event }
+        ContactEvent {
+            time,
+            displacement: self.absolute_displacement(event.displacement),
+            ..event
+        }
     }
 
     /// Seconds until a time that is counted from the start of the run.
@@ -137,15 +141,35 @@ impl Frame {
 
     /// The drive's displacement from now on, within the cycle, in m.
     pub fn drive_motion(&self) -> Harmonic {
-        let Drive { velocity, amplitude, angular_frequency, .. } = self.drive;
-        Harmonic { start: self.ramp(), rate: velocity, amplitude, phase: self.phase(), angular_frequency }
+        let Drive {
+            velocity,
+            amplitude,
+            angular_frequency,
+            ..
+        } = self.drive;
+        Harmonic {
+            start: self.ramp(),
+            rate: velocity,
+            amplitude,
+            phase: self.phase(),
+            angular_frequency,
+        }
     }
 
     /// The drive for a grid of steps of `length` s, from the present on.
     pub fn grid_drive(&self, length: f64) -> GridDrive {
-        let angle = if self.drive.is_modulated() { self.drive.angular_frequency * length } else { 0.0 };
+        let angle = if self.drive.is_modulated() {
+            self.drive.angular_frequency * length
+        } else {
+            0.0
+        };
         let (sine, cosine) = libm::sincos(angle);
-        GridDrive { ramp: [self.ramp(), self.drive.velocity * length], swing: self.swing, turn: [sine, cosine], angle }
+        GridDrive {
+            ramp: [self.ramp(), self.drive.velocity * length],
+            swing: self.swing,
+            turn: [sine, cosine],
+            angle,
+        }
     }
 
     /// The derivatives of the drive's displacement, for a step of `length` s.

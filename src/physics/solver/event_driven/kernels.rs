@@ -93,14 +93,17 @@ impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
 
 /// The fastest loops that this processor can run for this many rows.
 pub(super) fn fastest(rows: usize) -> Box<dyn Kernels> {
-    let (_, fastest) = available(rows).pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
+    let (_, fastest) = available(rows)
+        .pop()
+        .unwrap_or_else(|| unreachable!("there is always the baseline"));
     fastest
 }
 
 /// All loops that this processor can run for this many rows, with their names; the fastest last.
 #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, unused_variables))]
 pub(super) fn available(rows: usize) -> Vec<(&'static str, Box<dyn Kernels>)> {
-    let mut paths: Vec<(&'static str, Box<dyn Kernels>)> = vec![("baseline", Box::new(Compiled::<_, 0>(Scalar512b)))];
+    let mut paths: Vec<(&'static str, Box<dyn Kernels>)> =
+        vec![("baseline", Box::new(Compiled::<_, 0>(Scalar512b)))];
     // The slider of the paper, 70 blocks in nine rows: loops of known length cost a quarter less.
     #[cfg(target_arch = "x86_64")]
     {

@@ -20,7 +20,10 @@ pub(super) struct Layout {
 
 impl Layout {
     pub fn new(blocks: usize) -> Self {
-        Self { blocks, rows: blocks.div_ceil(LANES) }
+        Self {
+            blocks,
+            rows: blocks.div_ceil(LANES),
+        }
     }
 
     /// Row and lane of a block.

@@ -86,8 +86,16 @@ fn passing_horizon(
         limit = limit.min(seconds + (reach - ASTRAY * error).max(0.0) / speed);
         true
     });
-    let horizon = if rate > 0.0 { limit.min(last + (allowed - displaced) / rate) } else { limit };
-    if horizon < least { Err(loose.clamp(0.5 * least, 4.0 * least)) } else { Ok(horizon) }
+    let horizon = if rate > 0.0 {
+        limit.min(last + (allowed - displaced) / rate)
+    } else {
+        limit
+    };
+    if horizon < least {
+        Err(loose.clamp(0.5 * least, 4.0 * least))
+    } else {
+        Ok(horizon)
+    }
 }
 
 /// Looks for a leap under a drive that moves as given. The free motion of a block is at most `largest` m. If there is none,
@@ -105,7 +113,11 @@ fn plan<S: Simd>(
     let Bounds { horizon, error, .. } = bounds;
     // Worth another try after some e-foldings of the free motion, or after the next event.
     let wait = (0.7 / split.decay_rate).min(horizon);
-    let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / split.decay_rate };
+    let decay = if largest <= error {
+        0.0
+    } else {
+        libm::log(largest / error) / split.decay_rate
+    };
     if decay >= horizon {
         return Err(horizon);
     }
@@ -120,12 +132,32 @@ fn plan<S: Simd>(
     if !elapsed.is_finite() {
         return Err(f64::INFINITY);
     }
-    let path = split.driven(chain, 0).force_path(drive, chain.drive_stiffness);
-    let segment = Segment { start: 0.0, duration: elapsed, path };
-    if largest > error && !hides_no_peak(simd, split, (chain, interface), drive, &segment, [decay, left], bounds) {
+    let path = split
+        .driven(chain, 0)
+        .force_path(drive, chain.drive_stiffness);
+    let segment = Segment {
+        start: 0.0,
+        duration: elapsed,
+        path,
+    };
+    if largest > error
+        && !hides_no_peak(
+            simd,
+            split,
+            (chain, interface),
+            drive,
+            &segment,
+            [decay, left],
+            bounds,
+        )
+    {
         return Err(wait);
     }
-    Ok(Plan { segment, reached, is_whole: elapsed == horizon })
+    Ok(Plan {
+        segment,
+        reached,
+        is_whole: elapsed == horizon,
+    })
 }
 
 /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force: one
@@ -138,19 +170,33 @@ fn hides_no_peak<S: Simd>(
     drive: &Harmonic,
     segment: &Segment<'static>,
     [moving, left]: [f64; 2],
-    Bounds { start, horizon, until_cycle_end, largest_force, .. }: Bounds,
+    Bounds {
+        start,
+        horizon,
+        until_cycle_end,
+        largest_force,
+        ..
+    }: Bounds,
 ) -> bool {
     let swing = chain.drive_stiffness * split.rows[0].bound[0];
-    let driven = |seconds: f64| Segment { duration: seconds, ..*segment };
+    let driven = |seconds: f64| Segment {
+        duration: seconds,
+        ..*segment
+    };
     let now = segment.force_after(0.0);
     let later = segment.force_after(moving);
     let highest = if drive.amplitude == 0.0 {
         // A rising line and a decaying bound: largest at an end.
         (now + swing).max(later + left * swing)
     } else {
-        driven(moving).maximum_above(f64::NEG_INFINITY).map_or(f64::INFINITY, |(_, force)| force) + swing
+        driven(moving)
+            .maximum_above(f64::NEG_INFINITY)
+            .map_or(f64::INFINITY, |(_, force)| force)
+            + swing
     };
-    if highest <= largest_force || (segment.duration > moving && segment.maximum_above(highest).is_some()) {
+    if highest <= largest_force
+        || (segment.duration > moving && segment.maximum_above(highest).is_some())
+    {
         return true;
     }
     let rate = chain.drive_stiffness * (drive.rate - split.driven(chain, 0).rate);
@@ -163,11 +209,15 @@ fn hides_no_peak<S: Simd>(
     if ahead > horizon {
         // Nor does a contact break that attaches on the way.
         interface.look_ahead_to_lives(|due, block, [_, reach]| {
-            ahead = ahead.min(due - start + reach / split.speed_and_compliance(chain, drive, block)[0]);
+            ahead =
+                ahead.min(due - start + reach / split.speed_and_compliance(chain, drive, block)[0]);
             due - start < ahead
         });
     }
-    driven(ahead).maximum_above(highest + left * swing).is_some() && stays_clear(simd, chain, split, ahead, left)
+    driven(ahead)
+        .maximum_above(highest + left * swing)
+        .is_some()
+        && stays_clear(simd, chain, split, ahead, left)
 }
 
 /// Tries to leap, on the grid over reattachments, and moves the state on; see [`plan`]. `audit` receives the energies.
@@ -175,14 +225,21 @@ fn hides_no_peak<S: Simd>(
 pub(super) fn leap<S: Simd>(
     simd: S,
     split: &mut Split,
-    Slider { chain, state, interface }: &mut Slider,
+    Slider {
+        chain,
+        state,
+        interface,
+    }: &mut Slider,
     drive: &Harmonic,
     mut bounds: Bounds,
     audit: Option<&Audit>,
 ) -> Result<Plan, f64> {
-    let largest = split.update(simd, chain, drive, state).ok_or((2.0 / chain.damping_rate).min(bounds.horizon))?;
+    let largest = split
+        .update(simd, chain, drive, state)
+        .ok_or((2.0 / chain.damping_rate).min(bounds.horizon))?;
     if let Some(passing) = bounds.passing {
-        bounds.horizon = passing_horizon(split, (chain, interface), drive, bounds, passing, largest)?;
+        bounds.horizon =
+            passing_horizon(split, (chain, interface), drive, bounds, passing, largest)?;
     }
     let plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
     if let Some(audit) = audit {
@@ -199,9 +256,15 @@ fn stays_clear<S: Simd>(simd: S, chain: &Chain, split: &Split, seconds: f64, lef
     let (seconds, left) = (simd.splat(seconds), simd.splat(left));
     let mut clear = u8::MAX;
     for ((row, upper), lower) in split.rows.iter().zip(&chain.upper).zip(&chain.lower) {
-        let (start, bound, swing) = (simd.load(&row.start), simd.load(&row.bound), simd.load(&row.swing));
+        let (start, bound, swing) = (
+            simd.load(&row.start),
+            simd.load(&row.bound),
+            simd.load(&row.swing),
+        );
         // Ramp and decaying bound together are convex in time: largest at the ends.
-        let late = start.plus(simd.load(&row.rate[0]).times(seconds)).plus(left.times(bound));
+        let late = start
+            .plus(simd.load(&row.rate[0]).times(seconds))
+            .plus(left.times(bound));
         let highest = late.larger(start.plus(bound)).plus(swing);
         clear &= simd.load(upper).reaches(highest);
         clear &= start.minus(bound).minus(swing).reaches(simd.load(lower));
@@ -226,20 +289,31 @@ fn first_reached<S: Simd>(
             until = first.0;
             let half = 0.5 * drive.angular_frequency * (until - decay);
             let is_short = drive.amplitude > 0.0 && half < 1.0;
-            ends = if is_short { [decay, until].map(|at| libm::sincos(drive.turn(at))) } else { [(0.0, 0.0); 2] };
+            ends = if is_short {
+                [decay, until].map(|at| libm::sincos(drive.turn(at)))
+            } else {
+                [(0.0, 0.0); 2]
+            };
             bend = if is_short { 0.5 * half * half } else { 1.0 };
         }
         let (start, rate) = (simd.load(&row.start), simd.load(&row.rate[0]));
-        let from = start.plus(rate.times(simd.splat(decay))).plus(turned(simd, row, ends[0]));
-        let to = start.plus(rate.times(simd.splat(until))).plus(turned(simd, row, ends[1]));
+        let from = start
+            .plus(rate.times(simd.splat(decay)))
+            .plus(turned(simd, row, ends[0]));
+        let to = start
+            .plus(rate.times(simd.splat(until)))
+            .plus(turned(simd, row, ends[1]));
         let beyond = simd.load(&row.swing).times(simd.splat(bend));
         let (highest, lowest) = (from.larger(to).plus(beyond), from.smaller(to).minus(beyond));
-        let mut lanes = highest.reaches(simd.load(&chain.upper[r])) | simd.load(&chain.lower[r]).reaches(lowest);
+        let mut lanes = highest.reaches(simd.load(&chain.upper[r]))
+            | simd.load(&chain.lower[r]).reaches(lowest);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             let block = chain.layout.block(r, lane);
             let levels = [chain.lower[r][lane], chain.upper[r][lane]];
-            let elapsed = split.driven(chain, block).reaches(drive, levels, [decay, first.0]);
+            let elapsed = split
+                .driven(chain, block)
+                .reaches(drive, levels, [decay, first.0]);
             if elapsed < first.0 {
                 first = (elapsed, Some(block));
             }
@@ -252,13 +326,26 @@ fn first_reached<S: Simd>(
 /// Moves a state on along the driven solution, by `elapsed` s.
 #[inline(always)]
 fn follow<S: Simd>(simd: S, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State) {
-    let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(drive.turn(elapsed)) } else { (0.0, 1.0) };
+    let (sine, cosine) = if drive.amplitude > 0.0 {
+        libm::sincos(drive.turn(elapsed))
+    } else {
+        (0.0, 1.0)
+    };
     let (elapsed, frequency) = (simd.splat(elapsed), simd.splat(drive.angular_frequency));
-    for ((row, x), v) in split.rows.iter().zip(&mut state.displacement).zip(&mut state.velocity) {
+    for ((row, x), v) in split
+        .rows
+        .iter()
+        .zip(&mut state.displacement)
+        .zip(&mut state.velocity)
+    {
         let (start, rate) = (simd.load(&row.start), simd.load(&row.rate[0]));
-        start.plus(rate.times(elapsed)).plus(turned(simd, row, (sine, cosine))).store(x);
+        start
+            .plus(rate.times(elapsed))
+            .plus(turned(simd, row, (sine, cosine)))
+            .store(x);
         // -ω Im(q e^{iφ}): ω times the real part a quarter of a turn ahead.
-        rate.plus(frequency.times(turned(simd, row, (cosine, -sine)))).store(v);
+        rate.plus(frequency.times(turned(simd, row, (cosine, -sine))))
+            .store(v);
     }
 }
 
@@ -266,7 +353,9 @@ fn follow<S: Simd>(simd: S, split: &Split, drive: &Harmonic, elapsed: f64, state
 #[inline(always)]
 fn turned<S: Simd>(simd: S, row: &SplitRow, (sine, cosine): (f64, f64)) -> S::Vector {
     let [real, imaginary] = &row.wave;
-    simd.load(real).times(simd.splat(cosine)).minus(simd.load(imaginary).times(simd.splat(sine)))
+    simd.load(real)
+        .times(simd.splat(cosine))
+        .minus(simd.load(imaginary).times(simd.splat(sine)))
 }
 
 #[cfg(test)]
@@ -278,17 +367,32 @@ mod tests {
 
     #[test]
     fn a_leap_ends_where_the_first_block_reaches_a_break_position() {
-        let parameters = Parameters { blocks: 21, ..Parameters::default() };
-        let plain = Harmonic { start: 3e-6, rate: 1e-4, amplitude: 0.0, phase: 0.0, angular_frequency: 0.0 };
+        let parameters = Parameters {
+            blocks: 21,
+            ..Parameters::default()
+        };
+        let plain = Harmonic {
+            start: 3e-6,
+            rate: 1e-4,
+            amplitude: 0.0,
+            phase: 0.0,
+            angular_frequency: 0.0,
+        };
         let phases = (0..200).map(|i| 0.1 * f64::from(i));
-        let modulated = phases.map(|phase| Harmonic { amplitude: 1e-6, phase, angular_frequency: 364.0, ..plain });
+        let modulated = phases.map(|phase| Harmonic {
+            amplitude: 1e-6,
+            phase,
+            angular_frequency: 364.0,
+            ..plain
+        });
         let mut slider = Slider::new(&parameters);
         let mut split = Split::new(&slider.chain);
         for (case, drive) in std::iter::once(plain).chain(modulated).enumerate() {
             let close = [0.01, 0.5, 0.9, 10.0][case % 4];
             let Slider { chain, state, .. } = &mut slider;
             split.update(Baseline, chain, &drive, state).unwrap();
-            let blocks: Vec<BlockMotion> = (0..21).map(|block| split.driven(chain, block)).collect();
+            let blocks: Vec<BlockMotion> =
+                (0..21).map(|block| split.driven(chain, block)).collect();
             for (block, motion) in blocks.iter().enumerate() {
                 let (row, lane) = chain.layout.slot(block);
                 let away = close * (1.0 + (block * 8 % 21) as f64 / 42.0);
@@ -297,18 +401,26 @@ mod tests {
                 split.rows[row].bound[lane] = 0.0;
             }
             let is_beyond = |block: usize, seconds: f64| {
-                let (x, (row, lane)) = (blocks[block].displacement(&drive, seconds), chain.layout.slot(block));
+                let (x, (row, lane)) = (
+                    blocks[block].displacement(&drive, seconds),
+                    chain.layout.slot(block),
+                );
                 x >= chain.upper[row][lane] + 1e-16 || x <= chain.lower[row][lane] - 1e-16
             };
             for horizon in [1e-4, 1e-3, 4e-3, 0.01, 0.1, f64::INFINITY] {
-                let (elapsed, reached) = first_reached(Baseline, chain, &split, &drive, [1e-6, horizon]);
+                let (elapsed, reached) =
+                    first_reached(Baseline, chain, &split, &drive, [1e-6, horizon]);
                 assert!(reached.is_some() || elapsed == horizon);
                 let sample = |i: u32| 1e-6 + 0.999 * (elapsed - 1e-6) * f64::from(i) / 100.0;
                 let mut samples = (0..21).flat_map(|block| (0..100).map(move |i| (block, i)));
-                let early = samples.find(|&(block, i)| elapsed > 1e-6 && is_beyond(block, sample(i)));
+                let early =
+                    samples.find(|&(block, i)| elapsed > 1e-6 && is_beyond(block, sample(i)));
                 assert_eq!(early, None, "{elapsed} s, at {drive:?}");
                 if let Some(block) = reached {
-                    assert!((1..100).any(|i| is_beyond(block, elapsed + 1e-7 * f64::from(i))), "{block} is not there");
+                    assert!(
+                        (1..100).any(|i| is_beyond(block, elapsed + 1e-7 * f64::from(i))),
+                        "{block} is not there"
+                    );
                     assert!(!stays_clear(Baseline, chain, &split, elapsed + 1e-5, 0.0));
                 }
                 if elapsed.is_finite() {
@@ -316,7 +428,8 @@ mod tests {
                     for (block, motion) in blocks.iter().enumerate() {
                         let expected = motion.displacement(&drive, elapsed);
                         assert!(
-                            (chain.at(&state.displacement, block) - expected).abs() < 1e-15 * expected.abs().max(1e-6)
+                            (chain.at(&state.displacement, block) - expected).abs()
+                                < 1e-15 * expected.abs().max(1e-6)
                         );
                     }
                 }

@@ -61,8 +61,18 @@ pub(super) fn run(
     }
     let is_possible = audit.is_none() && Grid::is_resolved(parameters, tolerance);
     let takes_grid = resolve.takes_grid(tolerance) && (is_possible || resolve == Resolve::Grid);
-    let integration = Integration::new(parameters, tolerance, takes_grid, limits, kernels::fastest(rows));
-    Integration { audit, ..integration }.integrate(observer)
+    let integration = Integration::new(
+        parameters,
+        tolerance,
+        takes_grid,
+        limits,
+        kernels::fastest(rows),
+    );
+    Integration {
+        audit,
+        ..integration
+    }
+    .integrate(observer)
 }
 
 /// One simulation in progress. Times and displacements are those of the frame unless stated otherwise.
@@ -97,7 +107,11 @@ impl<'a> Integration<'a> {
         let tolerances = Tolerances::new(parameters, tolerance);
         let slider = Slider::new(parameters);
         let layout = slider.chain.layout;
-        let span = if takes_grid { grid::FRAME_SPAN } else { frame::SPAN };
+        let span = if takes_grid {
+            grid::FRAME_SPAN
+        } else {
+            frame::SPAN
+        };
         Self {
             limits,
             kernels,
@@ -147,7 +161,8 @@ impl<'a> Integration<'a> {
             let leapt = is_worthwhile
                 && self.frame.time >= self.next_leap
                 && self.try_leap(horizon, [until_change, until_cycle_end], observer);
-            let moved = leapt || (self.takes_grid && self.take_grid_steps(until_change, observer)?);
+            let moved =
+                leapt || (self.takes_grid && self.take_grid_steps(until_change, observer)?);
             if !moved {
                 self.take_step(until_change, observer)?;
             }
@@ -157,27 +172,46 @@ impl<'a> Integration<'a> {
             }
             // A value that is not finite spreads to the driven edge, if the run lasts.
             if !self.slider.state.displacement[0][0].is_finite() {
-                return Err(SimulationError::NotFinite { time: self.frame.now() });
+                return Err(SimulationError::NotFinite {
+                    time: self.frame.now(),
+                });
             }
             if self.frame.time > self.frame.span {
                 self.move_frame(observer);
             }
             let is_check = self.summary.steps >= next_check;
             next_check += if is_check { STEPS_PER_CHECK } else { 0 };
-            if is_check && self.limits.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-                return Err(SimulationError::Interrupted { time: self.frame.now() });
+            if is_check
+                && self
+                    .limits
+                    .interrupt
+                    .is_some_and(|flag| flag.load(Ordering::Relaxed))
+            {
+                return Err(SimulationError::Interrupted {
+                    time: self.frame.now(),
+                });
             }
         }
         self.finish(true, observer)
     }
 
     #[inline(never)]
-    fn finish(&mut self, satisfied: bool, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+    fn finish(
+        &mut self,
+        satisfied: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<Summary, SimulationError> {
         self.leave_grid(observer);
         self.summary.end_time = self.frame.now();
-        let displacement: Vec<f64> = self.slider.displacements().map(|x| self.frame.absolute_displacement(x)).collect();
+        let displacement: Vec<f64> = self
+            .slider
+            .displacements()
+            .map(|x| self.frame.absolute_displacement(x))
+            .collect();
         if !displacement.iter().sum::<f64>().is_finite() {
-            return Err(SimulationError::NotFinite { time: self.summary.end_time });
+            return Err(SimulationError::NotFinite {
+                time: self.summary.end_time,
+            });
         }
         observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
@@ -199,12 +233,35 @@ impl<'a> Integration<'a> {
         self.update_velocities(observer);
         let drive = self.frame.drive_motion();
         let (start, began) = (self.frame.now(), self.frame.time);
-        let Tolerances { leap_error: error, max_step, .. } = self.tolerances;
-        let passing = self.takes_grid.then_some([WORTHWHILE_GRID_LEAP * self.grid.step.length, until_change]);
+        let Tolerances {
+            leap_error: error,
+            max_step,
+            ..
+        } = self.tolerances;
+        let passing = self
+            .takes_grid
+            .then_some([WORTHWHILE_GRID_LEAP * self.grid.step.length, until_change]);
         let largest_force = self.largest_force;
-        let bounds = Bounds { start: began, horizon, until_cycle_end, error, largest_force, passing };
-        let attempt = self.kernels.leap(&mut self.split, &mut self.slider, &drive, bounds, self.audit);
-        let Plan { segment, reached, is_whole } = match attempt {
+        let bounds = Bounds {
+            start: began,
+            horizon,
+            until_cycle_end,
+            error,
+            largest_force,
+            passing,
+        };
+        let attempt = self.kernels.leap(
+            &mut self.split,
+            &mut self.slider,
+            &drive,
+            bounds,
+            self.audit,
+        );
+        let Plan {
+            segment,
+            reached,
+            is_whole,
+        } = match attempt {
             Ok(plan) => plan,
             Err(seconds) => {
                 self.next_leap = began + seconds.max(max_step);
@@ -220,7 +277,10 @@ impl<'a> Integration<'a> {
         self.arrive(segment.duration, is_whole);
         match reached {
             Some(block) => {
-                let (x, trailing) = (self.slider.displacement(block), self.slider.state.displacement[0][0]);
+                let (x, trailing) = (
+                    self.slider.displacement(block),
+                    self.slider.state.displacement[0][0],
+                );
                 let mean = self.slider.mean_displacement();
                 self.break_block(block, [x, mean], self.frame.shear_force(trailing), observer);
             }
@@ -231,23 +291,45 @@ impl<'a> Integration<'a> {
 
     /// Tells the shear force along a leap that began at a time in s in the frame, and attaches on the driven solution what
     /// it passed from the grid.
-    fn tell_leap(&mut self, leap: &Segment<'static>, drive: &Harmonic, began: f64, observer: &mut dyn Observer) {
-        let ForcePath::Harmonic(path) = leap.path else { unreachable!("a leap follows the driven solution") };
+    fn tell_leap(
+        &mut self,
+        leap: &Segment<'static>,
+        drive: &Harmonic,
+        began: f64,
+        observer: &mut dyn Observer,
+    ) {
+        let ForcePath::Harmonic(path) = leap.path else {
+            unreachable!("a leap follows the driven solution")
+        };
         let mut told = 0.0;
         let mut tell = |until: f64, observer: &mut dyn Observer| {
-            let path = Harmonic { start: path.start + path.rate * told, phase: path.phase + path.turn(told), ..path };
+            let path = Harmonic {
+                start: path.start + path.rate * told,
+                phase: path.phase + path.turn(told),
+                ..path
+            };
             let start = leap.start + told;
-            observer.advance(&Segment { start, duration: until - told, path: ForcePath::Harmonic(path) });
+            observer.advance(&Segment {
+                start,
+                duration: until - told,
+                path: ForcePath::Harmonic(path),
+            });
             told = until;
         };
         // What is due at the very end is attached to the state there.
-        while let Some((due, block)) = self.slider.interface.next_reattachment_by(began + leap.duration)
+        while let Some((due, block)) = self
+            .slider
+            .interface
+            .next_reattachment_by(began + leap.duration)
             && due - began < leap.duration
         {
             if self.grid.tells_attachments() {
                 tell(due - began, observer);
             }
-            let x = self.split.driven(&self.slider.chain, block).displacement(drive, due - began);
+            let x = self
+                .split
+                .driven(&self.slider.chain, block)
+                .displacement(drive, due - began);
             self.attach_next(x, observer);
         }
         tell(leap.duration, observer);
@@ -263,13 +345,22 @@ impl<'a> Integration<'a> {
 
     /// Breaks the contacts of a block that has reached a break position, at these displacements of it and of all blocks on
     /// average in m and shear force `force` N.
-    fn break_block(&mut self, block: usize, [x, mean]: [f64; 2], force: f64, observer: &mut dyn Observer) {
+    fn break_block(
+        &mut self,
+        block: usize,
+        [x, mean]: [f64; 2],
+        force: f64,
+        observer: &mut dyn Observer,
+    ) {
         self.largest_force = force;
         let (frame, summary) = (&self.frame, &mut self.summary);
         let mean_displacement = frame.absolute_displacement(mean);
         self.slider.break_reached(block, frame.time, x, |event| {
             summary.breaks += 1;
-            observer.contact(&ContactEvent { mean_displacement, ..frame.absolute(event) });
+            observer.contact(&ContactEvent {
+                mean_displacement,
+                ..frame.absolute(event)
+            });
         });
     }
 
@@ -320,17 +411,32 @@ mod tests {
             seed: 5,
             ..Parameters::default()
         };
-        for (parameters, takes_grid) in [(&plain, true), (&plain, false), (&modulated, true), (&modulated, false)] {
-            let logs: Vec<(&str, Vec<ContactEvent>)> = kernels::available(Layout::new(parameters.blocks).rows)
-                .into_iter()
-                .map(|(name, kernels)| {
-                    let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };
-                    let mut log = ContactLog::default();
-                    Integration::new(parameters, 1e-6, takes_grid, limits, kernels).integrate(&mut log).unwrap();
-                    (name, log.events)
-                })
-                .collect();
-            assert!(logs[0].1.len() > 2 * parameters.blocks * parameters.contacts_per_block, "no slip to compare");
+        for (parameters, takes_grid) in [
+            (&plain, true),
+            (&plain, false),
+            (&modulated, true),
+            (&modulated, false),
+        ] {
+            let logs: Vec<(&str, Vec<ContactEvent>)> =
+                kernels::available(Layout::new(parameters.blocks).rows)
+                    .into_iter()
+                    .map(|(name, kernels)| {
+                        let limits = Limits {
+                            end_time: 0.25,
+                            events: u64::MAX,
+                            interrupt: None,
+                        };
+                        let mut log = ContactLog::default();
+                        Integration::new(parameters, 1e-6, takes_grid, limits, kernels)
+                            .integrate(&mut log)
+                            .unwrap();
+                        (name, log.events)
+                    })
+                    .collect();
+            assert!(
+                logs[0].1.len() > 2 * parameters.blocks * parameters.contacts_per_block,
+                "no slip to compare"
+            );
             for (name, log) in &logs[1..] {
                 assert_eq!(*log, logs[0].1, "{name} differs from {}", logs[0].0);
             }
@@ -340,23 +446,47 @@ mod tests {
     #[test]
     fn events_that_share_a_step_come_in_the_order_and_at_the_times_of_those_that_do_not() {
         let plain = Parameters::default();
-        let modulated =
-            Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };
+        let modulated = Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(1.0 / 58.0),
+            ..Parameters::default()
+        };
         for parameters in [plain, modulated] {
             let log = |tolerance: f64| {
-                let limits = Limits { end_time: 0.1, events: u64::MAX, interrupt: None };
+                let limits = Limits {
+                    end_time: 0.1,
+                    events: u64::MAX,
+                    interrupt: None,
+                };
                 let mut log = ContactLog::default();
-                let summary = run(&parameters, tolerance, Resolve::Taylor, limits, &mut log, None).unwrap();
+                let summary = run(
+                    &parameters,
+                    tolerance,
+                    Resolve::Taylor,
+                    limits,
+                    &mut log,
+                    None,
+                )
+                .unwrap();
                 (summary.steps, log.events)
             };
             let (steps_alone, alone) = log(1e-10);
             let later = alone.iter().filter(|event| event.generation > 0).count();
             assert!(later > 150, "too few events to compare");
-            let which =
-                |event: &ContactEvent| (event.block, event.contact, event.generation, event.change == Change::Break);
+            let which = |event: &ContactEvent| {
+                (
+                    event.block,
+                    event.contact,
+                    event.generation,
+                    event.change == Change::Break,
+                )
+            };
             for tolerance in [1e-3, 1e-4] {
                 let ((steps, mut merged), mut alone) = (log(tolerance), alone.clone());
-                assert!(10 * steps < 8 * steps_alone, "nothing is merged: {steps} steps, {steps_alone} at 1e-10");
+                assert!(
+                    10 * steps < 8 * steps_alone,
+                    "nothing is merged: {steps} steps, {steps_alone} at 1e-10"
+                );
                 assert_eq!(merged.len(), alone.len());
                 assert!(merged.is_sorted_by_key(|event| event.time));
                 if tolerance > 1e-4 {
@@ -368,7 +498,12 @@ mod tests {
                     assert_eq!(which(event), which(exact), "at t = {} s", exact.time);
                     // Errors grow from event to event: seen 3e-6 s at 1e-3.
                     let late = event.time - exact.time;
-                    assert!(late.abs() < 0.01 * tolerance, "{} s, not {} s", event.time, exact.time);
+                    assert!(
+                        late.abs() < 0.01 * tolerance,
+                        "{} s, not {} s",
+                        event.time,
+                        exact.time
+                    );
                 }
             }
         }
@@ -376,25 +511,56 @@ mod tests {
 
     #[test]
     fn leaps_hide_no_event_and_no_largest_force() {
-        let plain = Parameters { drive_velocity: 1e-5, ..Parameters::default() };
-        let modulated = Parameters { modulation_amplitude: 1e-7, modulation_period: Some(1.0 / 58.0), ..plain.clone() };
+        let plain = Parameters {
+            drive_velocity: 1e-5,
+            ..Parameters::default()
+        };
+        let modulated = Parameters {
+            modulation_amplitude: 1e-7,
+            modulation_period: Some(1.0 / 58.0),
+            ..plain.clone()
+        };
         for parameters in [plain, modulated] {
             let slips = |next_leap: f64| {
-                let limits = Limits { end_time: 5.0, events: u64::MAX, interrupt: None };
+                let limits = Limits {
+                    end_time: 5.0,
+                    events: u64::MAX,
+                    interrupt: None,
+                };
                 let kernels = kernels::fastest(Layout::new(parameters.blocks).rows);
-                let recording = Recording { discard: 0, ..Recording::default() };
+                let recording = Recording {
+                    discard: 0,
+                    ..Recording::default()
+                };
                 let mut observer = SlipObserver::new(&parameters, &recording);
                 let integration = Integration::new(&parameters, 1e-10, false, limits, kernels);
-                let summary = Integration { next_leap, ..integration }.integrate(&mut observer).unwrap();
+                let summary = Integration {
+                    next_leap,
+                    ..integration
+                }
+                .integrate(&mut observer)
+                .unwrap();
                 (summary, observer.into_rows().0)
             };
             let ((leaping, leapt), (stepping, stepped)) = (slips(0.0), slips(f64::INFINITY));
-            assert!(leaping.leaps > 100 && stepping.leaps == 0, "{leaping:?} {stepping:?}");
-            assert_eq!((leaping.breaks, leapt.len()), (stepping.breaks, stepped.len()));
+            assert!(
+                leaping.leaps > 100 && stepping.leaps == 0,
+                "{leaping:?} {stepping:?}"
+            );
+            assert_eq!(
+                (leaping.breaks, leapt.len()),
+                (stepping.breaks, stepped.len())
+            );
             assert!(leapt.len() >= 3, "too few slips to compare");
             for (slip, exact) in leapt.iter().zip(&stepped) {
-                assert!((slip.onset - exact.onset).abs() < 1e-7, "{slip:?} {exact:?}");
-                assert!((slip.peak_force - exact.peak_force).abs() < 1e-4, "{slip:?} {exact:?}");
+                assert!(
+                    (slip.onset - exact.onset).abs() < 1e-7,
+                    "{slip:?} {exact:?}"
+                );
+                assert!(
+                    (slip.peak_force - exact.peak_force).abs() < 1e-4,
+                    "{slip:?} {exact:?}"
+                );
                 assert!((slip.drop - exact.drop).abs() < 1e-4, "{slip:?} {exact:?}");
             }
         }
@@ -402,21 +568,47 @@ mod tests {
 
     #[test]
     fn truncations_of_many_steps_do_not_add_up_with_heavy_damping() {
-        let parameters = Parameters { blocks: 1, damping_rate: 1e7, ..Parameters::default() };
+        let parameters = Parameters {
+            blocks: 1,
+            damping_rate: 1e7,
+            ..Parameters::default()
+        };
         let log = |tolerance: f64| {
-            let limits = Limits { end_time: 0.5, events: u64::MAX, interrupt: None };
+            let limits = Limits {
+                end_time: 0.5,
+                events: u64::MAX,
+                interrupt: None,
+            };
             let mut log = ContactLog::default();
-            run(&parameters, tolerance, Resolve::Taylor, limits, &mut log, None).unwrap();
+            run(
+                &parameters,
+                tolerance,
+                Resolve::Taylor,
+                limits,
+                &mut log,
+                None,
+            )
+            .unwrap();
             log.events
         };
         let (loose, tight) = (log(1e-4), log(1e-10));
         assert!(tight.len() > 200, "too few events to compare");
         assert_eq!(loose.len(), tight.len());
         for (event, exact) in loose.iter().zip(&tight) {
-            assert_eq!((event.contact, event.change), (exact.contact, exact.change), "at t = {} s", exact.time);
+            assert_eq!(
+                (event.contact, event.change),
+                (exact.contact, exact.change),
+                "at t = {} s",
+                exact.time
+            );
             // A million steps, of which each may be off by a tenth of the tolerance.
-            let error = (event.displacement - exact.displacement).abs() / parameters.contact_reach();
-            assert!(error < 1e-3, "off by {error} of the reach at t = {} s", exact.time);
+            let error =
+                (event.displacement - exact.displacement).abs() / parameters.contact_reach();
+            assert!(
+                error < 1e-3,
+                "off by {error} of the reach at t = {} s",
+                exact.time
+            );
         }
     }
 }

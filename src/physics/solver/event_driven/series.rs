@@ -86,8 +86,14 @@ impl Series {
 
     /// Mean displacement of the blocks at s, in m, to third order: the slider as a whole moves far more slowly than its blocks.
     pub fn mean(&self, chain: &Chain, s: f64) -> f64 {
-        let terms = self.terms.chunks(self.rows).take(self.order.min(3) + 1).zip(&INVERSE_FACTORIAL);
-        terms.rev().fold(0.0, |sum, (term, inverse)| sum * s + inverse * chain.mean(Scalar512b, term))
+        let terms = self
+            .terms
+            .chunks(self.rows)
+            .take(self.order.min(3) + 1)
+            .zip(&INVERSE_FACTORIAL);
+        terms.rev().fold(0.0, |sum, (term, inverse)| {
+            sum * s + inverse * chain.mean(Scalar512b, term)
+        })
     }
 
     /// Adds to the first coefficients Y_p/p! of one block, in m. The order is at least that of the last.
@@ -109,7 +115,12 @@ impl Series {
     }
 
     /// Writes the coefficients of F_S, in N, for a drive of `stiffness` N/m.
-    pub fn shear_force(&self, mut drive: DriveDerivatives, stiffness: f64, coefficients: &mut Vec<f64>) {
+    pub fn shear_force(
+        &self,
+        mut drive: DriveDerivatives,
+        stiffness: f64,
+        coefficients: &mut Vec<f64>,
+    ) {
         coefficients.resize(self.order + 1, 0.0);
         let mut at = 0;
         for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
@@ -126,7 +137,13 @@ const FEW: usize = 3;
 
 /// State at s in [0, 1] of a step of `length` s.
 #[inline(always)]
-pub(super) fn evaluate<S: Simd, const R: usize>(simd: S, series: &Series, s: f64, length: f64, state: &mut State) {
+pub(super) fn evaluate<S: Simd, const R: usize>(
+    simd: S,
+    series: &Series,
+    s: f64,
+    length: f64,
+    state: &mut State,
+) {
     let rows = series.rows_in::<R>();
     let mut r = 0;
     while S::HAS_MANY_REGISTERS && r + MANY <= rows {
@@ -166,15 +183,21 @@ fn evaluate_rows<S: Simd, const G: usize>(
     for inverse in INVERSE[1..order].iter().rev() {
         at -= rows;
         let for_slope = simd.splat(s * inverse);
-        for ((value, slope), term) in value.iter_mut().zip(&mut slope).zip(&series.terms[at..at + G]) {
+        for ((value, slope), term) in value
+            .iter_mut()
+            .zip(&mut slope)
+            .zip(&series.terms[at..at + G])
+        {
             let term = simd.load(term);
             *value = value.mul_add(for_value, term);
             *slope = slope.mul_add(for_slope, term);
         }
         for_value = for_slope;
     }
-    for ((value, term), x) in
-        value.iter().zip(&series.terms[first..first + G]).zip(&mut state.displacement[first..first + G])
+    for ((value, term), x) in value
+        .iter()
+        .zip(&series.terms[first..first + G])
+        .zip(&mut state.displacement[first..first + G])
     {
         value.mul_add(for_value, simd.load(term)).store(x);
     }
@@ -228,7 +251,10 @@ fn reachable_rows<S: Simd, const G: usize>(
         }
     }
     let own = first..first + G;
-    let (bounds, starts) = (&mut series.excursion[own.clone()], &series.terms[own.clone()]);
+    let (bounds, starts) = (
+        &mut series.excursion[own.clone()],
+        &series.terms[own.clone()],
+    );
     let (upper, lower) = (&chain.upper[own.clone()], &chain.lower[own]);
     let mut reached = [0; G];
     for g in 0..G {

@@ -22,7 +22,14 @@ impl Slider {
         for block in 0..layout.blocks {
             chain.update(block, &interface);
         }
-        Self { interface, chain, state: State { displacement: layout.filled(0.0), velocity: layout.filled(0.0) } }
+        Self {
+            interface,
+            chain,
+            state: State {
+                displacement: layout.filled(0.0),
+                velocity: layout.filled(0.0),
+            },
+        }
     }
 
     /// Displacement of a block, in m.
@@ -44,11 +51,21 @@ impl Slider {
 
     /// Breaks the contacts of a block that has reached a break position, at displacement `x` m.
     #[inline]
-    pub fn break_reached(&mut self, block: usize, time: f64, x: f64, log: impl FnMut(ContactEvent)) {
+    pub fn break_reached(
+        &mut self,
+        block: usize,
+        time: f64,
+        x: f64,
+        log: impl FnMut(ContactEvent),
+    ) {
         let (row, lane) = self.chain.layout.slot(block);
         let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
         // Rounding may leave the block just short of the position that it has reached.
-        let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
+        let reached = if upper - x <= x - lower {
+            x.max(upper)
+        } else {
+            x.min(lower)
+        };
         self.interface.break_reached(block, time, reached, log);
         self.chain.update(block, &self.interface);
     }

@@ -67,7 +67,14 @@ impl Split {
             fixed[row][lane] = FIXED;
         }
         let [start, swing, bound, compliance] = [Row::filled(0.0); 4];
-        let row = SplitRow { start, rate: [start], wave: [start; 2], swing, bound, compliance };
+        let row = SplitRow {
+            start,
+            rate: [start],
+            wave: [start; 2],
+            swing,
+            bound,
+            compliance,
+        };
         let [stiffness, shifted] = [(); 2].map(|()| Elimination::new(layout.rows));
         Self {
             rows: vec![row; layout.rows],
@@ -82,8 +89,19 @@ impl Split {
     /// The driven solution of a block.
     pub fn driven(&self, chain: &Chain, block: usize) -> BlockMotion {
         let (row, lane) = chain.layout.slot(block);
-        let SplitRow { start, rate: [rate], wave: [real, imaginary], swing, .. } = &self.rows[row];
-        BlockMotion { start: start[lane], rate: rate[lane], wave: [real[lane], imaginary[lane]], swing: swing[lane] }
+        let SplitRow {
+            start,
+            rate: [rate],
+            wave: [real, imaginary],
+            swing,
+            ..
+        } = &self.rows[row];
+        BlockMotion {
+            start: start[lane],
+            rate: rate[lane],
+            wave: [real[lane], imaginary[lane]],
+            swing: swing[lane],
+        }
     }
 
     /// Largest speed of a block on the driven solution, in m/s, and how far a force on it displaces it at most, per mass, in
@@ -91,19 +109,34 @@ impl Split {
     #[inline(always)]
     pub fn speed_and_compliance(&self, chain: &Chain, drive: &Harmonic, block: usize) -> [f64; 2] {
         let (row, lane) = chain.layout.slot(block);
-        let SplitRow { rate: [rate], swing, compliance, .. } = &self.rows[row];
-        [rate[lane] + drive.angular_frequency * swing[lane], compliance[lane]]
+        let SplitRow {
+            rate: [rate],
+            swing,
+            compliance,
+            ..
+        } = &self.rows[row];
+        [
+            rate[lane] + drive.angular_frequency * swing[lane],
+            compliance[lane],
+        ]
     }
 
     /// Splits a state, and bounds the free motion. Returns the largest bound on a displacement, in m; `None` if the free
     /// motion does not decay.
     #[inline(always)]
-    pub fn update<S: Simd>(&mut self, simd: S, chain: &Chain, drive: &Harmonic, state: &State) -> Option<f64> {
+    pub fn update<S: Simd>(
+        &mut self,
+        simd: S,
+        chain: &Chain,
+        drive: &Harmonic,
+        state: &State,
+    ) -> Option<f64> {
         let shift = simd.splat(self.find_decay(simd, chain)?);
         let cut = self.solve(simd, chain, drive);
         let (outer, minus_two) = (outer(simd, chain), simd.splat(-2.0));
         let before = cut.to_next_lane().times(outer);
-        let (mut energy, mut y_before, mut y_first) = (simd.splat(0.0), simd.splat(0.0), simd.splat(0.0));
+        let (mut energy, mut y_before, mut y_first) =
+            (simd.splat(0.0), simd.splat(0.0), simd.splat(0.0));
         for ((r, row), entry) in self.rows.iter_mut().enumerate().zip(&self.stiffness.rows) {
             let alone = before.mul_add(simd.load(&entry.after[0]), simd.load(&row.start));
             let start = cut.mul_add(simd.load(&entry.before[0]), alone);
@@ -115,13 +148,18 @@ impl Split {
             let w = imaginary.mul_add(simd.splat(drive.angular_frequency), velocity);
             let shifted = y.mul_add(simd.splat(self.decay_rate), w);
             let own = simd.load(&chain.diagonal[r]).minus(shift).times(y);
-            let stretched = y_before.times(minus_two).mul_add(simd.load(&chain.coupling[r]), own);
+            let stretched = y_before
+                .times(minus_two)
+                .mul_add(simd.load(&chain.coupling[r]), own);
             energy = shifted.mul_add(shifted, y.mul_add(stretched, energy));
             y_first = if r == 0 { y } else { y_first };
             y_before = y;
         }
         let across = y_before.to_next_lane().times(outer).times(y_first);
-        let twice_energy = across.mul_add(minus_two, energy).reduce(|a, b| a + b).max(0.0);
+        let twice_energy = across
+            .mul_add(minus_two, energy)
+            .reduce(|a, b| a + b)
+            .max(0.0);
         Some(self.bound(simd, chain, twice_energy))
     }
 
@@ -145,19 +183,37 @@ impl Split {
     /// Solves for p1, q and what p0 is in each piece alone. Returns where the cuts are in p0.
     #[inline(always)]
     fn solve<S: Simd>(&mut self, simd: S, chain: &Chain, drive: &Harmonic) -> S::Vector {
-        let Self { rows, fixed, stiffness, complex, .. } = self;
+        let Self {
+            rows,
+            fixed,
+            stiffness,
+            complex,
+            ..
+        } = self;
         let pulling = chain.drive_stiffness / chain.mass;
         stiffness.eliminate(simd, chain, fixed, [0.0]);
-        stiffness.pull_first(simd, chain, [pulling * drive.rate], rows.iter_mut().map(|row| &mut row.rate));
+        stiffness.pull_first(
+            simd,
+            chain,
+            [pulling * drive.rate],
+            rows.iter_mut().map(|row| &mut row.rate),
+        );
         if drive.amplitude > 0.0 {
             let (sine, cosine) = libm::sincos(drive.phase);
             let (frequency, force) = (drive.angular_frequency, pulling * drive.amplitude);
-            complex.eliminate(simd, chain, fixed, [-frequency * frequency, chain.damping_rate * frequency]);
+            complex.eliminate(
+                simd,
+                chain,
+                fixed,
+                [-frequency * frequency, chain.damping_rate * frequency],
+            );
             let waves = rows.iter_mut().map(|row| &mut row.wave);
             complex.pull_first(simd, chain, [force * cosine, force * sine], waves);
             for row in rows.iter_mut() {
                 let (real, imaginary) = (simd.load(&row.wave[0]), simd.load(&row.wave[1]));
-                real.mul_add(real, imaginary.times(imaginary)).root().store(&mut row.swing);
+                real.mul_add(real, imaginary.times(imaginary))
+                    .root()
+                    .store(&mut row.swing);
             }
         } else if rows[0].swing[0] != 0.0 {
             // A ramp has switched the modulation off.
@@ -166,13 +222,21 @@ impl Split {
             }
         }
         let damping = simd.splat(-chain.damping_rate);
-        let mut force = simd.splat(pulling * drive.start).times(simd.load(&FIRST_BLOCK));
+        let mut force = simd
+            .splat(pulling * drive.start)
+            .times(simd.load(&FIRST_BLOCK));
         let last = rows.len() - 1;
         for ((r, row), entry) in rows.iter_mut().enumerate().zip(&stiffness.rows) {
-            let own = simd.load(&row.rate[0]).mul_add(damping, simd.load(&chain.pull[r]));
+            let own = simd
+                .load(&row.rate[0])
+                .mul_add(damping, simd.load(&chain.pull[r]));
             force = force.plus(own);
             force.store(&mut row.start);
-            force = if r < last { force.times(simd.load(&entry.ratio[0])) } else { force };
+            force = if r < last {
+                force.times(simd.load(&entry.ratio[0]))
+            } else {
+                force
+            };
         }
         let mut alone = simd.splat(0.0);
         for (row, entry) in rows[..last].iter_mut().zip(&stiffness.rows).rev() {
@@ -188,17 +252,32 @@ impl Split {
     /// The diagonal of the inverse of S'/m, and the bounds for this energy, twice E/m. Returns the largest bound.
     #[inline(always)]
     fn bound<S: Simd>(&mut self, simd: S, chain: &Chain, twice_energy: f64) -> f64 {
-        let Elimination { rows: entries, coupling: [coupling], gain: [gain], .. } = &self.shifted;
+        let Elimination {
+            rows: entries,
+            coupling: [coupling],
+            gain: [gain],
+            ..
+        } = &self.shifted;
         let (outer, coupling, after) = (outer(simd, chain), simd.load(coupling), simd.load(gain));
         let before = after.to_next_lane();
         let product = coupling.times(before).times(after);
-        let root = product.times(coupling).mul_add(simd.splat(4.0), simd.splat(1.0)).root();
-        let twice_mixed = product.times(simd.splat(4.0)).over(root.plus(simd.splat(1.0)));
+        let root = product
+            .times(coupling)
+            .mul_add(simd.splat(4.0), simd.splat(1.0))
+            .root();
+        let twice_mixed = product
+            .times(simd.splat(4.0))
+            .over(root.plus(simd.splat(1.0)));
         let mut largest = simd.splat(0.0);
         for (row, entry) in self.rows.iter_mut().zip(entries) {
-            let (along, back) = (simd.load(&entry.after[0]).times(outer), simd.load(&entry.before[0]));
+            let (along, back) = (
+                simd.load(&entry.after[0]).times(outer),
+                simd.load(&entry.before[0]),
+            );
             let mixed = along.mul_add(before, back.times(twice_mixed));
-            let own = back.times(after).mul_add(back, along.mul_add(mixed, simd.load(&entry.own[0])));
+            let own = back
+                .times(after)
+                .mul_add(back, along.mul_add(mixed, simd.load(&entry.own[0])));
             let bound = own.times(simd.splat(twice_energy)).root();
             own.store(&mut row.compliance);
             bound.store(&mut row.bound);
@@ -211,10 +290,19 @@ impl Split {
 impl BlockMotion {
     /// First instant in [`from`, `until`], in s, at which the block is at or beyond a break position; if none, one that is
     /// later or infinite.
-    pub fn reaches(&self, drive: &Harmonic, [lower, upper]: [f64; 2], [from, until]: [f64; 2]) -> f64 {
+    pub fn reaches(
+        &self,
+        drive: &Harmonic,
+        [lower, upper]: [f64; 2],
+        [from, until]: [f64; 2],
+    ) -> f64 {
         if drive.amplitude == 0.0 {
             // The rate is positive, so the ramp alone only rises.
-            return if lower >= self.start { from } else { ((upper - self.start) / self.rate).max(from) };
+            return if lower >= self.start {
+                from
+            } else {
+                ((upper - self.start) / self.rate).max(from)
+            };
         }
         let rises_before = self.start + self.rate * until + self.swing >= upper;
         let falls_at_all = self.start + self.rate * from - self.swing <= lower;
@@ -222,10 +310,29 @@ impl BlockMotion {
             return f64::INFINITY;
         }
         let phase = libm::atan2(self.wave[1], self.wave[0]);
-        let Self { start, rate, swing: amplitude, .. } = *self;
-        let motion = Harmonic { start, rate, amplitude, phase, angular_frequency: drive.angular_frequency };
-        let rise = if rises_before { motion.first_rise_to(upper, from) } else { f64::INFINITY };
-        let fall = if falls_at_all { motion.first_fall_to(lower, from) } else { f64::INFINITY };
+        let Self {
+            start,
+            rate,
+            swing: amplitude,
+            ..
+        } = *self;
+        let motion = Harmonic {
+            start,
+            rate,
+            amplitude,
+            phase,
+            angular_frequency: drive.angular_frequency,
+        };
+        let rise = if rises_before {
+            motion.first_rise_to(upper, from)
+        } else {
+            f64::INFINITY
+        };
+        let fall = if falls_at_all {
+            motion.first_fall_to(lower, from)
+        } else {
+            f64::INFINITY
+        };
         rise.min(fall)
     }
 
@@ -265,7 +372,9 @@ mod tests {
     fn numbers() -> impl FnMut() -> f64 {
         let mut state = 1_u64;
         move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         }
     }
@@ -288,22 +397,44 @@ mod tests {
         slider
     }
 
-    const PLAIN: Harmonic = Harmonic { start: 3e-6, rate: 1e-4, amplitude: 0.0, phase: 0.0, angular_frequency: 0.0 };
-    const MODULATED: Harmonic = Harmonic { amplitude: 1e-6, phase: 0.7, angular_frequency: 364.0, ..PLAIN };
+    const PLAIN: Harmonic = Harmonic {
+        start: 3e-6,
+        rate: 1e-4,
+        amplitude: 0.0,
+        phase: 0.0,
+        angular_frequency: 0.0,
+    };
+    const MODULATED: Harmonic = Harmonic {
+        amplitude: 1e-6,
+        phase: 0.7,
+        angular_frequency: 364.0,
+        ..PLAIN
+    };
 
     /// Diagonal and right-hand side of a block, and the coupling to those beside: real and imaginary parts.
     type Equation = ([f64; 2], [f64; 2]);
 
     /// By how much a solution misses the equations of the chain, as a part of the terms that cancel.
-    fn miss(chain: &Chain, equation: impl Fn(usize) -> Equation, solution: impl Fn(usize) -> [f64; 2]) -> f64 {
+    fn miss(
+        chain: &Chain,
+        equation: impl Fn(usize) -> Equation,
+        solution: impl Fn(usize) -> [f64; 2],
+    ) -> f64 {
         let (blocks, coupling) = (chain.layout.blocks, chain.coupling[0][0]);
         let mut worst = 0.0_f64;
         for block in 0..blocks {
             let ([real, imaginary], right) = equation(block);
             let x = solution(block);
-            let mut sum = [real * x[0] - imaginary * x[1] - right[0], real * x[1] + imaginary * x[0] - right[1]];
-            let mut size = (real.abs() + imaginary.abs()) * x[0].hypot(x[1]) + right[0].hypot(right[1]);
-            for beside in [block.wrapping_sub(1), block + 1].into_iter().filter(|beside| *beside < blocks) {
+            let mut sum = [
+                real * x[0] - imaginary * x[1] - right[0],
+                real * x[1] + imaginary * x[0] - right[1],
+            ];
+            let mut size =
+                (real.abs() + imaginary.abs()) * x[0].hypot(x[1]) + right[0].hypot(right[1]);
+            for beside in [block.wrapping_sub(1), block + 1]
+                .into_iter()
+                .filter(|beside| *beside < blocks)
+            {
                 let x = solution(beside);
                 sum = [sum[0] - coupling * x[0], sum[1] - coupling * x[1]];
                 size += coupling * x[0].hypot(x[1]);
@@ -317,8 +448,9 @@ mod tests {
     /// The diagonal of the inverse of S/m - `shift`, from pivots of both ends; `None` if it is not positive definite.
     fn inverse_diagonal(chain: &Chain, shift: f64) -> Option<Vec<f64>> {
         let squared = chain.coupling[0][0] * chain.coupling[0][0];
-        let entries: Vec<f64> =
-            (0..chain.layout.blocks).map(|block| chain.at(&chain.diagonal, block) - shift).collect();
+        let entries: Vec<f64> = (0..chain.layout.blocks)
+            .map(|block| chain.at(&chain.diagonal, block) - shift)
+            .collect();
         let pivots = |entries: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
             entries
                 .scan(f64::INFINITY, |pivot, entry| {
@@ -327,10 +459,19 @@ mod tests {
                 })
                 .collect()
         };
-        let (behind, ahead) = (pivots(&mut entries.iter().copied()), pivots(&mut entries.iter().rev().copied()));
-        let is_definite = behind.iter().zip(&entries).all(|(pivot, entry)| *pivot > 1e-12 * entry.abs());
+        let (behind, ahead) = (
+            pivots(&mut entries.iter().copied()),
+            pivots(&mut entries.iter().rev().copied()),
+        );
+        let is_definite = behind
+            .iter()
+            .zip(&entries)
+            .all(|(pivot, entry)| *pivot > 1e-12 * entry.abs());
         let all = behind.iter().zip(ahead.iter().rev()).zip(&entries);
-        is_definite.then(|| all.map(|((behind, ahead), entry)| 1.0 / (behind + ahead - entry)).collect())
+        is_definite.then(|| {
+            all.map(|((behind, ahead), entry)| 1.0 / (behind + ahead - entry))
+                .collect()
+        })
     }
 
     #[test]
@@ -340,8 +481,14 @@ mod tests {
             for exponent in [-8, -4, -1, 0, 2, 4, 8] {
                 for damping_rate in [0.0, 1.0, 1e4, 1e7] {
                     let stiff = libm::exp10(f64::from(exponent));
-                    let slider_stiffness = stiff * plain.block_contact_stiffness() / (blocks.max(2) - 1) as f64;
-                    let parameters = Parameters { blocks, slider_stiffness, damping_rate, ..plain.clone() };
+                    let slider_stiffness =
+                        stiff * plain.block_contact_stiffness() / (blocks.max(2) - 1) as f64;
+                    let parameters = Parameters {
+                        blocks,
+                        slider_stiffness,
+                        damping_rate,
+                        ..plain.clone()
+                    };
                     // Digits are lost where the chain is stiff against its contacts.
                     check(&parameters, &MODULATED, 1e-12 * stiff.max(1.0));
                     check(&parameters, &PLAIN, 1e-12 * stiff.max(1.0));
@@ -351,7 +498,12 @@ mod tests {
     }
 
     fn check(parameters: &Parameters, drive: &Harmonic, allowed: f64) {
-        let what = (parameters.blocks, parameters.slider_stiffness, parameters.damping_rate, drive.amplitude);
+        let what = (
+            parameters.blocks,
+            parameters.slider_stiffness,
+            parameters.damping_rate,
+            drive.amplitude,
+        );
         let Slider { chain, state, .. } = slider(parameters);
         let mut split = Split::new(&chain);
         let largest = split.update(Baseline, &chain, drive, &state);
@@ -363,19 +515,30 @@ mod tests {
         };
         let rate = split.decay_rate;
         if rate < 0.5 * chain.damping_rate {
-            assert_eq!(inverse_diagonal(&chain, shift(2.0 * rate)), None, "{what:?}");
+            assert_eq!(
+                inverse_diagonal(&chain, shift(2.0 * rate)),
+                None,
+                "{what:?}"
+            );
         }
         let driven = |block: usize| split.driven(&chain, block);
         let (pulling, frequency) = (chain.drive_stiffness / chain.mass, drive.angular_frequency);
         let first = |block: usize, force: f64| if block == 0 { pulling * force } else { 0.0 };
         let stiffness = |block: usize| chain.at(&chain.diagonal, block);
         let missed = [
-            miss(&chain, |j| ([stiffness(j), 0.0], [first(j, drive.rate), 0.0]), |j| [driven(j).rate, 0.0]),
+            miss(
+                &chain,
+                |j| ([stiffness(j), 0.0], [first(j, drive.rate), 0.0]),
+                |j| [driven(j).rate, 0.0],
+            ),
             miss(
                 &chain,
                 |j| {
                     let drag = chain.damping_rate * driven(j).rate;
-                    ([stiffness(j), 0.0], [first(j, drive.start) + chain.at(&chain.pull, j) - drag, 0.0])
+                    (
+                        [stiffness(j), 0.0],
+                        [first(j, drive.start) + chain.at(&chain.pull, j) - drag, 0.0],
+                    )
                 },
                 |j| [driven(j).start, 0.0],
             ),
@@ -384,31 +547,55 @@ mod tests {
                 |j| {
                     let (sine, cosine) = libm::sincos(drive.phase);
                     let force = first(j, drive.amplitude);
-                    let diagonal = [stiffness(j) - frequency * frequency, chain.damping_rate * frequency];
+                    let diagonal = [
+                        stiffness(j) - frequency * frequency,
+                        chain.damping_rate * frequency,
+                    ];
                     (diagonal, [force * cosine, force * sine])
                 },
                 |j| driven(j).wave,
             ),
         ];
-        assert!(missed.iter().all(|missed| *missed < 1e-3 * allowed.max(1e-10)), "{what:?}: {missed:?}");
+        assert!(
+            missed
+                .iter()
+                .all(|missed| *missed < 1e-3 * allowed.max(1e-10)),
+            "{what:?}: {missed:?}"
+        );
         let inverse = inverse_diagonal(&chain, shift(rate)).unwrap();
         let (mut twice_energy, mut before, mut widest) = (0.0, 0.0, 0.0_f64);
         for block in 0..parameters.blocks {
             let (row, lane) = chain.layout.slot(block);
-            let BlockMotion { start, rate: speed, wave: [real, imaginary], swing } = driven(block);
+            let BlockMotion {
+                start,
+                rate: speed,
+                wave: [real, imaginary],
+                swing,
+            } = driven(block);
             let y = state.displacement[row][lane] - start - real;
             let shifted = state.velocity[row][lane] - speed + frequency * imaginary + rate * y;
-            assert!((swing - real.hypot(imaginary)).abs() <= 1e-14 * swing + 1e-150, "{what:?}");
-            twice_energy +=
-                shifted * shifted + y * ((stiffness(block) - shift(rate)) * y - 2.0 * chain.coupling[0][0] * before);
+            assert!(
+                (swing - real.hypot(imaginary)).abs() <= 1e-14 * swing + 1e-150,
+                "{what:?}"
+            );
+            twice_energy += shifted * shifted
+                + y * ((stiffness(block) - shift(rate)) * y - 2.0 * chain.coupling[0][0] * before);
             before = y;
         }
         for (block, inverse) in inverse.into_iter().enumerate() {
             let (row, lane) = chain.layout.slot(block);
-            let SplitRow { bound, compliance, .. } = &split.rows[row];
-            assert!((compliance[lane] / inverse - 1.0).abs() < allowed, "{what:?}: block {block}");
+            let SplitRow {
+                bound, compliance, ..
+            } = &split.rows[row];
+            assert!(
+                (compliance[lane] / inverse - 1.0).abs() < allowed,
+                "{what:?}: block {block}"
+            );
             let expected = (twice_energy * inverse).sqrt();
-            assert!((bound[lane] / expected - 1.0).abs() < allowed, "{what:?}: block {block}");
+            assert!(
+                (bound[lane] / expected - 1.0).abs() < allowed,
+                "{what:?}: block {block}"
+            );
             widest = widest.max(bound[lane]);
         }
         assert_eq!(largest, widest, "{what:?}");

@@ -50,14 +50,23 @@ pub(super) struct StepControl {
 
 impl StepControl {
     pub fn new(max_step: f64) -> Self {
-        Self { typical_advance: max_step, break_window: 0.0, attach_window: 0.0, min_orders: [0; MAX_HALVINGS + 1] }
+        Self {
+            typical_advance: max_step,
+            break_window: 0.0,
+            attach_window: 0.0,
+            min_orders: [0; MAX_HALVINGS + 1],
+        }
     }
 
     /// Notes the order at which a series converged.
     fn note_order(&mut self, halvings: usize, order: usize) {
         if let Some(min_order) = self.min_orders.get_mut(halvings) {
             // Reached at the first check: check earlier next time.
-            *min_order = if order <= *min_order + 1 { order - 2 } else { order };
+            *min_order = if order <= *min_order + 1 {
+                order - 2
+            } else {
+                order
+            };
         }
     }
 }
@@ -118,14 +127,19 @@ impl Step {
             return f64::INFINITY;
         }
         self.series.block(row, lane, &mut self.coefficients);
-        let Some(s) = first_exit(&mut self.coefficients, levels, from, end) else { return f64::INFINITY };
+        let Some(s) = first_exit(&mut self.coefficients, levels, from, end) else {
+            return f64::INFINITY;
+        };
         self.breaks.push((s, block));
         s
     }
 
     /// The first break noted; ties go to the smaller block.
     fn first_break(&self) -> Option<(f64, usize)> {
-        self.breaks.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+        self.breaks
+            .iter()
+            .copied()
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     }
 
     /// Value, slope and half the second derivative of a block's displacement at s, in m.
@@ -151,21 +165,38 @@ impl Step {
 
 impl Integration<'_> {
     /// Takes one Taylor step of at most `horizon` s, to its end or soon after its first events.
-    pub(super) fn take_step(&mut self, horizon: f64, observer: &mut dyn Observer) -> Result<(), SimulationError> {
-        let until_attach = self.slider.interface.next_reattachment() - self.frame.time + self.control.attach_window;
+    pub(super) fn take_step(
+        &mut self,
+        horizon: f64,
+        observer: &mut dyn Observer,
+    ) -> Result<(), SimulationError> {
+        let until_attach = self.slider.interface.next_reattachment() - self.frame.time
+            + self.control.attach_window;
         self.expand(horizon.min(until_attach))?;
         let (start, length) = (self.step.start, self.step.length);
         if !self.frame.resolves(length) {
-            return Err(SimulationError::StepTooShort { time: self.frame.now(), step: length });
+            return Err(SimulationError::StepTooShort {
+                time: self.frame.now(),
+                step: length,
+            });
         }
         self.summary.steps += 1;
         let (mut done, mut end, mut merged) = (0.0, (horizon / length).min(1.0), 0);
-        let mut force = ForceAt { force: self.step.force[0], integral: 0.0 };
-        self.kernels.reachable(&self.slider.chain, &mut self.step.series, &mut self.step.candidates);
+        let mut force = ForceAt {
+            force: self.step.force[0],
+            integral: 0.0,
+        };
+        self.kernels.reachable(
+            &self.slider.chain,
+            &mut self.step.series,
+            &mut self.step.candidates,
+        );
         self.step.breaks.clear();
         while let Some((row, lane)) = self.step.candidates.pop() {
             let chain = &self.slider.chain;
-            let found = self.step.look_for_break(chain, chain.layout.block(row, lane), 0.0, end);
+            let found = self
+                .step
+                .look_for_break(chain, chain.layout.block(row, lane), 0.0, end);
             // Events this long after the first are left to the next step.
             end = end.min(found + self.control.break_window / length);
         }
@@ -173,16 +204,20 @@ impl Integration<'_> {
             let due = ((self.slider.interface.next_reattachment() - start) / length).max(done);
             let event = match self.step.first_break() {
                 Some((s, block)) if s <= due && s <= end => Some((Change::Break, block, s)),
-                _ if due <= end => {
-                    self.slider.interface.next_reattachment_block().map(|block| (Change::Attach, block, due))
-                }
+                _ if due <= end => self
+                    .slider
+                    .interface
+                    .next_reattachment_block()
+                    .map(|block| (Change::Attach, block, due)),
                 _ => None,
             };
             let s = event.map_or(end, |(_, _, s)| s);
             force = self.report([done, s], force, observer);
             done = s;
             self.frame.time = start + s * length;
-            let Some((change, block, _)) = event else { break };
+            let Some((change, block, _)) = event else {
+                break;
+            };
             if change == Change::Attach {
                 self.frame.time = self.slider.interface.next_reattachment();
             }
@@ -205,17 +240,27 @@ impl Integration<'_> {
                 }
             }
         }
-        self.kernels.evaluate(&self.step.series, done, length, &mut self.slider.state);
+        self.kernels
+            .evaluate(&self.step.series, done, length, &mut self.slider.state);
         self.frame.set_time(self.frame.time);
         self.largest_force = self.largest_force.max(force.force);
-        let covered = if done == 1.0 { 2.0 * length } else { done * length };
+        let covered = if done == 1.0 {
+            2.0 * length
+        } else {
+            done * length
+        };
         self.control.typical_advance += 0.25 * (covered - self.control.typical_advance);
         Ok(())
     }
 
     /// Reports a part of the step to the observer, and to the ledger if there is one; `force` is the shear force at its
     /// start. Returns that at its end.
-    fn report(&mut self, [first, last]: [f64; 2], force: ForceAt, observer: &mut dyn Observer) -> ForceAt {
+    fn report(
+        &mut self,
+        [first, last]: [f64; 2],
+        force: ForceAt,
+        observer: &mut dyn Observer,
+    ) -> ForceAt {
         let (start, length) = (self.step.start, self.step.length);
         let end_force = ForceAt::new(&self.step.force, last);
         observer.advance(&Segment {
@@ -224,16 +269,32 @@ impl Integration<'_> {
             path: self.step.force_path(first, [force, end_force]),
         });
         if let Some(audit) = self.audit {
-            audit.follow_series(&*self.kernels, &self.slider.chain, &self.step.series, [first, last], length);
+            audit.follow_series(
+                &*self.kernels,
+                &self.slider.chain,
+                &self.step.series,
+                [first, last],
+                length,
+            );
         }
         end_force
     }
 
     /// Breaks the contacts that a block has reached, or attaches the one that is due there, at s in the step. Returns
     /// how far beyond s the series stays accurate; 0 if the step must end.
-    fn change(&mut self, change: Change, block: usize, s: f64, force: f64, observer: &mut dyn Observer) -> f64 {
+    fn change(
+        &mut self,
+        change: Change,
+        block: usize,
+        s: f64,
+        force: f64,
+        observer: &mut dyn Observer,
+    ) -> f64 {
         let [x, slope, half_curvature] = self.step.expanded(&self.slider.chain, block, s);
-        let (stiffness, pull) = (self.slider.interface.block_stiffness[block], self.slider.interface.block_pull[block]);
+        let (stiffness, pull) = (
+            self.slider.interface.block_stiffness[block],
+            self.slider.interface.block_pull[block],
+        );
         match change {
             Change::Break => {
                 let mean = self.step.series.mean(&self.slider.chain, s);
@@ -244,7 +305,8 @@ impl Integration<'_> {
         if self.step.series.order < MERGED_ORDER {
             return 0.0;
         }
-        let (chain, interface, length) = (&self.slider.chain, &self.slider.interface, self.step.length);
+        let (chain, interface, length) =
+            (&self.slider.chain, &self.slider.interface, self.step.length);
         let square = length * length;
         let stiffened = (interface.block_stiffness[block] - stiffness) * square / chain.mass;
         let pulled = (interface.block_pull[block] - pull) * square / chain.mass;
@@ -252,12 +314,16 @@ impl Integration<'_> {
         let second = 0.5 * (pulled - stiffened * x);
         let third = -stiffened * slope / 6.0 - damping * second / 3.0;
         let own = square * chain.at(&chain.diagonal, block);
-        let fourth = -stiffened * half_curvature / 12.0 - 0.25 * damping * third - own * second / 12.0;
-        let window = self.tolerances.merged_window([second, third], length, chain.damping_rate);
+        let fourth =
+            -stiffened * half_curvature / 12.0 - 0.25 * damping * third - own * second / 12.0;
+        let window = self
+            .tolerances
+            .merged_window([second, third], length, chain.damping_rate);
         if window * length < MIN_WINDOW * self.control.typical_advance {
             return 0.0;
         }
-        self.step.amend(chain, block, about_start([second, third, fourth], s));
+        self.step
+            .amend(chain, block, about_start([second, third, fourth], s));
         if change == Change::Break {
             let beside = about_start([0.0, 0.0, square * chain.coupling[0][0] * second / 12.0], s);
             if block > 0 {
@@ -283,11 +349,17 @@ impl Integration<'_> {
         loop {
             let min_order = self.control.min_orders.get(halvings).copied().unwrap_or(0);
             let drive = self.frame.drive_derivatives(length);
-            let input = StepInput { length, error: self.tolerances.step_error, min_order, drive };
+            let input = StepInput {
+                length,
+                error: self.tolerances.step_error,
+                min_order,
+                drive,
+            };
             let step = &mut self.step;
             if self.kernels.expand(chain, state, &input, &mut step.series) {
                 self.control.note_order(halvings, step.series.order);
-                step.series.shear_force(drive, chain.drive_stiffness, &mut step.force);
+                step.series
+                    .shear_force(drive, chain.drive_stiffness, &mut step.force);
                 step.curvature_bound = polynomial::second_derivative_bound(&step.force);
                 (step.start, step.length) = (self.frame.time, length);
                 return Ok(());
@@ -295,7 +367,9 @@ impl Integration<'_> {
             halvings += 1;
             length *= 0.5;
             if halvings > HOPELESS_HALVINGS {
-                return Err(SimulationError::NotFinite { time: self.frame.now() });
+                return Err(SimulationError::NotFinite {
+                    time: self.frame.now(),
+                });
             }
         }
     }

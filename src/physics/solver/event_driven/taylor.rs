@@ -41,7 +41,12 @@ pub(super) fn expand<S: Simd, const R: usize>(
     series: &mut Series,
 ) -> bool {
     let rows = series.rows_in::<R>();
-    let Series { terms, coupling, diagonal, .. } = series;
+    let Series {
+        terms,
+        coupling,
+        diagonal,
+        ..
+    } = series;
     let (coupling, diagonal) = (&mut coupling[..rows], &mut diagonal[..rows]);
     let square = simd.splat(input.length * input.length);
     let minus_square = simd.splat(-(input.length * input.length));
@@ -69,8 +74,14 @@ pub(super) fn expand<S: Simd, const R: usize>(
         pulling: input.length * input.length * (chain.drive_stiffness / chain.mass),
         drive: input.drive,
     };
-    let min_order = input.min_order.max(order_of_drive(input.drive, recurrence.pulling, input.error));
-    let input = StepInput { min_order, ..*input };
+    let min_order =
+        input
+            .min_order
+            .max(order_of_drive(input.drive, recurrence.pulling, input.error));
+    let input = StepInput {
+        min_order,
+        ..*input
+    };
     let order = if R > 0 && S::HAS_MANY_REGISTERS {
         converge_in_registers::<S, R>(recurrence, &input, terms)
     } else {
@@ -86,7 +97,8 @@ pub(super) fn expand<S: Simd, const R: usize>(
 fn order_of_drive(drive: DriveDerivatives, pulling: f64, error: f64) -> usize {
     let mut order = MIN_ORDER;
     // Of order + 1, times that; from here on they fall, since a step is at most four radians of the modulation.
-    let mut term = pulling * (drive.swing[0].abs() + drive.swing[1].abs()) * drive.angle * drive.angle / 6.0;
+    let mut term =
+        pulling * (drive.swing[0].abs() + drive.swing[1].abs()) * drive.angle * drive.angle / 6.0;
     while term > error && order < MAX_ORDER {
         order += 1;
         term *= drive.angle / order as f64;
@@ -115,12 +127,18 @@ impl<S: Simd> Recurrence<'_, S> {
     fn add_forces(&mut self, p: usize, next: &mut [Row]) {
         if p == 0 {
             for (row, pull) in next.iter_mut().zip(self.pull) {
-                self.simd.load(pull).mul_add(self.square, self.simd.load(row)).store(row);
+                self.simd
+                    .load(pull)
+                    .mul_add(self.square, self.simd.load(row))
+                    .store(row);
             }
         }
         let push = self.pulling * self.drive.next_order();
         if push != 0.0 {
-            self.simd.load(&FIRST_BLOCK).mul_add(self.simd.splat(push), self.simd.load(&next[0])).store(&mut next[0]);
+            self.simd
+                .load(&FIRST_BLOCK)
+                .mul_add(self.simd.splat(push), self.simd.load(&next[0]))
+                .store(&mut next[0]);
         }
     }
 
@@ -137,8 +155,16 @@ impl<S: Simd> Recurrence<'_, S> {
         let (coupling, diagonal) = (&self.coupling[..R], &self.diagonal[..R]);
         let mut next = y;
         for r in 0..R {
-            let before = if r > 0 { y[r - 1] } else { y[R - 1].to_next_lane() };
-            let after = if r + 1 < R { y[r + 1] } else { y[0].to_lane_before() };
+            let before = if r > 0 {
+                y[r - 1]
+            } else {
+                y[R - 1].to_next_lane()
+            };
+            let after = if r + 1 < R {
+                y[r + 1]
+            } else {
+                y[0].to_lane_before()
+            };
             let coupled = before.plus(after).times(self.simd.load(&coupling[r]));
             let forced = y[r].mul_add(self.simd.load(&diagonal[r]), coupled);
             next[r] = rate[r].mul_add(self.damping, forced);
@@ -151,7 +177,10 @@ impl<S: Simd> Recurrence<'_, S> {
         }
         let push = self.pulling * self.drive.next_order();
         if push != 0.0 {
-            next[0] = self.simd.load(&FIRST_BLOCK).mul_add(self.simd.splat(push), next[0]);
+            next[0] = self
+                .simd
+                .load(&FIRST_BLOCK)
+                .mul_add(self.simd.splat(push), next[0]);
         }
         let rows = &mut rows[..R];
         for r in 0..R {
@@ -171,7 +200,14 @@ fn converge_in_memory<S: Simd>(
 ) -> Option<usize> {
     for p in 0..MAX_ORDER - 1 {
         let terms = &mut terms[p * rows..(p + 3) * rows];
-        sweep(recurrence.simd, recurrence.coupling, recurrence.diagonal, recurrence.damping, terms, rows);
+        sweep(
+            recurrence.simd,
+            recurrence.coupling,
+            recurrence.diagonal,
+            recurrence.damping,
+            terms,
+            rows,
+        );
         recurrence.add_forces(p, &mut terms[2 * rows..]);
         // Two orders at a time: every second one may vanish by symmetry.
         let order = p + 2;
@@ -212,7 +248,14 @@ fn converge_in_registers<S: Simd, const R: usize>(
 
 /// Y_{p+2} without pull and drive: `terms` holds Y_p, Y_{p+1} and room for it.
 #[inline(always)]
-fn sweep<S: Simd>(simd: S, coupling: &[Row], diagonal: &[Row], damping: S::Vector, terms: &mut [Row], rows: usize) {
+fn sweep<S: Simd>(
+    simd: S,
+    coupling: &[Row],
+    diagonal: &[Row],
+    damping: S::Vector,
+    terms: &mut [Row],
+    rows: usize,
+) {
     let (y, rest) = terms.split_at_mut(rows);
     let (rate, next) = rest.split_at_mut(rows);
     let next = &mut next[..rows];
@@ -220,8 +263,12 @@ fn sweep<S: Simd>(simd: S, coupling: &[Row], diagonal: &[Row], damping: S::Vecto
     let mut here = simd.load(&y[0]);
     let last_after = here.to_lane_before();
     let last = rows - 1;
-    for ((((next, rate), coupling), diagonal), after) in
-        next[..last].iter_mut().zip(&rate[..last]).zip(&coupling[..last]).zip(&diagonal[..last]).zip(&y[1..])
+    for ((((next, rate), coupling), diagonal), after) in next[..last]
+        .iter_mut()
+        .zip(&rate[..last])
+        .zip(&coupling[..last])
+        .zip(&diagonal[..last])
+        .zip(&y[1..])
     {
         let after = simd.load(after);
         let coupled = before.plus(after).times(simd.load(coupling));
@@ -231,7 +278,9 @@ fn sweep<S: Simd>(simd: S, coupling: &[Row], diagonal: &[Row], damping: S::Vecto
     }
     let coupled = before.plus(last_after).times(simd.load(&coupling[last]));
     let forced = here.mul_add(simd.load(&diagonal[last]), coupled);
-    simd.load(&rate[last]).mul_add(damping, forced).store(&mut next[last]);
+    simd.load(&rate[last])
+        .mul_add(damping, forced)
+        .store(&mut next[last]);
 }
 
 /// Whether the rows of the last two orders, weighted as terms and taken times the last order, are within the error
@@ -243,6 +292,10 @@ fn are_small<S: Simd>(simd: S, terms: &[Row], rows: usize, order: usize, error: 
         in_lower = simd.load(lower).abs().larger(in_lower);
         in_higher = simd.load(higher).abs().larger(in_higher);
     }
-    let [for_lower, for_higher] = [order - 1, order].map(|p| simd.splat(order as f64 * INVERSE_FACTORIAL[p]));
-    in_lower.times(for_lower).larger(in_higher.times(for_higher)).within(simd.splat(error))
+    let [for_lower, for_higher] =
+        [order - 1, order].map(|p| simd.splat(order as f64 * INVERSE_FACTORIAL[p]));
+    in_lower
+        .times(for_lower)
+        .larger(in_higher.times(for_higher))
+        .within(simd.splat(error))
 }

@@ -29,12 +29,15 @@ pub(super) struct Tolerances {
 impl Tolerances {
     /// The bounds for a tolerance relative to the contact reach.
     pub fn new(parameters: &Parameters, tolerance: f64) -> Self {
-        let fastest =
-            largest_frequency(parameters).max(parameters.largest_modulation_frequency()).max(parameters.damping_rate);
+        let fastest = largest_frequency(parameters)
+            .max(parameters.largest_modulation_frequency())
+            .max(parameters.damping_rate);
         let max_step = MAX_STEP / fastest;
         Self {
             max_step,
-            step_error: truncation_share(parameters, max_step) * tolerance * parameters.contact_reach(),
+            step_error: truncation_share(parameters, max_step)
+                * tolerance
+                * parameters.contact_reach(),
             leap_error: tolerance * parameters.contact_reach(),
         }
     }
@@ -50,7 +53,9 @@ impl Tolerances {
         let fifth = square * (third.abs() / 20.0 + damping * second.abs() / 60.0);
         let sixth = square * square * second.abs() / 720.0;
         let error = MERGED_SHARE * self.step_error;
-        root_below::<5>(error / fifth).min(root_below::<6>(error / sixth)).min(1.0)
+        root_below::<5>(error / fifth)
+            .min(root_below::<6>(error / sixth))
+            .min(1.0)
     }
 }
 
@@ -64,7 +69,11 @@ fn truncation_share(parameters: &Parameters, max_step: f64) -> f64 {
     // The contacts alone bound the lowest squared frequency of the attached slider.
     let squared = parameters.block_contact_stiffness() / parameters.block_mass();
     let overdamped = (half * half - squared).max(0.0);
-    let rate = if overdamped > 0.0 { squared / (half + overdamped.sqrt()) } else { half };
+    let rate = if overdamped > 0.0 {
+        squared / (half + overdamped.sqrt())
+    } else {
+        half
+    };
     let remembered = (1.0 / (rate * max_step)).min(MAX_REMEMBERED);
     TRUNCATION_SHARE.min(REMEMBERED_SHARE / remembered)
 }

@@ -46,20 +46,38 @@ impl Path {
     #[inline(always)]
     fn new(slider: &Slider, step: &GridStep, drive: &GridDrive, block: usize) -> Self {
         let (x, q) = (&slider.state.displacement, &step.increment);
-        let Place { slot: (row, lane), before, after, shares } = step.places[block];
+        let Place {
+            slot: (row, lane),
+            before,
+            after,
+            shares,
+        } = step.places[block];
         let (end, rise) = (x[row][lane], q[row][lane]);
-        let beside = |rows: &[Row]| shares[0].mul_add(rows[before.0][before.1], shares[1] * rows[after.0][after.1]);
+        let beside = |rows: &[Row]| {
+            shares[0].mul_add(rows[before.0][before.1], shares[1] * rows[after.0][after.1])
+        };
         let (beside_end, beside_rise) = (beside(x), beside(q));
         let pulls = if block == 0 { step.pulling } else { 0.0 };
-        let last_force = pulls.mul_add(drive.displacement(), step.force_on(row, lane, beside_end, end));
+        let last_force = pulls.mul_add(
+            drive.displacement(),
+            step.force_on(row, lane, beside_end, end),
+        );
         let beside_start = beside_end - beside_rise;
-        let first_force =
-            pulls.mul_add(drive.displacement_before(), step.force_on(row, lane, beside_start, end - rise));
+        let first_force = pulls.mul_add(
+            drive.displacement_before(),
+            step.force_on(row, lane, beside_start, end - rise),
+        );
         // x'' = φ - γh x' at both ends, with the slopes of this very path.
         let damping = step.damping;
-        let (from, to) = (damping.mul_add(-rise, first_force), damping.mul_add(-rise, last_force));
+        let (from, to) = (
+            damping.mul_add(-rise, first_force),
+            damping.mul_add(-rise, last_force),
+        );
         let [across, along_first, along_last] = step.damped;
-        let (first, last) = (across.mul_add(to, along_first * from), across.mul_add(-from, along_last * to));
+        let (first, last) = (
+            across.mul_add(to, along_first * from),
+            across.mul_add(-from, along_last * to),
+        );
         let slope = SIXTH.mul_add(-2.0f64.mul_add(first, last), rise);
         let coefficients = [end - rise, slope, 0.5 * first, (last - first) * SIXTH, 0.0];
         Self {
@@ -68,7 +86,10 @@ impl Path {
             bare: slider.chain.bare[row][lane],
             coefficients,
             from: 0.0,
-            eventless: Correction { displacement: end, increment: rise },
+            eventless: Correction {
+                displacement: end,
+                increment: rise,
+            },
             beside: Correction::default(),
         }
     }
@@ -78,8 +99,14 @@ impl Path {
     fn at(&self, s: f64) -> [f64; 3] {
         let [c0, c1, c2, c3, c4] = self.coefficients;
         [
-            c4.mul_add(s, c3).mul_add(s, c2).mul_add(s, c1).mul_add(s, c0),
-            (4.0 * c4).mul_add(s, 3.0 * c3).mul_add(s, 2.0 * c2).mul_add(s, c1),
+            c4.mul_add(s, c3)
+                .mul_add(s, c2)
+                .mul_add(s, c1)
+                .mul_add(s, c0),
+            (4.0 * c4)
+                .mul_add(s, 3.0 * c3)
+                .mul_add(s, 2.0 * c2)
+                .mul_add(s, c1),
             (6.0 * c4).mul_add(s, 3.0 * c3).mul_add(s, c2),
         ]
     }
@@ -95,8 +122,14 @@ impl Path {
     #[inline(always)]
     fn change_by(&mut self, s: f64, [second, third, fourth]: [f64; 3]) {
         let [c0, c1, c2, c3, c4] = &mut self.coefficients;
-        *c0 = fourth.mul_add(s, -third).mul_add(s, second).mul_add(s * s, *c0);
-        *c1 = (4.0 * fourth).mul_add(s, -3.0 * third).mul_add(s, 2.0 * second).mul_add(-s, *c1);
+        *c0 = fourth
+            .mul_add(s, -third)
+            .mul_add(s, second)
+            .mul_add(s * s, *c0);
+        *c1 = (4.0 * fourth)
+            .mul_add(s, -3.0 * third)
+            .mul_add(s, 2.0 * second)
+            .mul_add(-s, *c1);
         *c2 += (6.0 * fourth).mul_add(s, -3.0 * third).mul_add(s, second);
         *c3 += (4.0 * fourth).mul_add(-s, third);
         *c4 += fourth;
@@ -107,15 +140,31 @@ impl Path {
     /// Hermite's cubic has it, that of s by displacement with the slopes at both ends of the step.
     #[inline(always)]
     fn crossing(&self, level: f64) -> f64 {
-        let within = |s: f64| if s > self.from { if s < 1.0 { s } else { 1.0 } } else { self.from };
+        let within = |s: f64| {
+            if s > self.from {
+                if s < 1.0 { s } else { 1.0 }
+            } else {
+                self.from
+            }
+        };
         let [c0, c1, c2, c3, c4] = self.coefficients;
         let rise = self.end() - c0;
         // Slopes above 3 let a cubic turn back.
-        let limited = |slope: f64| if slope > 0.0 && slope < 3.0 { slope } else { 3.0 };
-        let [at_start, at_end] = [limited(rise / c1), limited(rise / (c1 + 2.0 * c2 + (3.0 * c3 + 4.0 * c4)))];
+        let limited = |slope: f64| {
+            if slope > 0.0 && slope < 3.0 {
+                slope
+            } else {
+                3.0
+            }
+        };
+        let [at_start, at_end] = [
+            limited(rise / c1),
+            limited(rise / (c1 + 2.0 * c2 + (3.0 * c3 + 4.0 * c4))),
+        ];
         let part = (level - c0) / rise;
         let rest = 1.0 - part;
-        let mut s = within(part * (part * (1.0 + 2.0 * rest) + rest * (rest * at_start - part * at_end)));
+        let mut s =
+            within(part * (part * (1.0 + 2.0 * rest) + rest * (rest * at_start - part * at_end)));
         let mut is_there = false;
         for _ in 0..MAX_HALLEY_STEPS {
             let [x, slope, half_curvature] = self.at(s);
@@ -126,7 +175,11 @@ impl Path {
                 break;
             }
         }
-        if is_there { s } else { self.careful_crossing(level, s) }
+        if is_there {
+            s
+        } else {
+            self.careful_crossing(level, s)
+        }
     }
 
     /// The same where a path turns about.
@@ -163,27 +216,65 @@ pub(super) struct StepEvents {
 /// at `start` s in the frame.
 #[inline(always)]
 pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64) {
-    let Grid { step, drive, events, .. } = grid;
+    let Grid {
+        step,
+        drive,
+        events,
+        ..
+    } = grid;
     // Stage after stage over all blocks: one alone would wait for its own results.
     let mut paths = std::mem::take(&mut events.paths);
     paths.clear();
     for &(row, lane) in &step.reached {
-        paths.push((Path::new(slider, step, drive, slider.chain.layout.block(row, lane)), 0.0));
+        paths.push((
+            Path::new(slider, step, drive, slider.chain.layout.block(row, lane)),
+            0.0,
+        ));
     }
     for (path, first) in &mut paths {
-        let [upper, lower] = [slider.interface.block_upper[path.block], slider.interface.block_lower[path.block]];
-        *first = path.crossing(if path.eventless.displacement >= upper { upper } else { lower });
+        let [upper, lower] = [
+            slider.interface.block_upper[path.block],
+            slider.interface.block_lower[path.block],
+        ];
+        *first = path.crossing(if path.eventless.displacement >= upper {
+            upper
+        } else {
+            lower
+        });
     }
     for (path, first) in &mut paths {
-        break_along(simd, &mut slider.interface, step, events, path, Some(*first), start);
+        break_along(
+            simd,
+            &mut slider.interface,
+            step,
+            events,
+            path,
+            Some(*first),
+            start,
+        );
         settle(simd, slider, step, path);
     }
     events.paths = paths;
     // Breaks may have made something due within the step, and what attaches lets a block reach other contacts or not.
     while let Some((due, block)) = slider.interface.next_reattachment_by(start + step.length) {
         let mut path = Path::new(slider, step, drive, block);
-        attach(simd, &mut slider.interface, step, events, &mut path, (due - start) * step.inverse_length);
-        break_along(simd, &mut slider.interface, step, events, &mut path, None, start);
+        attach(
+            simd,
+            &mut slider.interface,
+            step,
+            events,
+            &mut path,
+            (due - start) * step.inverse_length,
+        );
+        break_along(
+            simd,
+            &mut slider.interface,
+            step,
+            events,
+            &mut path,
+            None,
+            start,
+        );
         settle(simd, slider, step, &path);
     }
     count_in_order(&mut slider.interface, events);
@@ -191,7 +282,14 @@ pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut 
 
 /// Puts the events of a step, in which block came after block, in the order of time and counts them.
 #[inline(always)]
-fn count_in_order(interface: &mut Interface, StepEvents { events, attachments, .. }: &mut StepEvents) {
+fn count_in_order(
+    interface: &mut Interface,
+    StepEvents {
+        events,
+        attachments,
+        ..
+    }: &mut StepEvents,
+) {
     if !events.is_sorted_by(|a, b| a.time <= b.time) {
         events.sort_by(|a, b| a.time.total_cmp(&b.time));
     }
@@ -241,7 +339,8 @@ fn break_along<S: Simd>(
             let stiffened = -step.by_mass * event.stiffness;
             let second = 0.5 * step.by_mass * event.force;
             let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
-            let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second) - 0.25 * step.damping * third;
+            let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second)
+                - 0.25 * step.damping * third;
             path.change_by(s, [second, third, fourth]);
             let [ahead, back] = [(1.0 - s) * (1.0 - s), s * s];
             let [ahead, back] = [ahead * ahead, back * back];
@@ -289,10 +388,18 @@ fn attach<S: Simd>(
 /// Enters what has happened to a block into the motion.
 #[inline(always)]
 fn settle<S: Simd>(simd: S, slider: &mut Slider, step: &mut GridStep, path: &Path) {
-    let Slider { interface, state, .. } = slider;
+    let Slider {
+        interface, state, ..
+    } = slider;
     let block = path.block;
     let levels = [interface.block_upper[block], interface.block_lower[block]];
-    step.update(simd, path.slot, path.bare + interface.block_stiffness[block], interface.block_pull[block], levels);
+    step.update(
+        simd,
+        path.slot,
+        path.bare + interface.block_stiffness[block],
+        interface.block_pull[block],
+        levels,
+    );
     let displacement = path.end();
     let own = Correction {
         displacement: displacement - path.eventless.displacement,
@@ -308,7 +415,15 @@ mod tests {
 
     fn path(coefficients: [f64; 5], from: f64) -> Path {
         let none = Correction::default();
-        Path { block: 0, slot: (0, 0), bare: 0.0, coefficients, from, eventless: none, beside: none }
+        Path {
+            block: 0,
+            slot: (0, 0),
+            bare: 0.0,
+            coefficients,
+            from,
+            eventless: none,
+            beside: none,
+        }
     }
 
     proptest! {

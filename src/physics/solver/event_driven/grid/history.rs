@@ -37,7 +37,12 @@ impl ForceHistory {
     /// Restarts at a time in s, with the next step.
     pub fn restart(&mut self, start: f64) {
         self.steps.clear();
-        *self = Self { keeps_all: self.keeps_all, steps: std::mem::take(&mut self.steps), start, ..Self::new() };
+        *self = Self {
+            keeps_all: self.keeps_all,
+            steps: std::mem::take(&mut self.steps),
+            start,
+            ..Self::new()
+        };
     }
 
     pub fn len(&self) -> usize {
@@ -70,8 +75,16 @@ impl ForceHistory {
     pub fn segment_to(&self, s: f64, spacing: f64, origin: f64) -> Option<Segment<'_>> {
         let (first, last) = (self.steps.first()?, self.steps.last()?);
         let steps = (self.count - 1) as f64 + s - self.first;
-        let before = if self.first > 0.0 { first.integral_to(self.first) } else { 0.0 };
-        let beyond = if s < 1.0 { last.integral() - last.integral_to(s) } else { 0.0 };
+        let before = if self.first > 0.0 {
+            first.integral_to(self.first)
+        } else {
+            0.0
+        };
+        let beyond = if s < 1.0 {
+            last.integral() - last.integral_to(s)
+        } else {
+            0.0
+        };
         let path = ForcePath::Grid {
             steps: &self.steps,
             count: self.count,
@@ -80,12 +93,19 @@ impl ForceHistory {
             inner: self.inner,
             bounds: {
                 let ([low, high], [lowest, highest]) = (first.bounds(), last.bounds());
-                [self.inner.least.1.min(low).min(lowest), self.inner.largest.1.max(high).max(highest)]
+                [
+                    self.inner.least.1.min(low).min(lowest),
+                    self.inner.largest.1.max(high).max(highest),
+                ]
             },
             end: last.value(s),
             integral: self.integral - before - beyond,
         };
-        Some(Segment { start: origin + self.start, duration: steps * spacing, path })
+        Some(Segment {
+            start: origin + self.start,
+            duration: steps * spacing,
+            path,
+        })
     }
 
     /// Forgets all before s in the last step, which is at a time in s.

@@ -112,7 +112,10 @@ impl Grid {
         for pair in self.step.trail[..steps].windows(2) {
             let [next, beyond] = [pair[0], pair[1]];
             let next_bend = (beyond - next) - (next - here);
-            self.history.push(CubicStep { force: [here, next], bend: [bend, next_bend] });
+            self.history.push(CubicStep {
+                force: [here, next],
+                bend: [bend, next_bend],
+            });
             (here, bend) = (next, next_bend);
         }
         [here, bend]
@@ -120,9 +123,21 @@ impl Grid {
 
     /// Adds the last step to the history, once its events are known. The drive was `drive` at its start.
     #[inline(always)]
-    fn follow_last(&mut self, chain: &Chain, state: &State, [force, bend]: [f64; 2], start_bend: f64) {
+    fn follow_last(
+        &mut self,
+        chain: &Chain,
+        state: &State,
+        [force, bend]: [f64; 2],
+        start_bend: f64,
+    ) {
         let (step, drive) = (&self.step, &self.drive);
-        let x = |block: usize| if block < chain.layout.blocks { chain.at(&state.displacement, block) } else { 0.0 };
+        let x = |block: usize| {
+            if block < chain.layout.blocks {
+                chain.at(&state.displacement, block)
+            } else {
+                0.0
+            }
+        };
         let (here, rise) = (x(0), step.increment[0][0]);
         let own = step.force_on(0, 0, x(1), here) + step.pulling * drive.displacement();
         // h² x'' at the start of the step and, from the law of motion, at its end.
@@ -130,7 +145,10 @@ impl Grid {
         let last = (own - step.damping * (rise + first / 6.0)) * step.inverse_end;
         let end = chain.drive_stiffness * (drive.displacement() - here);
         let end_bend = chain.drive_stiffness * (drive.bend() - last);
-        self.history.push(CubicStep { force: [force, end], bend: [bend, end_bend] });
+        self.history.push(CubicStep {
+            force: [force, end],
+            bend: [bend, end_bend],
+        });
         self.force = end;
     }
 }
@@ -146,18 +164,31 @@ pub(super) fn advance<S: Simd, const R: usize>(
 ) -> usize {
     let Slider { chain, state, .. } = slider;
     let before = chain.drive_stiffness
-        * (grid.drive.displacement_before() - (state.displacement[0][0] - grid.step.increment[0][0]));
-    let done = march::<S, R>(simd, chain, &mut grid.step, &mut grid.drive, &mut state.displacement, steps);
+        * (grid.drive.displacement_before()
+            - (state.displacement[0][0] - grid.step.increment[0][0]));
+    let done = march::<S, R>(
+        simd,
+        chain,
+        &mut grid.step,
+        &mut grid.drive,
+        &mut state.displacement,
+        steps,
+    );
     let at_start = grid.follow_run(done, before);
     let start_bend = grid.drive.bend_before();
     let start = time + (done - 1) as f64 * grid.step.length;
     grid.events.events.clear();
     (grid.events.breaks, grid.events.reattachments) = (0, 0);
-    if !grid.step.reached.is_empty() || slider.interface.next_reattachment() <= start + grid.step.length {
+    if !grid.step.reached.is_empty()
+        || slider.interface.next_reattachment() <= start + grid.step.length
+    {
         change_contacts(simd, slider, grid, start);
         if grid.events.breaks > 0 {
             let Slider { chain, state, .. } = slider;
-            grid.events.mean = [chain.mean(simd, &state.displacement), chain.mean(simd, &grid.step.increment)];
+            grid.events.mean = [
+                chain.mean(simd, &state.displacement),
+                chain.mean(simd, &grid.step.increment),
+            ];
         }
     }
     grid.follow_last(&slider.chain, &slider.state, at_start, start_bend);
@@ -169,18 +200,36 @@ impl Integration<'_> {
     fn enter_grid(&mut self) -> Result<(), SimulationError> {
         let length = self.grid.step.length;
         if !self.frame.resolves(length) {
-            return Err(SimulationError::StepTooShort { time: self.frame.now(), step: length });
+            return Err(SimulationError::StepTooShort {
+                time: self.frame.now(),
+                step: length,
+            });
         }
         let drive = self.frame.drive_derivatives(length);
-        let input = StepInput { length, error: self.tolerances.step_error, min_order: 0, drive };
+        let input = StepInput {
+            length,
+            error: self.tolerances.step_error,
+            min_order: 0,
+            drive,
+        };
         let (chain, state) = (&self.slider.chain, &self.slider.state);
-        if !self.kernels.expand(chain, state, &input, &mut self.step.series) {
-            return Err(SimulationError::NotFinite { time: self.frame.now() });
+        if !self
+            .kernels
+            .expand(chain, state, &input, &mut self.step.series)
+        {
+            return Err(SimulationError::NotFinite {
+                time: self.frame.now(),
+            });
         }
         let grid = &mut self.grid;
-        self.kernels.evaluate(&self.step.series, -1.0, length, &mut grid.before);
-        for ((increment, now), before) in
-            grid.step.increment.iter_mut().zip(&state.displacement).zip(&grid.before.displacement)
+        self.kernels
+            .evaluate(&self.step.series, -1.0, length, &mut grid.before);
+        for ((increment, now), before) in grid
+            .step
+            .increment
+            .iter_mut()
+            .zip(&state.displacement)
+            .zip(&grid.before.displacement)
         {
             for lane in 0..increment.len() {
                 increment[lane] = now[lane] - before[lane];
@@ -199,8 +248,18 @@ impl Integration<'_> {
     pub(super) fn update_velocities(&mut self, observer: &mut dyn Observer) {
         if self.grid.is_on {
             self.tell_force(1.0, observer);
-            let Self { kernels, slider, grid, .. } = self;
-            kernels.velocity(&slider.chain, &mut grid.step, &grid.drive, &mut slider.state);
+            let Self {
+                kernels,
+                slider,
+                grid,
+                ..
+            } = self;
+            kernels.velocity(
+                &slider.chain,
+                &mut grid.step,
+                &grid.drive,
+                &mut slider.state,
+            );
             grid.step.hand_back(&mut slider.chain);
             self.frame.set_time(self.frame.time);
         }
@@ -229,7 +288,11 @@ impl Integration<'_> {
         }
         let steps_until = |time: f64| {
             // Casts saturate: nothing need be due.
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count, which saturates")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a count, which saturates"
+            )]
             (((time - self.frame.time) * self.grid.step.inverse_length) as usize).saturating_add(1)
         };
         // To the next reattachment, and to where a leap may be tried.
@@ -237,9 +300,15 @@ impl Integration<'_> {
         if self.next_leap > self.frame.time {
             steps = steps.min(steps_until(self.next_leap));
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count, which saturates")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count, which saturates"
+        )]
         let steps = steps.min(room as usize);
-        let done = self.kernels.advance(&mut self.slider, &mut self.grid, self.frame.time, steps);
+        let done = self
+            .kernels
+            .advance(&mut self.slider, &mut self.grid, self.frame.time, steps);
         self.summary.steps += done as u64;
         self.summary.grid_steps += done as u64;
         self.summary.breaks += self.grid.events.breaks;
@@ -247,7 +316,9 @@ impl Integration<'_> {
         let start = self.frame.time + (done - 1) as f64 * length;
         self.frame.time += done as f64 * length;
         if self.grid.events.breaks > 0 {
-            self.next_leap = self.next_leap.max(self.frame.time + WORTHWHILE_GRID_LEAP * length);
+            self.next_leap = self
+                .next_leap
+                .max(self.frame.time + WORTHWHILE_GRID_LEAP * length);
         }
         self.tell_events(start, observer);
         self.largest_force = self.largest_force.max(self.grid.force);
@@ -261,10 +332,14 @@ impl Integration<'_> {
     fn tell_force(&mut self, s: f64, observer: &mut dyn Observer) {
         let length = self.grid.step.length;
         let grid = &mut self.grid;
-        if let Some(segment) = grid.history.segment_to(s, length, self.frame.absolute_time(0.0)) {
+        if let Some(segment) = grid
+            .history
+            .segment_to(s, length, self.frame.absolute_time(0.0))
+        {
             observer.advance(&segment);
             self.largest_force = self.largest_force.max(segment.end_force());
-            grid.history.forget_to(s, self.frame.time - (1.0 - s) * length);
+            grid.history
+                .forget_to(s, self.frame.time - (1.0 - s) * length);
         }
     }
 
@@ -284,15 +359,26 @@ impl Integration<'_> {
         let leading = self.slider.chain.layout.blocks - 1;
         let mut rest = &events[..];
         while let [first, ..] = rest {
-            let is_alone = self.grid.tells_attachments() || (may_begin && rest.len() == events.len());
-            let last = if is_alone { Some(0) } else { rest.iter().position(|event| event.block == leading) };
+            let is_alone =
+                self.grid.tells_attachments() || (may_begin && rest.len() == events.len());
+            let last = if is_alone {
+                Some(0)
+            } else {
+                rest.iter().position(|event| event.block == leading)
+            };
             let (told, later) = rest.split_at(last.map_or(rest.len(), |last| last + 1));
             let until = told.last().unwrap_or(first).time;
-            self.tell_force(((until - start) * self.grid.step.inverse_length).clamp(0.0, 1.0), observer);
+            self.tell_force(
+                ((until - start) * self.grid.step.inverse_length).clamp(0.0, 1.0),
+                observer,
+            );
             for event in told {
                 let left = 1.0 - (event.time - start) * self.grid.step.inverse_length;
                 let mean_displacement = self.frame.absolute_displacement(mean - left * rise);
-                observer.contact(&ContactEvent { mean_displacement, ..self.frame.absolute(*event) });
+                observer.contact(&ContactEvent {
+                    mean_displacement,
+                    ..self.frame.absolute(*event)
+                });
             }
             rest = later;
         }

@@ -77,7 +77,10 @@ impl GridDrive {
         if self.angle != 0.0 {
             let ([sine, cosine], [along, across]) = (self.turn, self.swing);
             // Δ cos(θ + ωh) and -Δ sin(θ + ωh).
-            self.swing = [along * cosine + across * sine, across * cosine - along * sine];
+            self.swing = [
+                along * cosine + across * sine,
+                across * cosine - along * sine,
+            ];
         }
     }
 }
@@ -95,12 +98,20 @@ pub(super) struct Place {
 impl Place {
     fn new(layout: Layout, block: usize) -> Self {
         let slot = layout.slot(block);
-        let beside =
-            |other: Option<usize>| other.filter(|other| *other < layout.blocks).map(|other| layout.slot(other));
+        let beside = |other: Option<usize>| {
+            other
+                .filter(|other| *other < layout.blocks)
+                .map(|other| layout.slot(other))
+        };
         let (before, after) = (beside(block.checked_sub(1)), beside(Some(block + 1)));
         let share = |beside: Option<(usize, usize)>| if beside.is_some() { 1.0 } else { 0.0 };
         let shares = [share(before), share(after)];
-        Self { slot, before: before.unwrap_or(slot), after: after.unwrap_or(slot), shares }
+        Self {
+            slot,
+            before: before.unwrap_or(slot),
+            after: after.unwrap_or(slot),
+            shares,
+        }
     }
 }
 
@@ -183,7 +194,9 @@ impl GridStep {
             force: layout.filled(0.0),
             trail: [0.0; MAX_RUN],
             reached: Vec::new(),
-            places: (0..layout.blocks).map(|block| Place::new(layout, block)).collect(),
+            places: (0..layout.blocks)
+                .map(|block| Place::new(layout, block))
+                .collect(),
             saved_displacement: layout.filled(0.0),
             saved_increment: layout.filled(0.0),
         };
@@ -224,7 +237,11 @@ impl GridStep {
         let diagonal = self.by_mass * diagonal;
         simd.set(&mut self.pull[row], lane, self.by_mass * pull);
         simd.set(&mut self.diagonal[row], lane, -diagonal);
-        simd.set(&mut self.own[row], lane, self.first - self.second * diagonal);
+        simd.set(
+            &mut self.own[row],
+            lane,
+            self.first - self.second * diagonal,
+        );
         simd.set(&mut self.upper[row], lane, upper);
         simd.set(&mut self.lower[row], lane, lower);
     }
@@ -251,8 +268,17 @@ impl GridStep {
         [own, beside]: [Correction; 2],
         displacement: &mut [Row],
     ) {
-        let Place { slot, before, after, shares } = self.places[block];
-        for (slot, by, share) in [(slot, own, 1.0), (before, beside, shares[0]), (after, beside, shares[1])] {
+        let Place {
+            slot,
+            before,
+            after,
+            shares,
+        } = self.places[block];
+        for (slot, by, share) in [
+            (slot, own, 1.0),
+            (before, beside, shares[0]),
+            (after, beside, shares[1]),
+        ] {
             add(simd, displacement, slot, share * by.displacement);
             add(simd, &mut self.increment, slot, share * by.increment);
         }
@@ -261,7 +287,10 @@ impl GridStep {
     /// φ of the block in a slot at the displacements of it and of both blocks beside together, but for the drive, in m.
     #[inline(always)]
     pub fn force_on(&self, row: usize, lane: usize, beside: f64, here: f64) -> f64 {
-        self.coupling.mul_add(beside, self.diagonal[row][lane].mul_add(here, self.pull[row][lane]))
+        self.coupling.mul_add(
+            beside,
+            self.diagonal[row][lane].mul_add(here, self.pull[row][lane]),
+        )
     }
 }
 
@@ -331,8 +360,16 @@ fn march_in_registers<S: Simd, const R: usize>(
     while done < steps && !is_any {
         let [push, correction] = pushes(step.pulling, step.second, step.damping, drive);
         for r in 0..R {
-            let before = if r > 0 { x[r - 1] } else { x[R - 1].to_next_lane() };
-            let after = if r + 1 < R { x[r + 1] } else { x[0].to_lane_before() };
+            let before = if r > 0 {
+                x[r - 1]
+            } else {
+                x[R - 1].to_next_lane()
+            };
+            let after = if r + 1 < R {
+                x[r + 1]
+            } else {
+                x[0].to_lane_before()
+            };
             let mut own = simd.load(&pull[r]);
             if r == 0 {
                 own = first_lane.mul_add(simd.splat(push), own);
@@ -341,14 +378,24 @@ fn march_in_registers<S: Simd, const R: usize>(
             f[r] = before.plus(after).mul_add(simd.load(&couplings[r]), own);
         }
         for r in 0..R {
-            let before = if r > 0 { f[r - 1] } else { f[R - 1].to_next_lane() };
-            let after = if r + 1 < R { f[r + 1] } else { f[0].to_lane_before() };
+            let before = if r > 0 {
+                f[r - 1]
+            } else {
+                f[R - 1].to_next_lane()
+            };
+            let after = if r + 1 < R {
+                f[r + 1]
+            } else {
+                f[0].to_lane_before()
+            };
             let mut kept = q[r].times(decay);
             if r == 0 {
                 kept = first_lane.mul_add(simd.splat(correction), kept);
             }
             let own = f[r].mul_add(simd.load(&own[r]), kept);
-            q[r] = before.plus(after).mul_add(simd.load(&second_couplings[r]), own);
+            q[r] = before
+                .plus(after)
+                .mul_add(simd.load(&second_couplings[r]), own);
             x[r] = x[r].plus(q[r]);
             reached[r] = x[r].reaches(simd.load(&upper[r])) | simd.load(&lower[r]).reaches(x[r]);
         }
@@ -364,7 +411,10 @@ fn march_in_registers<S: Simd, const R: usize>(
     }
     if is_any {
         // At most sixteen rows have registers.
-        let mut bits = reached.iter().rev().fold(0_u128, |bits, lanes| bits << LANES | u128::from(*lanes));
+        let mut bits = reached
+            .iter()
+            .rev()
+            .fold(0_u128, |bits, lanes| bits << LANES | u128::from(*lanes));
         while bits != 0 {
             let first = bits.trailing_zeros() as usize;
             step.reached.push((first / LANES, first % LANES));
@@ -388,7 +438,11 @@ fn march_in_memory<S: Simd, const R: usize>(
     let x = &mut displacement[..rows];
     let last = rows - 1;
     let (q, force) = (&mut step.increment[..rows], &mut step.force[..rows]);
-    let (pull, diagonal, own) = (&step.pull[..rows], &step.diagonal[..rows], &step.own[..rows]);
+    let (pull, diagonal, own) = (
+        &step.pull[..rows],
+        &step.diagonal[..rows],
+        &step.own[..rows],
+    );
     let (couplings, second_couplings) = (&step.couplings[..rows], &step.second_couplings[..rows]);
     let (upper, lower) = (&step.upper[..rows], &step.lower[..rows]);
     let first_lane = simd.load(&FIRST_BLOCK);
@@ -400,13 +454,20 @@ fn march_in_memory<S: Simd, const R: usize>(
         let mut here = simd.load(&x[0]);
         let beyond = here.to_lane_before();
         for r in 0..rows {
-            let after = if r < last { simd.load(&x[r + 1]) } else { beyond };
+            let after = if r < last {
+                simd.load(&x[r + 1])
+            } else {
+                beyond
+            };
             let mut own = simd.load(&pull[r]);
             if r == 0 {
                 own = first_lane.mul_add(simd.splat(push), own);
             }
             let own = here.mul_add(simd.load(&diagonal[r]), own);
-            before.plus(after).mul_add(simd.load(&couplings[r]), own).store(&mut force[r]);
+            before
+                .plus(after)
+                .mul_add(simd.load(&couplings[r]), own)
+                .store(&mut force[r]);
             (before, here) = (here, after);
         }
         // The increments, and where they take the blocks.
@@ -415,13 +476,19 @@ fn march_in_memory<S: Simd, const R: usize>(
         let beyond = here.to_lane_before();
         let mut reached = 0;
         for r in 0..rows {
-            let after = if r < last { simd.load(&force[r + 1]) } else { beyond };
+            let after = if r < last {
+                simd.load(&force[r + 1])
+            } else {
+                beyond
+            };
             let mut kept = simd.load(&q[r]).times(decay);
             if r == 0 {
                 kept = first_lane.mul_add(simd.splat(correction), kept);
             }
             let own = here.mul_add(simd.load(&own[r]), kept);
-            let next = before.plus(after).mul_add(simd.load(&second_couplings[r]), own);
+            let next = before
+                .plus(after)
+                .mul_add(simd.load(&second_couplings[r]), own);
             let moved = simd.load(&x[r]).plus(next);
             next.store(&mut q[r]);
             moved.store(&mut x[r]);
@@ -441,12 +508,20 @@ fn march_in_memory<S: Simd, const R: usize>(
 /// What the drive adds to φ of block 1, and to its increment beside, in m.
 #[inline(always)]
 fn pushes(pulling: f64, second: f64, damping: f64, drive: &GridDrive) -> [f64; 2] {
-    [pulling * drive.displacement(), second * pulling * (drive.bend() + damping * drive.increment())]
+    [
+        pulling * drive.displacement(),
+        second * pulling * (drive.bend() + damping * drive.increment()),
+    ]
 }
 
 /// Notes row and lane of every block at or beyond a break position.
 #[inline(always)]
-fn note_reached<S: Simd>(simd: S, [upper, lower]: [&[Row]; 2], x: &[Row], reached: &mut Vec<(usize, usize)>) {
+fn note_reached<S: Simd>(
+    simd: S,
+    [upper, lower]: [&[Row]; 2],
+    x: &[Row],
+    reached: &mut Vec<(usize, usize)>,
+) {
     for (row, ((x, upper), lower)) in x.iter().zip(upper).zip(lower).enumerate() {
         let x = simd.load(x);
         let mut lanes = x.reaches(simd.load(upper)) | simd.load(lower).reaches(x);
@@ -476,8 +551,15 @@ pub(in super::super) fn velocity<S: Simd, const R: usize>(
     state.displacement.copy_from_slice(&step.saved_displacement);
     // Central differences, in the place of the displacements after the step.
     let central = &mut step.saved_displacement[..rows];
-    for ((central, before), after) in central.iter_mut().zip(&step.saved_increment).zip(&step.increment) {
-        simd.load(before).plus(simd.load(after)).times(simd.splat(0.5)).store(central);
+    for ((central, before), after) in central
+        .iter_mut()
+        .zip(&step.saved_increment)
+        .zip(&step.increment)
+    {
+        simd.load(before)
+            .plus(simd.load(after))
+            .times(simd.splat(0.5))
+            .store(central);
     }
     step.increment.copy_from_slice(&step.saved_increment);
     let first_lane = simd.load(&FIRST_BLOCK);
@@ -486,16 +568,24 @@ pub(in super::super) fn velocity<S: Simd, const R: usize>(
     let mut here = simd.load(&central[0]);
     let beyond = here.to_lane_before();
     for r in 0..rows {
-        let after = if r < last { simd.load(&central[r + 1]) } else { beyond };
+        let after = if r < last {
+            simd.load(&central[r + 1])
+        } else {
+            beyond
+        };
         let bend = here.mul_add(damping, simd.load(&step.force[r]));
         let mut third = bend.times(damping);
         if r == 0 {
             third = first_lane.mul_add(simd.splat(step.pulling * drive.increment()), third);
         }
         third = here.mul_add(simd.load(&step.diagonal[r]), third);
-        third = before.plus(after).mul_add(simd.load(&step.couplings[r]), third);
+        third = before
+            .plus(after)
+            .mul_add(simd.load(&step.couplings[r]), third);
         let increment = third.mul_add(simd.splat(-1.0 / 6.0), here);
-        increment.times(simd.splat(1.0 / step.length)).store(&mut state.velocity[r]);
+        increment
+            .times(simd.splat(1.0 / step.length))
+            .store(&mut state.velocity[r]);
         (before, here) = (here, after);
     }
 }
@@ -510,11 +600,21 @@ mod tests {
 
     /// A slider of ten blocks with all its contacts, far from any break position.
     fn parameters() -> Parameters {
-        Parameters { blocks: 10, mean_threshold: 1e6, threshold_deviation: 0.0, ..Parameters::default() }
+        Parameters {
+            blocks: 10,
+            mean_threshold: 1e6,
+            threshold_deviation: 0.0,
+            ..Parameters::default()
+        }
     }
 
     /// A slider on the grid, from the present and the displacements one step before.
-    fn on_grid(parameters: &Parameters, length: f64, x: &[f64], before: &[f64]) -> (Slider, GridStep, GridDrive) {
+    fn on_grid(
+        parameters: &Parameters,
+        length: f64,
+        x: &[f64],
+        before: &[f64],
+    ) -> (Slider, GridStep, GridDrive) {
         let mut slider = Slider::new(parameters);
         let layout = slider.chain.layout;
         let mut step = GridStep::new(parameters, &slider.chain, length);
@@ -524,19 +624,34 @@ mod tests {
             slider.state.displacement[row][lane] = x[block];
             step.increment[row][lane] = x[block] - before[block];
         }
-        (slider, step, Frame::new(Drive::new(parameters), SPAN).grid_drive(length))
+        (
+            slider,
+            step,
+            Frame::new(Drive::new(parameters), SPAN).grid_drive(length),
+        )
     }
 
     fn take(slider: &mut Slider, step: &mut GridStep, drive: &mut GridDrive, mut steps: usize) {
         while steps > 0 {
-            steps -= march::<_, 0>(Baseline, &slider.chain, step, drive, &mut slider.state.displacement, steps);
+            steps -= march::<_, 0>(
+                Baseline,
+                &slider.chain,
+                step,
+                drive,
+                &mut slider.state.displacement,
+                steps,
+            );
         }
     }
 
     #[test]
     fn uniform_motion_is_exact() {
         // Without contacts, with the spring stretched by what damping takes: every block at the velocity of the drive.
-        let bare = Parameters { contact_stiffness: 1e-30, damping_rate: 1e4, ..parameters() };
+        let bare = Parameters {
+            contact_stiffness: 1e-30,
+            damping_rate: 1e4,
+            ..parameters()
+        };
         let (length, velocity) = (2e-6, bare.drive_velocity);
         // The tension between blocks falls by mγV0 from one to the next.
         let drag = bare.block_mass() * bare.damping_rate * velocity;
@@ -544,18 +659,31 @@ mod tests {
         for j in 1..bare.blocks {
             start[j] = start[j - 1] - drag * (bare.blocks - j) as f64 / bare.coupling_stiffness();
         }
-        let at = |steps: f64| start.iter().map(|x| x + velocity * length * steps).collect::<Vec<_>>();
+        let at = |steps: f64| {
+            start
+                .iter()
+                .map(|x| x + velocity * length * steps)
+                .collect::<Vec<_>>()
+        };
         let (mut slider, mut step, mut drive) = on_grid(&bare, length, &at(0.0), &at(-1.0));
         take(&mut slider, &mut step, &mut drive, 1000);
         for (x, expected) in slider.displacements().zip(at(1000.0)) {
-            assert!((x - expected).abs() < 1e-12 * expected.abs().max(1e-9), "{x} instead of {expected}");
+            assert!(
+                (x - expected).abs() < 1e-12 * expected.abs().max(1e-9),
+                "{x} instead of {expected}"
+            );
         }
     }
 
     #[test]
     fn the_error_of_a_mode_falls_sixteenfold_when_the_step_is_halved() {
         // One block on its contacts and its spring: x'' + γ x' + ω² x = 0, about an equilibrium that does not move.
-        let one = Parameters { blocks: 1, drive_velocity: 1e-30, damping_rate: 500.0, ..parameters() };
+        let one = Parameters {
+            blocks: 1,
+            drive_velocity: 1e-30,
+            damping_rate: 500.0,
+            ..parameters()
+        };
         let squared = (one.drive_stiffness + one.block_contact_stiffness()) / one.block_mass();
         let half = 0.5 * one.damping_rate;
         let frequency = (squared - half * half).sqrt();
@@ -563,7 +691,8 @@ mod tests {
         let time = 20.0 / frequency;
         let error = |steps: usize| {
             let length = time / steps as f64;
-            let (mut slider, mut step, mut drive) = on_grid(&one, length, &[exact(0.0)], &[exact(-length)]);
+            let (mut slider, mut step, mut drive) =
+                on_grid(&one, length, &[exact(0.0)], &[exact(-length)]);
             take(&mut slider, &mut step, &mut drive, steps);
             (slider.displacement(0) - exact(time)).abs() / 1e-6
         };
@@ -577,16 +706,27 @@ mod tests {
 
     #[test]
     fn velocities_are_of_fourth_order_and_taking_them_changes_nothing() {
-        let one = Parameters { blocks: 1, drive_velocity: 1e-30, ..parameters() };
+        let one = Parameters {
+            blocks: 1,
+            drive_velocity: 1e-30,
+            ..parameters()
+        };
         let squared = (one.drive_stiffness + one.block_contact_stiffness()) / one.block_mass();
         let half = 0.5 * one.damping_rate;
         let frequency = (squared - half * half).sqrt();
         let exact = |t: f64| 1e-6 * libm::exp(-half * t) * libm::cos(frequency * t + 0.5);
         let rate = -1e-6 * (half * libm::cos(0.5) + frequency * libm::sin(0.5));
         let error = |length: f64| {
-            let (mut slider, mut step, drive) = on_grid(&one, length, &[exact(0.0)], &[exact(-length)]);
+            let (mut slider, mut step, drive) =
+                on_grid(&one, length, &[exact(0.0)], &[exact(-length)]);
             let before = (slider.displacement(0), step.increment[0][0]);
-            velocity::<_, 0>(Baseline, &slider.chain, &mut step, &drive, &mut slider.state);
+            velocity::<_, 0>(
+                Baseline,
+                &slider.chain,
+                &mut step,
+                &drive,
+                &mut slider.state,
+            );
             assert_eq!(before, (slider.displacement(0), step.increment[0][0]));
             (slider.state.velocity[0][0] / rate - 1.0).abs()
         };
@@ -598,12 +738,18 @@ mod tests {
 
     #[test]
     fn padding_stays_at_rest() {
-        let (mut slider, mut step, mut drive) = on_grid(&parameters(), 4e-6, &[1e-7; 10], &[0.0; 10]);
+        let (mut slider, mut step, mut drive) =
+            on_grid(&parameters(), 4e-6, &[1e-7; 10], &[0.0; 10]);
         take(&mut slider, &mut step, &mut drive, 100);
         let layout = slider.chain.layout;
-        for (row, lane) in (0..layout.rows).flat_map(|row| (0..LANES).map(move |lane| (row, lane))) {
+        for (row, lane) in (0..layout.rows).flat_map(|row| (0..LANES).map(move |lane| (row, lane)))
+        {
             let x = slider.state.displacement[row][lane];
-            assert_eq!(x == 0.0, layout.block(row, lane) >= layout.blocks, "{x} in row {row}, lane {lane}");
+            assert_eq!(
+                x == 0.0,
+                layout.block(row, lane) >= layout.blocks,
+                "{x} in row {row}, lane {lane}"
+            );
         }
     }
 
