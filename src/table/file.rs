@@ -1,8 +1,8 @@
 //! Datasets: a table as Parquet files, written with the same bytes for the same rows, and read file by file.
 //!
-//! zstd over Parquet's own encodings, dictionary or plain, which every reader knows. The footer holds program, model and
-//! sweep, sorted, and a checksum, but no clock, host or thread count. Row groups are cut by row count alone, so bytes do
-//! not depend on how the rows came in.
+//! zstd; doubles plain, other columns with dictionaries, which every reader knows: byte streams would save 1 % of tables and
+//! 4 % of reduced data. The footer holds program, model and sweep, sorted, and a checksum, but no clock, host or
+//! thread count. Row groups are cut by row count alone, so bytes do not depend on how the rows came in.
 
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
 use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
@@ -11,7 +11,7 @@ use crate::table::columns::{FromRow, Row};
 use crate::table::error::ResultsError;
 use crate::table::storage::{Storage, StoredFile};
 use arrow_array::RecordBatch;
-use arrow_schema::{ArrowError, Schema};
+use arrow_schema::{ArrowError, DataType, Schema};
 use bytes::Bytes;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::{ArrowWriter, ProjectionMask};
@@ -19,6 +19,7 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::schema::types::ColumnPath;
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -83,13 +84,19 @@ impl Footer {
             .0
             .into_iter()
             .map(|(key, text)| KeyValue::new(key, text));
-        Ok(WriterProperties::builder()
+        let mut properties = WriterProperties::builder()
             .set_created_by(concat!("stickslip version ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_max_row_group_row_count(Some(GROUP_ROWS))
-            .set_key_value_metadata(Some(texts.collect()))
-            .build())
+            .set_key_value_metadata(Some(texts.collect()));
+        for field in schema.fields() {
+            if field.data_type() == &DataType::Float64 {
+                let column = ColumnPath::from(field.name().as_str());
+                properties = properties.set_column_dictionary_enabled(column, false);
+            }
+        }
+        Ok(properties.build())
     }
 }
 
