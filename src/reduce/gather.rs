@@ -3,9 +3,9 @@
 //! Contract: a function of the wanted jobs and their rows alone. What is summed over the jobs of a set is summed in the order
 //! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before.
 //!
-//! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 200 more for the jobs of [`MAX_SLIPS`]
-//! slips and 40 to 80 for each of these, and as much again for those of the set at hand; where the tables hold more, the
-//! slips are read again for the next sets.
+//! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 200 more for the jobs of
+//! [`MAX_SLIPS`] slips and 40 to 80 for each of these, and as much again for those of the set at hand; where the tables
+//! hold more, the slips are read again for the next sets.
 
 use super::PhaseLimits;
 use super::drive_alone::{Controls, Explained};
