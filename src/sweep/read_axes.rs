@@ -5,7 +5,7 @@
 //! Delta = { linear = [3e-7, 1e-6], points = 8 } ends included; log = [..] likewise
 //! seed  = { count = 4 }                         0, 1, 2, 3; with first = 100: 100, 101, 102, 103
 //! [[axes.zip]]                                  columns of equal length that move together
-//! [axes.sobol], [axes.latin]                    points, seed and a range for each quantity
+//! [axes.sobol]                                  points, seed and a range for each quantity
 //! ```
 //!
 //! Axes stand in the order of the file; the last moves fastest. Values of a range are rounded to twelve digits, those of a
@@ -14,7 +14,7 @@
 use super::axes::{Axis, Column, MAX_ROWS, Repeated};
 use super::checks::Places;
 use super::quantity::Quantity;
-use super::samples::{Range, Sample};
+use super::samples::{MAX_SAMPLE, Range, sobol};
 use super::source::{Entry, Refused, Section, all};
 use crate::model::Value;
 
@@ -30,12 +30,7 @@ pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec
     let axes = all(section.entries().iter().map(|entry| {
         let (title, read): (_, TableReader) = match entry.key {
             "zip" => ("[axes.zip]", read_zip),
-            "sobol" => ("[axes.sobol]", |table, places| {
-                read_sample(table, Sample::Sobol, places)
-            }),
-            "latin" => ("[axes.latin]", |table, places| {
-                read_sample(table, Sample::Latin, places)
-            }),
+            "sobol" => ("[axes.sobol]", read_sample),
             _ => return Ok(vec![read_single(entry, places)?]),
         };
         all(tables(entry, title)?
@@ -75,7 +70,7 @@ fn known(
 }
 
 fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
-    let quantity = known(entry, "[axes]", &["zip", "sobol", "latin"], places)?;
+    let quantity = known(entry, "[axes]", &["zip", "sobol"], places)?;
     if let (Some((first, count)), Quantity::Parameter(symbol)) =
         (read_count(entry, quantity)?, quantity)
     {
@@ -290,14 +285,10 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
     of_columns(table, columns)
 }
 
-fn read_sample(
-    table: &Section<'_>,
-    sample: Sample,
-    places: &mut Places<'_>,
-) -> Result<Axis, Refused> {
+fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
     const SETTINGS: [&str; 2] = ["points", "seed"];
     let points = table.required("points", "the number of points of the sample");
-    let points = points.and_then(|points| points.count(1, sample.max_points()));
+    let points = points.and_then(|points| points.count(1, MAX_SAMPLE));
     let seed = table
         .entry("seed")
         .map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)));
@@ -326,13 +317,11 @@ fn read_sample(
     }
     let [points, seed] = [points?, seed?].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
     let columns = (0..).zip(ranges).map(|(dimension, (quantity, range))| {
-        let coordinates = sample.coordinates(dimension, points, seed);
+        let coordinates = sobol(dimension, points, seed);
+        let values = coordinates.map(|x| ranged(quantity, range.at(x)));
         Column {
             quantity,
-            values: coordinates
-                .into_iter()
-                .map(|x| ranged(quantity, range.at(x)))
-                .collect(),
+            values: values.collect(),
         }
     });
     of_columns(table, columns.collect())

@@ -1,14 +1,10 @@
 //! Ranges and points on them: evenly spaced, and space-filling in several dimensions.
 //!
-//! Sobol: Owen-scrambled (B. Burley, JCGT 9(4), 2020; crate `sobol_burley`); the first points of a longer sample are those
-//! of a shorter one. Latin hypercube: one `ChaCha8` stream a dimension permutes the strata and places a point in each
-//! (M. D. McKay et al., Technometrics 21, 239, 1979). Logarithms and exponentials come from `libm`: the same bits on every
-//! machine.
+//! Sobol points, Owen-scrambled (B. Burley, JCGT 9(4), 2020; crate `sobol_burley`): the first points of a longer sample are
+//! those of a shorter one. Logarithms and exponentials come from `libm`: the same bits on every machine.
 
-use super::axes::MAX_ROWS;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
-
+/// Length of the Sobol sequence.
+pub(super) const MAX_SAMPLE: u64 = 1 << 16;
 /// Significant digits of a value between the ends of a range: 1e-4 as people write it, not what a logarithm makes of it.
 const DIGITS: usize = 12;
 
@@ -59,46 +55,9 @@ fn significant(value: f64) -> f64 {
     format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sample {
-    Sobol,
-    Latin,
-}
-
-impl Sample {
-    /// Most points; of a Sobol sample the length of the sequence.
-    pub const fn max_points(self) -> u64 {
-        match self {
-            Self::Sobol => 1 << 16,
-            Self::Latin => MAX_ROWS,
-        }
-    }
-
-    /// The coordinates of all points in one dimension, each in [0, 1).
-    pub fn coordinates(self, dimension: u32, points: u32, seed: u32) -> Vec<f64> {
-        match self {
-            Self::Sobol => (0..points)
-                .map(|point| f64::from(sobol_burley::sample(point, dimension, seed)))
-                .collect(),
-            Self::Latin => {
-                let mut generator = ChaCha8Rng::seed_from_u64(u64::from(seed));
-                generator.set_stream(u64::from(dimension));
-                let mut strata: Vec<u32> = (0..points).collect();
-                for last in (1..points).rev() {
-                    let other = (u64::from(generator.next_u32()) * (u64::from(last) + 1)) >> 32;
-                    strata.swap(last as usize, usize::try_from(other).unwrap_or_default());
-                }
-                let count = f64::from(points);
-                let inside = 1.0 / (f64::from(u32::MAX) + 1.0);
-                strata
-                    .into_iter()
-                    .map(|stratum| {
-                        (f64::from(stratum) + f64::from(generator.next_u32()) * inside) / count
-                    })
-                    .collect()
-            }
-        }
-    }
+/// The coordinates of the first Sobol points in one dimension, each in [0, 1).
+pub(super) fn sobol(dimension: u32, points: u32, seed: u32) -> impl Iterator<Item = f64> {
+    (0..points).map(move |point| f64::from(sobol_burley::sample(point, dimension, seed)))
 }
 
 #[cfg(test)]
@@ -147,40 +106,20 @@ mod tests {
     }
 
     #[test]
-    fn every_stratum_of_a_latin_sample_holds_one_point() {
-        for dimension in 0..3 {
-            let mut coordinates = Sample::Latin.coordinates(dimension, 97, 5);
-            coordinates.sort_unstable_by(f64::total_cmp);
-            for (stratum, coordinate) in (0_u8..).zip(coordinates) {
-                assert_eq!((97.0 * coordinate).floor(), f64::from(stratum));
-            }
-        }
-    }
-
-    #[test]
     fn a_longer_sobol_sample_begins_with_the_shorter() {
-        let long = Sample::Sobol.coordinates(2, 64, 1);
-        assert_eq!(Sample::Sobol.coordinates(2, 16, 1), long[..16]);
+        let long: Vec<f64> = sobol(2, 64, 1).collect();
+        assert!(sobol(2, 16, 1).eq(long[..16].iter().copied()));
     }
 
     #[test]
     fn samples_are_pinned() {
         // Known answers: points of a sample are parameters of jobs, and so part of every id.
-        assert_eq!(
-            Sample::Sobol.coordinates(1, 3, 7),
-            [
-                0.592_596_173_286_438,
-                0.194_618_463_516_235_35,
-                0.365_000_367_164_611_8
-            ]
-        );
-        assert_eq!(
-            Sample::Latin.coordinates(1, 3, 7),
-            [
-                0.035_778_330_406_174_064,
-                0.669_683_803_416_167_7,
-                0.655_623_660_888_522_9
-            ]
-        );
+        let points: Vec<f64> = sobol(1, 3, 7).collect();
+        let known = [
+            0.592_596_173_286_438,
+            0.194_618_463_516_235_35,
+            0.365_000_367_164_611_8,
+        ];
+        assert_eq!(points, known);
     }
 }

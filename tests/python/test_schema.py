@@ -14,7 +14,7 @@ GOOD = [
     'name = "a"\n[model]\nbreak_on = "tension"\nDelta = 0\n[axes]\nseed = { count = 3, first = 7 }\n',
     'name = "a"\n[[axes.zip]]\nV0 = [1e-5, 1e-4]\nfs = { linear = [1, 2], points = 2 }\n',
     'name = "a"\n[axes.sobol]\npoints = 8\nseed = 3\nV0 = { log = [1e-5, 1e-4] }\nKd = { linear = [1e7, 4e7] }\n',
-    'name = "a"\n[[axes.latin]]\npoints = 8\nV0 = { log = [1e-5, 1e-4] }\n[[axes.latin]]\npoints = 3\nK = { log = [1e7, 1e8] }\n',
+    'name = "a"\n[[axes.sobol]]\npoints = 8\nV0 = { log = [1e-5, 1e-4] }\n[[axes.sobol]]\npoints = 3\nK = { log = [1e7, 1e8] }\n',
     'name = "a"\n[record]\nslips = 7\nprecursors = true\ndrop_size = 0.5\n[solver]\nmethod = "fixed-step"\ndt = 1e-6\n',
     'name = "a"\n[solver]\nresolve = "taylor"\ntolerance = 1e-9\n',
     'name = "a"\n[precision]\nof = ["tau_mean", "drop_mean"]\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',

@@ -316,19 +316,19 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
             &["points = 65537", "65536"],
         ),
         (
-            "name = \"a\"\n[axes.latin]\npoints = 4",
+            "name = \"a\"\n[axes.sobol]\npoints = 4",
             2,
             &["at least one quantity"],
         ),
         (
-            "name = \"a\"\n[axes.latin]\npoints = 4\nV0 = [1, 2]",
+            "name = \"a\"\n[axes.sobol]\npoints = 4\nV0 = [1, 2]",
             4,
             &["V0 = [1, 2]", "in a sample"],
         ),
         (
-            "name = \"a\"\n[axes.latin]\npoints = 9\nN = { linear = [1, 2] }",
+            "name = \"a\"\n[axes.sobol]\npoints = 9\nN = { linear = [1, 2] }",
             2,
-            &["row 2 repeats row 1", "fewer points"],
+            &["row 3 repeats row 2", "fewer points"],
         ),
         (
             "name = \"a\"\nwhere = \"V0 < \"",
@@ -623,7 +623,7 @@ fn an_error_leads_to_no_other() {
         // A column that is refused makes a zip neither short nor uneven.
         ("name = \"a\"\n[axes.zip]\nV0 = [1, 2]\nN = [0]", "N = 0"),
         (
-            "name = \"a\"\n[axes.latin]\npoints = 4\nV0 = [1, 2]",
+            "name = \"a\"\n[axes.sobol]\npoints = 4\nV0 = [1, 2]",
             "V0 = [1, 2]",
         ),
         // Nor is a period missing, or a modulation, or any point.

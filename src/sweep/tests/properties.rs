@@ -73,16 +73,10 @@ fn modulation() -> impl Strategy<Value = String> {
             listed(&amplitudes)
         )
     });
-    let sample = (
-        key(),
-        amplitudes,
-        prop_oneof![Just("sobol"), Just("latin")],
-        1..20,
-        any::<u32>(),
-    )
-        .prop_map(|(key, amplitudes, kind, points, seed)| {
+    let sample =
+        (key(), amplitudes, 1..20, any::<u32>()).prop_map(|(key, amplitudes, points, seed)| {
             format!(
-                "Delta = {amplitudes}\n[axes.{kind}]\npoints = {points}\nseed = {seed}\n\
+                "Delta = {amplitudes}\n[axes.sobol]\npoints = {points}\nseed = {seed}\n\
                  {key} = {{ log = [0.01, 50] }}\nKd = {{ linear = [1e6, 1e8] }}\n"
             )
         });

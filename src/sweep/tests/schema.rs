@@ -82,12 +82,12 @@ fn every_table_of_the_schema_has_the_keys_that_the_parser_allows() {
         ),
         (
             "/definitions/positive_range/anyOf/0",
-            &["[axes.latin]\nV0 = { log = [1, 2], ??? }"],
+            &["[axes.sobol]\nV0 = { log = [1, 2], ??? }"],
             "log",
         ),
         (
             "/definitions/positive_range/anyOf/1",
-            &["[axes.latin]\nV0 = { log = [1, 2], ??? }"],
+            &["[axes.sobol]\nV0 = { log = [1, 2], ??? }"],
             "linear",
         ),
         (
