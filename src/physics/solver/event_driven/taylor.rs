@@ -82,11 +82,7 @@ pub(super) fn expand<S: Simd, const R: usize>(
         min_order,
         ..*input
     };
-    let order = if R > 0 && S::HAS_MANY_REGISTERS {
-        converge_in_registers::<S, R>(recurrence, &input, terms)
-    } else {
-        converge_in_memory(recurrence, &input, terms, rows)
-    };
+    let order = converge(recurrence, &input, terms, rows);
     series.order = order.unwrap_or(series.order);
     order.is_some()
 }
@@ -141,58 +137,11 @@ impl<S: Simd> Recurrence<'_, S> {
                 .store(&mut next[0]);
         }
     }
-
-    /// Y_{p+2} of Y_p and Y_{p+1}, also written to `rows`. [`sweep`] and [`Self::add_forces`] in arrays: one form for
-    /// rows in memory and in registers is slower than either.
-    #[inline(always)]
-    fn next_order<const R: usize>(
-        &mut self,
-        p: usize,
-        y: [S::Vector; R],
-        rate: [S::Vector; R],
-        rows: &mut [Row],
-    ) -> [S::Vector; R] {
-        let (coupling, diagonal) = (&self.coupling[..R], &self.diagonal[..R]);
-        let mut next = y;
-        for r in 0..R {
-            let before = if r > 0 {
-                y[r - 1]
-            } else {
-                y[R - 1].to_next_lane()
-            };
-            let after = if r + 1 < R {
-                y[r + 1]
-            } else {
-                y[0].to_lane_before()
-            };
-            let coupled = before.plus(after).times(self.simd.load(&coupling[r]));
-            let forced = y[r].mul_add(self.simd.load(&diagonal[r]), coupled);
-            next[r] = rate[r].mul_add(self.damping, forced);
-        }
-        if p == 0 {
-            let pull = &self.pull[..R];
-            for r in 0..R {
-                next[r] = self.simd.load(&pull[r]).mul_add(self.square, next[r]);
-            }
-        }
-        let push = self.pulling * self.drive.next_order();
-        if push != 0.0 {
-            next[0] = self
-                .simd
-                .load(&FIRST_BLOCK)
-                .mul_add(self.simd.splat(push), next[0]);
-        }
-        let rows = &mut rows[..R];
-        for r in 0..R {
-            next[r].store(&mut rows[r]);
-        }
-        next
-    }
 }
 
 /// Adds orders to Y_0 and Y_1 until the series converges. Returns the last one, if it does.
 #[inline(always)]
-fn converge_in_memory<S: Simd>(
+fn converge<S: Simd>(
     mut recurrence: Recurrence<'_, S>,
     input: &StepInput,
     terms: &mut [Row],
@@ -215,31 +164,6 @@ fn converge_in_memory<S: Simd>(
             && order >= input.min_order
             && are_small(recurrence.simd, &terms[rows..], rows, order, input.error)
         {
-            return Some(order);
-        }
-    }
-    None
-}
-
-/// The same with the last two orders in registers, so that no sum waits for memory.
-#[inline(always)]
-fn converge_in_registers<S: Simd, const R: usize>(
-    mut recurrence: Recurrence<'_, S>,
-    input: &StepInput,
-    terms: &mut [Row],
-) -> Option<usize> {
-    let simd = recurrence.simd;
-    let (mut even, mut odd) = ([simd.splat(0.0); R], [simd.splat(0.0); R]);
-    for r in 0..R {
-        (even[r], odd[r]) = (simd.load(&terms[r]), simd.load(&terms[R + r]));
-    }
-    for (pair, rows) in terms[2 * R..].chunks_exact_mut(2 * R).enumerate() {
-        let p = 2 * pair;
-        let (lower, higher) = rows.split_at_mut(R);
-        even = recurrence.next_order(p, even, odd, lower);
-        odd = recurrence.next_order(p + 1, odd, even, higher);
-        let order = p + 3;
-        if order >= input.min_order && are_small(simd, rows, R, order, input.error) {
             return Some(order);
         }
     }
