@@ -52,7 +52,7 @@ impl ColourBar {
             ([left, top, WIDTH, height + overlap], colour.clone())
         });
         sheet.clipped([left, top, WIDTH, frame.height], |sheet| {
-            sheet.rectangles(boxes)
+            sheet.rectangles(boxes);
         });
         let right = left + WIDTH;
         sheet.line(

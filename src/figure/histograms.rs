@@ -115,7 +115,7 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
             .chain(outlines)
             .chain(overlay);
         let numbered = Layer::Drawn(Box::new(move |sheet, frame| {
-            draw_multiples(sheet, frame, multiples, period)
+            draw_multiples(sheet, frame, multiples, period);
         }));
         let layers = vec![numbered, Layer::Inside(inside.collect())];
         panel::Panel {

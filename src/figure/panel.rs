@@ -96,7 +96,7 @@ impl Layer<'_> {
                 sheet.rectangles(cells.into_iter().map(|(cell, colour)| {
                     let [left, top, width, height] = frame.box_of(cell);
                     ([left, top, width + overlap, height + overlap], colour)
-                }))
+                }));
             }
             Self::Word((x, y), text, share) => {
                 let (x, y) = frame.place((frame.x.middle(x.0, x.1), frame.y.middle(y.0, y.1)));

@@ -84,7 +84,7 @@ impl Page<'_> {
                 ..
             } => {
                 self.with_opacity(*opacity, |page| {
-                    page.rectangle([*x, *y, *width, *height], fill)
+                    page.rectangle([*x, *y, *width, *height], fill);
                 });
             }
             Primitive::RectBatch { x, y, w, h, fills } => {

@@ -82,9 +82,9 @@ fn saddle_point(n: f64, length: f64) -> f64 {
     while high - low > 1e-9 {
         let middle = 0.5 * (low + high);
         if VonMises::at(libm::exp(middle)).length < length {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
     let whole = saddle_tail(n, LOWEST);

@@ -503,7 +503,7 @@ pub fn sets_of_edges(
 ) -> Result<BTreeMap<u64, SetOfEdges>, ResultsError> {
     let mut sets = BTreeMap::new();
     each_chosen(results, |number, set, explained| {
-        drop(sets.insert(number, of_set(&set, explained, refinement)))
+        drop(sets.insert(number, of_set(&set, explained, refinement)));
     })?;
     Ok(sets)
 }

@@ -55,7 +55,7 @@ type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, ResultsError> {
     let mut rows = BTreeMap::new();
     each_chosen(results, |number, set, explained| {
-        drop(rows.insert(number, set.finish_with(explained).0.row))
+        drop(rows.insert(number, set.finish_with(explained).0.row));
     })?;
     Ok(rows)
 }

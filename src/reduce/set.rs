@@ -528,9 +528,9 @@ pub(super) mod tests {
             for _ in 0..80 {
                 let middle = 0.5 * (low + high);
                 if middle + eta * libm::cos(middle) < load {
-                    low = middle
+                    low = middle;
                 } else {
-                    high = middle
+                    high = middle;
                 }
             }
             slip(None, Some(low))
@@ -654,7 +654,7 @@ pub(super) mod tests {
             reduced(set, slips)
         };
         let close = |value: Option<f64>, expected: f64| {
-            assert!((value.unwrap() - expected).abs() < 1e-12, "{value:?}")
+            assert!((value.unwrap() - expected).abs() < 1e-12, "{value:?}");
         };
         let whole = of(&[]);
         close(whole.tau_mean, 0.3);

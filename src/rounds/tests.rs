@@ -202,9 +202,9 @@ fn plain_bisection(
             };
             jobs += seeds;
             if side > 0.0 {
-                high = middle
+                high = middle;
             } else {
-                low = middle
+                low = middle;
             }
         }
         held += u64::from(low <= edge && edge <= high);

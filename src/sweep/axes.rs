@@ -103,7 +103,7 @@ impl Axis {
     pub fn apply(&self, row: u64, point: &mut Point) {
         match self {
             Self::Counted { symbol, first, .. } => {
-                point.set(Quantity::Parameter(*symbol), Value::Count(first + row))
+                point.set(Quantity::Parameter(*symbol), Value::Count(first + row));
             }
             Self::Table(table) => {
                 for column in &table.columns {

@@ -232,7 +232,7 @@ impl<'a> Plan<'a> {
         for part in self.parts_of(extension).filter(is_kept) {
             match ranges.last_mut() {
                 Some(range) if next == Some(part.index) => {
-                    *range = *range.start()..=*part.points.end()
+                    *range = *range.start()..=*part.points.end();
                 }
                 _ => ranges.push(part.points.clone()),
             }

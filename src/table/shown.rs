@@ -22,9 +22,9 @@ impl fmt::Display for Shown<'_> {
         for chunk in self.0.utf8_chunks() {
             for c in chunk.valid().chars() {
                 if is_plain(c) {
-                    write!(f, "{c}")?
+                    write!(f, "{c}")?;
                 } else {
-                    write!(f, "{}", c.escape_default())?
+                    write!(f, "{}", c.escape_default())?;
                 }
             }
             chunk

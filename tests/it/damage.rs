@@ -87,7 +87,7 @@ const PARTS: &[Damage] = &[
         1,
         |root| {
             change(&path(root, "jobs", SECOND), |bytes| {
-                bytes.truncate(bytes.len() / 2)
+                bytes.truncate(bytes.len() / 2);
             });
         },
     ),
@@ -97,7 +97,7 @@ const PARTS: &[Damage] = &[
         1,
         |root| {
             change(&path(root, "slips", SECOND), |bytes| {
-                bytes.truncate(bytes.len() - 1)
+                bytes.truncate(bytes.len() - 1);
             });
         },
     ),
@@ -163,7 +163,7 @@ const PARTS: &[Damage] = &[
         1,
         |root| {
             change(&path(root, "jobs", FIRST), |bytes| {
-                bytes[4096..8192].fill(0)
+                bytes[4096..8192].fill(0);
             });
         },
     ),
@@ -328,7 +328,7 @@ const PARTS: &[Damage] = &[
         0,
         |root| {
             change(&root.join("run/extension-000.json"), |bytes| {
-                bytes.truncate(bytes.len() / 2)
+                bytes.truncate(bytes.len() / 2);
             });
         },
     ),

@@ -34,9 +34,9 @@ fn a_run_whose_directory_is_moved_or_removed_ends_and_begins_no_other_at_its_pla
         let r = folder.path("r");
         let (code, stderr) = run_and(&folder, || {
             if is_moved {
-                fs::rename(&r, folder.path("moved")).unwrap()
+                fs::rename(&r, folder.path("moved")).unwrap();
             } else {
-                remove(&r)
+                remove(&r);
             }
         });
         assert_eq!(code, Some(2), "{stderr}");
@@ -77,7 +77,7 @@ fn a_run_whose_tables_are_moved_away_ends_and_begins_no_others() {
     let folder = Folder::new();
     let tables = folder.path("r/tables");
     let (code, stderr) = run_and(&folder, || {
-        fs::rename(&tables, folder.path("tables")).unwrap()
+        fs::rename(&tables, folder.path("tables")).unwrap();
     });
     assert_eq!(code, Some(3), "{stderr}");
     assert!(

@@ -84,9 +84,9 @@ impl StiffnessMatrix {
                 return high;
             }
             if self.eigenvalues_below(middle) > index {
-                high = middle
+                high = middle;
             } else {
-                low = middle
+                low = middle;
             }
         }
     }

@@ -554,7 +554,7 @@ mod tests {
             );
             let (mut interface, mut broken) = (whole.clone(), Vec::new());
             interface.break_reached(1, 0.0, displacement, |event| {
-                broken.push((event.block, event.contact))
+                broken.push((event.block, event.contact));
             });
             assert_eq!(
                 broken,

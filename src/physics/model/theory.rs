@@ -31,9 +31,9 @@ pub fn minimum_phase(eta: f64) -> Option<f64> {
             return Some(high);
         }
         if middle + eta * libm::cos(middle) < target {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
 }

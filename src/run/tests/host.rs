@@ -149,7 +149,7 @@ impl Storage for Host<'_> {
                 self.believe(file, Belief::Read(handle));
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                self.believe(file, Belief::Absent)
+                self.believe(file, Belief::Absent);
             }
             Err(_) => (),
         }

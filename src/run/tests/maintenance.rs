@@ -116,7 +116,7 @@ fn a_disk_that_cannot_be_read_is_not_damaged_and_its_repair_moves_nothing() {
             let case = format!("{error} at look {looks}");
             match repaired {
                 Ok(verification) => {
-                    assert!(verification.whole, "{case}: {:?}", verification.problems)
+                    assert!(verification.whole, "{case}: {:?}", verification.problems);
                 }
                 Err(error) => assert!(matches!(error.kind, ErrorKind::Disk(_)), "{case}: {error}"),
             }
