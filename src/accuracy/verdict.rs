@@ -51,9 +51,9 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         .iter()
         .max_by(|a, b| excess(a).total_cmp(&excess(b)))
         .filter(|row| excess(row) > 1.0);
-    let percent = |row: &DistanceRow, value: f64| 100.0 * value / row.reference_mean.abs();
-    let intervals: Vec<&&DistanceRow> = compared
+    let intervals: Vec<&DistanceRow> = compared
         .iter()
+        .copied()
         .filter(|row| row.quantity == "interval")
         .collect();
     let shown = intervals
@@ -79,18 +79,31 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         }
     };
     let mut lines = vec![format!("{subject} ({own}): {finding}.")];
+    lines.extend(break_errors(&rows));
+    lines.extend(statistical_error(study, &intervals, most.is_some()));
+    lines.extend(tighter(findings, &rows));
+    lines
+}
+
+/// A value in percent of the mean of the reference.
+fn percent(row: &DistanceRow, value: f64) -> f64 {
+    100.0 * value / row.reference_mean.abs()
+}
+
+/// How far breaks are off before trajectories part.
+fn break_errors(rows: &[&MethodRow]) -> Option<String> {
     let largest = |value: fn(&MethodRow) -> Option<f64>| {
         rows.iter().filter_map(|row| value(row)).reduce(f64::max)
     };
-    let (median, most_off) = (
-        largest(|row| row.break_times.median),
-        largest(|row| row.break_times.largest),
-    );
-    if let Some((median, most_off)) = median.zip(most_off) {
-        lines.push(format!(
-            "Before trajectories part, breaks are off by {median:.0e} s in the median, and by {most_off:.0e} s at most."
-        ));
-    }
+    let median = largest(|row| row.break_times.median)?;
+    let most_off = largest(|row| row.break_times.largest)?;
+    Some(format!(
+        "Before trajectories part, breaks are off by {median:.0e} s in the median, and by {most_off:.0e} s at most."
+    ))
+}
+
+/// The statistical error of the mean interval in the sets of a sweep, and whether the solver could add to it.
+fn statistical_error(study: &Study, intervals: &[&DistanceRow], is_biased: bool) -> Option<String> {
     // The error of a difference of two means, scaled to the slips of the sweep: neighbours are correlated in both.
     let errors = study
         .slips_of_sets
@@ -100,60 +113,53 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         .filter_map(|(&own, set)| {
             let row = intervals.iter().find(|row| *row.parameters == *set)?;
             let of_difference = 1.0 / row.slips as f64 + 1.0 / row.reference_slips as f64;
-            Some(percent(
-                row,
-                row.half_width() * (1.0 / (own as f64 * of_difference)).sqrt(),
-            ))
+            let scaled = row.half_width() * (1.0 / (own as f64 * of_difference)).sqrt();
+            Some(percent(row, scaled))
         });
     let errors: Vec<f64> = errors.collect();
-    if let Some((least, largest)) = errors
-        .iter()
-        .copied()
-        .reduce(f64::min)
-        .zip(errors.iter().copied().reduce(f64::max))
-    {
-        let excluded_from =
-            |row: &&&DistanceRow| percent(row, row.distances.mean_bias.abs() + row.half_width());
-        let conclusion = match most {
-            Some(_) => "",
-            None if intervals.iter().all(|row| excluded_from(row) <= largest) => {
-                ", so the solver is not what limits you"
-            }
-            None => "; more --seeds here would show whether the solver adds to it",
-        };
-        let range = if largest < 1.05 * least {
-            String::new()
-        } else {
-            format!("{least:.1} to ")
-        };
-        lines.push(format!(
-            "Statistical error of the mean interval in your sets (95 %), as far as these slips tell: {range}{largest:.1} \
-             %{conclusion}."
-        ));
-    }
-    let first = rows
-        .first()
-        .and_then(|row| Some((row.break_times.median? * TIGHTER, row)));
-    let tighter = first.and_then(|(error, row)| {
-        let others = findings
-            .methods
-            .iter()
-            .filter(|other| other.parameters == row.parameters);
-        let others = others.filter(|other| {
-            other
+    let least = errors.iter().copied().reduce(f64::min)?;
+    let largest = errors.iter().copied().reduce(f64::max)?;
+    let excluded_from =
+        |row: &&DistanceRow| percent(row, row.distances.mean_bias.abs() + row.half_width());
+    let conclusion = if is_biased {
+        ""
+    } else if intervals.iter().all(|row| excluded_from(row) <= largest) {
+        ", so the solver is not what limits you"
+    } else {
+        "; more --seeds here would show whether the solver adds to it"
+    };
+    let range = if largest < 1.05 * least {
+        String::new()
+    } else {
+        format!("{least:.1} to ")
+    };
+    Some(format!(
+        "Statistical error of the mean interval in your sets (95 %), as far as these slips tell: {range}{largest:.1} \
+         %{conclusion}."
+    ))
+}
+
+/// The cheapest setting whose breaks are off by much less.
+fn tighter(findings: &Findings, rows: &[&MethodRow]) -> Option<String> {
+    let row = rows.first()?;
+    let error = row.break_times.median? * TIGHTER;
+    let is_tighter = |other: &&MethodRow| {
+        other.parameters == row.parameters
+            && other
                 .break_times
                 .median
                 .is_some_and(|median| median < error)
-        });
-        let cheapest = others.min_by(|a, b| a.cost.per_slip.total_cmp(&b.cost.per_slip))?;
-        Some((&cheapest.solver, cheapest.cost.per_slip / row.cost.per_slip))
-    });
-    if let Some((solver, times)) = tighter {
-        lines.push(format!(
-            "For more: {solver} costs {times:.1} times as much."
-        ));
-    }
-    lines
+    };
+    let cheapest = findings
+        .methods
+        .iter()
+        .filter(is_tighter)
+        .min_by(|a, b| a.cost.per_slip.total_cmp(&b.cost.per_slip))?;
+    let times = cheapest.cost.per_slip / row.cost.per_slip;
+    Some(format!(
+        "For more: {} costs {times:.1} times as much.",
+        cheapest.solver
+    ))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use super::axis::{Axis, bounds, is_wide};
 use super::colour_bar::ColourBar;
 use super::frame::{Layout, OVERLAP};
-use super::legend::{Mark, entry};
+use super::legend::{Entry, Mark, entry};
 use super::own::Asked;
 use super::panel::{self, Cell, Layer, Panel, Place};
 use super::picture::{Fill, Ink, Picture, Stroke};
@@ -91,34 +91,7 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
             }))
         };
         let label = quantity.axis_label();
-        let scale = match column {
-            "periods" => {
-                let (first, last) = ends().unwrap_or_default();
-                let steps = (last - first).max(1.0);
-                Axis::linear(
-                    "n = τ / T",
-                    first - steps * FIRST_SHADE / (1.0 - FIRST_SHADE),
-                    first + steps,
-                )
-            }
-            "resultant_excess" => {
-                let (low, high) = ends()?;
-                let most = MIN_EXCESS.max(-low).max(high);
-                Axis::linear(&label, -most, most)
-            }
-            "slip_share" | "locking_index" => Axis::linear(&label, 0.0, 1.0),
-            _ => {
-                let ends = ends()?;
-                Axis::spanning(
-                    &label,
-                    if is_wide(ends) {
-                        ends
-                    } else {
-                        (ends.0.min(0.0), ends.1)
-                    },
-                )
-            }
-        };
+        let scale = scale_of(column, &label, ends())?;
         let colour = if column == "resultant_excess" {
             diverging
         } else {
@@ -126,23 +99,7 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         };
         let mut bar = ColourBar::of_axis(&scale, colour);
         if is_of_periods {
-            let (first, last) = ends().unwrap_or_default();
-            let all = || {
-                (0..=u32::MAX)
-                    .map(|step| first + f64::from(step))
-                    .take_while(|&n| n <= last)
-            };
-            let text = |n: f64| {
-                if n > MAX_PERIODS {
-                    format!(">{MAX_PERIODS}")
-                } else {
-                    n.to_string()
-                }
-            };
-            bar.colours = all().map(|n| shade(scale.place(n))).collect();
-            bar.ticks = all()
-                .map(|n| ((n - first + 0.5) / (last - first + 1.0), text(n)))
-                .collect();
+            mark_periods(&mut bar, &scale, ends().unwrap_or_default());
         }
         let none = is_of_periods.then(|| Color::from(FREE));
         let cells = map.coloured(|set| {
@@ -170,44 +127,86 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
             ..Panel::new(height, x_axis.clone(), y_axis.clone(), layers)
         })
     };
-    let (name, width, legend, found) = if is_locking {
-        let free = entry(
-            Mark::Patch(Fill {
-                ink: FREE,
-                opacity: 1.0,
-            }),
-            "no phase",
-        );
-        let legend = vec![
-            entry(Mark::Line(LINE), "η = 1; above, the drive turns back"),
-            free,
-        ];
-        (
-            "locking-map",
-            560.0,
-            legend,
-            ["periods", "locking_index", "resultant_excess"],
-        )
+    let columns = if is_locking {
+        ["periods", "locking_index", "resultant_excess"]
     } else {
-        let borders = entry(
-            Mark::Line(BORDER),
-            "borders of stick-slip, mixed, sliding; no slips where white",
-        );
-        (
-            "regime-map",
-            490.0,
-            vec![borders],
-            ["slip_share", "mean_friction", "tau_mean"],
-        )
+        ["slip_share", "mean_friction", "tau_mean"]
     };
-    let panels = found.into_iter().filter_map(panel).collect();
+    let panels = columns.into_iter().filter_map(panel).collect();
+    let (name, width) = if is_locking {
+        ("locking-map", 560.0)
+    } else {
+        ("regime-map", 490.0)
+    };
     Some(panel::draw(
         name,
         look,
         Layout::column(width),
-        &legend,
+        &legend(is_locking),
         panels,
     ))
+}
+
+/// The scale of the colours of a column, whose values lie between these ends.
+fn scale_of(column: &str, label: &str, ends: Option<(f64, f64)>) -> Option<Axis> {
+    Some(match column {
+        "periods" => {
+            let (first, last) = ends.unwrap_or_default();
+            let steps = (last - first).max(1.0);
+            Axis::linear(
+                "n = τ / T",
+                first - steps * FIRST_SHADE / (1.0 - FIRST_SHADE),
+                first + steps,
+            )
+        }
+        "resultant_excess" => {
+            let (low, high) = ends?;
+            let most = MIN_EXCESS.max(-low).max(high);
+            Axis::linear(label, -most, most)
+        }
+        "slip_share" | "locking_index" => Axis::linear(label, 0.0, 1.0),
+        _ => {
+            let ends = ends?;
+            let from_zero = (ends.0.min(0.0), ends.1);
+            Axis::spanning(label, if is_wide(ends) { ends } else { from_zero })
+        }
+    })
+}
+
+/// Gives a colour bar one block and one tick for each number of periods between these ends.
+fn mark_periods(bar: &mut ColourBar, scale: &Axis, (first, last): (f64, f64)) {
+    let all = || {
+        (0..=u32::MAX)
+            .map(|step| first + f64::from(step))
+            .take_while(|&n| n <= last)
+    };
+    let text = |n: f64| {
+        if n > MAX_PERIODS {
+            format!(">{MAX_PERIODS}")
+        } else {
+            n.to_string()
+        }
+    };
+    bar.colours = all().map(|n| shade(scale.place(n))).collect();
+    bar.ticks = all()
+        .map(|n| ((n - first + 0.5) / (last - first + 1.0), text(n)))
+        .collect();
+}
+
+fn legend(is_locking: bool) -> Vec<Entry> {
+    let free = Fill {
+        ink: FREE,
+        opacity: 1.0,
+    };
+    if is_locking {
+        vec![
+            entry(Mark::Line(LINE), "η = 1; above, the drive turns back"),
+            entry(Mark::Patch(free), "no phase"),
+        ]
+    } else {
+        let text = "borders of stick-slip, mixed, sliding; no slips where white";
+        vec![entry(Mark::Line(BORDER), text)]
+    }
 }
 
 struct Map {

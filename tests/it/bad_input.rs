@@ -26,6 +26,7 @@ fn assert_refused(folder: &Folder, arguments: &str, words: &[&str]) {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of cases")]
 fn bad_sweep_files_are_refused_by_plan_and_run_and_nothing_is_written() {
     // (text below `name = "bad"`, line, words of the message)
     let table: &[(&str, usize, &[&str])] = &[
@@ -221,6 +222,7 @@ error: bad.toml: has 4 mistakes:
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of cases")]
 fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
     let folder = Folder::new();
     folder.write("good.toml", GOOD);
@@ -411,6 +413,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of cases")]
 fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
     let folder = Folder::new();
     folder.write("good.toml", GOOD);

@@ -16,6 +16,7 @@ const GRID: Solver = solver(1e-3, Resolve::Grid);
 const TAYLOR: Solver = solver(1e-3, Resolve::Taylor);
 
 /// A case with what it is and its end, in s.
+#[expect(clippy::too_many_lines, reason = "a table of cases")]
 fn cases() -> Vec<(String, Parameters, f64)> {
     let base = Parameters::default;
     let modulated = |amplitude: f64, period: f64| Parameters {

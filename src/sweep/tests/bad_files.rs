@@ -160,6 +160,7 @@ fn unknown_and_missing_keys_are_refused_with_the_nearest_known() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of cases")]
 fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
     assert_refused(&[
         ("name = 3", 1, &["name = 3", "letters"]),
@@ -780,6 +781,7 @@ fn targets_that_cannot_be_are_refused_with_what_is_allowed() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of cases")]
 fn refinements_that_cannot_be_are_refused_with_what_is_allowed() {
     const RANGES: &str = "name = \"a\"\n[axes]\nfrequency = { linear = [5, 75], points = 8 }\n\
                           Delta = { log = [1e-7, 4e-6], points = 5 }\nV0 = [1e-4]\n";
