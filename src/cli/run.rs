@@ -10,6 +10,7 @@ use crate::observe::measure;
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
+use crate::results::rounds::RoundsSoFar;
 use crate::run::threads::{self, Threads};
 use crate::run::{Joined, Options, RunReport, Shard};
 use crate::sweep::{Job, Sweep};
@@ -148,12 +149,13 @@ fn work(
     let (recording, solver) = (*sweep.recording(), sweep.solver());
     let kernel =
         |job: &Job, interrupt: &AtomicBool| measure(&job.parameters, &recording, solver, interrupt);
-    let report = joined.run(&kernel, &mut |event| {
+    let mut report = joined.run(&kernel, &mut |event| {
         progress.show(event);
         if let Some(reporter) = &mut reporter {
             reporter.follow(event);
         }
     })?;
+    report.stopped |= signals::is_cancelled();
     let is_complete = report.jobs_left == 0 && !report.stopped;
     let reduced = if !is_complete || arguments.no_reduce {
         Ok(None)
@@ -203,21 +205,20 @@ fn work(
 /// Says what is left and what to do, and how the command ends.
 fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     if report.stopped {
-        let left = output::count(report.jobs_left, "job");
         let hint = match arguments.walltime {
             Some(_) if report.jobs_run == 0 => {
                 "No part ended in this time: give a longer --walltime."
             }
             _ => "The same command resumes.",
         };
-        let of_round = if report.rounds.is_some() {
-            " of this round"
-        } else {
-            ""
+        let left = output::count(report.jobs_left, "job");
+        let place = match (report.jobs_left, report.rounds) {
+            (0, Some(RoundsSoFar { is_over: false, .. })) => "between two rounds".to_owned(),
+            (0, _) => "before the reduction".to_owned(),
+            (_, Some(_)) => format!("with {left} left of this round"),
+            (_, None) => format!("with {left} left"),
         };
-        output::report(&format!(
-            "stopped with {left} left{of_round}; finished jobs are kept. {hint}"
-        ));
+        output::report(&format!("stopped {place}; finished jobs are kept. {hint}"));
         // One that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
         return if arguments.worker && has_worked && !signals::is_cancelled() {

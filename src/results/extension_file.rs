@@ -128,7 +128,7 @@ impl Record {
     pub fn of_footer(texts: &BTreeMap<String, String>) -> Option<Self> {
         let rest: Self = serde_json::from_str(texts.get(EXTENSION)?).ok()?;
         let sweep = texts.get(SWEEP)?;
-        let parsed = Sweep::parse(sweep, Path::new("the sweep of a footer")).ok()?;
+        let parsed = Sweep::parse_stored(sweep, Path::new("the sweep of a footer")).ok()?;
         (rest.format == FORMAT).then(|| Self {
             tables: columns_of(&parsed),
             sweep: sweep.clone(),
@@ -303,7 +303,7 @@ pub(super) fn extensions(
             Some(Extension { sweep, .. }) if sweep.text() == record.sweep => sweep.clone(),
             _ => {
                 let path = layout.extension(number);
-                let sweep = Sweep::parse(&record.sweep, &path);
+                let sweep = Sweep::parse_stored(&record.sweep, &path);
                 let sweep = sweep.map_err(|error| ResultsError::damaged(&path, error))?;
                 sweep.with_ids_of(record.model_version, &record.rng_scheme)
             }

@@ -19,8 +19,13 @@ use crate::results::{Results, ResultsError};
 use crate::sweep::{Precision, Round, Standing, Sweep};
 use std::collections::BTreeMap;
 
-/// The round after those that a directory has. All their jobs must be done.
+/// The round after those that a directory has. All their jobs must be done. One that chooses no point beyond theirs would
+/// come again for ever, so it is the end.
 pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
+    Ok(next_after(results)?.beyond(&results.chosen()))
+}
+
+fn next_after(results: &Results<'_>) -> Result<Round, ResultsError> {
     let sweep = results.sweep();
     if let Some(refinement) = sweep.refinement() {
         return Ok(edges::decide(

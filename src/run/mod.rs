@@ -144,6 +144,7 @@ impl Joined<'_> {
         self.results.sync_names()?;
         self.member.tidy()?;
         let (mut events, mut report) = (Events { log: None, display }, RunReport::default());
+        let walltime = Walltime::new(self.begin, self.options.walltime);
         let mut retry_failed = self.options.retry_failed;
         let mut round = (Cow::Borrowed(self.results), Cow::Borrowed(self.parts));
         loop {
@@ -153,12 +154,17 @@ impl Joined<'_> {
                 parts,
                 retry_failed,
                 kernel,
+                &walltime,
                 &mut events,
                 &mut report,
             )?;
             // Those that failed in this run fail again.
             retry_failed = false;
             if report.jobs_left > 0 {
+                break;
+            }
+            if self.must_end(&walltime) && results.round().is_some_and(|round| !round.is_end()) {
+                report.stopped = true;
                 break;
             }
             let Some(next) = results.next_round(self.member, rounds::next)? else {
@@ -177,6 +183,11 @@ impl Joined<'_> {
         Ok(report)
     }
 
+    /// Whether a signal came, or the time is over.
+    fn must_end(&self, walltime: &Walltime) -> bool {
+        self.options.stop.load(Ordering::Relaxed) || walltime.is_over()
+    }
+
     /// Runs the parts that are there now: all, or those of the rounds so far.
     fn run_parts(
         &self,
@@ -184,6 +195,7 @@ impl Joined<'_> {
         parts: &[Outline],
         retry_failed: bool,
         kernel: &Kernel<'_>,
+        walltime: &Walltime,
         events: &mut Events<'_>,
         report: &mut RunReport,
     ) -> Result<(), ResultsError> {
@@ -209,7 +221,6 @@ impl Joined<'_> {
             while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
         }
         if report.jobs_left > 0 {
-            let walltime = Walltime::new(begin, options.walltime);
             let (jobs, predicted_cost) = (
                 report.jobs_left,
                 overview.predicted_cost_missing + cost_again,
@@ -234,13 +245,12 @@ impl Joined<'_> {
                     predicted_cost,
                 })?;
             }
-            let mut collector = Collector::new(self, &pending, &walltime, events, report);
+            let mut collector = Collector::new(self, &pending, walltime, events, report);
             let ended = loop {
                 match collector.run(kernel) {
                     Ok(true) => (),
                     ended => break ended.map(|_| None),
                 }
-                let must_end = || options.stop.load(Ordering::Relaxed) || walltime.is_over();
                 let left = loop {
                     match pending.left(member) {
                         // There may be work for this one in the next round.
@@ -248,7 +258,7 @@ impl Joined<'_> {
                             jobs: 1..,
                             has_abandoned: false,
                             ..
-                        }) if results.round().is_some() && !must_end() => {
+                        }) if results.round().is_some() && !self.must_end(walltime) => {
                             std::thread::sleep(LOOK);
                         }
                         left => break left,
@@ -260,7 +270,7 @@ impl Joined<'_> {
                         has_abandoned: true,
                         ..
                     }) => (),
-                    Ok(Left { jobs: 1.., .. }) if must_end() => break Ok(None),
+                    Ok(Left { jobs: 1.., .. }) if self.must_end(walltime) => break Ok(None),
                     left => break left.map(Some),
                 }
             };

@@ -9,7 +9,7 @@ use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
 use super::set::Statistic;
-use super::source::{Refused, Section, Source};
+use super::source::{Refused, Section, Source, all};
 use crate::model::Symbol;
 use crate::solver::{Resolve, Solver};
 use crate::table::value::Shortest;
@@ -136,6 +136,34 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
         .solver
         .check(&first.parameters)
         .map_err(|error| file.source.refuse(time_step, error.to_string()))
+}
+
+/// What a sweep that begins is refused, and one that a results directory holds is not.
+pub(super) fn of_new(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
+    seeds_of_rounds(sweep, file)
+}
+
+/// Rounds count the seeds that a set has, so a condition must not leave some of them out.
+fn seeds_of_rounds(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
+    let (Some(rounds), Some(entry)) = (&sweep.rounds, file.entry("where")) else {
+        return Ok(());
+    };
+    let section = if rounds.refinement.is_some() {
+        "[refine]"
+    } else {
+        "[precision]"
+    };
+    let conditions = entry.list().unwrap_or_else(|| vec![entry]);
+    all(conditions.iter().zip(&sweep.conditions).map(|(entry, condition)| {
+        if condition.names().contains(&&Quantity::Parameter(Symbol::Seed)) {
+            return Err(entry.refuse(format!(
+                "names seed, and {section} chooses the seeds of each set; remove it, and choose the first seed by \
+                 seeds = {{ first = .., from = .., to = .. }} in {section}"
+            )));
+        }
+        Ok(())
+    }))
+    .map(drop)
 }
 
 /// Drive velocity in m/s from which a slip of microseconds would be driven through: micrometres per second were meant.

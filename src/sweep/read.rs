@@ -45,12 +45,18 @@ impl Sweep {
     /// Reads the text of a sweep file; the path is for messages only.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SweepError> {
         let source = Source::new(path, text);
-        read(&source).map_err(|_| source.error())
+        read(&source, true).map_err(|_| source.error())
+    }
+
+    /// The same with a text that a results directory holds: what its sweep was allowed when it began stays readable.
+    pub fn parse_stored(text: &str, path: &Path) -> Result<Self, SweepError> {
+        let source = Source::new(path, text);
+        read(&source, false).map_err(|_| source.error())
     }
 }
 
 /// Reads all of a file, as far as it goes.
-fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
+fn read(source: &Source<'_>, is_new: bool) -> Result<Sweep, Refused> {
     let table = source.table()?;
     let file = Section {
         source,
@@ -138,6 +144,9 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     };
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places)?;
+    if is_new {
+        checks::of_new(&sweep, &file)?;
+    }
     if let Some(Rounds { seeds, .. }) = &sweep.rounds {
         let sets = sweep.first_sets().len() as u64;
         if sets > MAX_SETS {

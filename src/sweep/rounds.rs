@@ -95,6 +95,21 @@ impl Round {
         contains(&self.points, point)
     }
 
+    /// The same, or the end if all its points are among those that were chosen before.
+    pub fn beyond(mut self, chosen: &Self) -> Self {
+        if self
+            .points
+            .iter()
+            .cloned()
+            .flatten()
+            .all(|point| chosen.has(point))
+        {
+            self.points.clear();
+            self.standing.sets_capped += std::mem::take(&mut self.standing.sets_open);
+        }
+        self
+    }
+
     /// Whether it says that the rounds are over.
     pub const fn is_end(&self) -> bool {
         self.points.is_empty()

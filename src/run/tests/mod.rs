@@ -5,6 +5,7 @@ mod faults;
 mod faulty_disk;
 mod host;
 mod maintenance;
+mod rounds;
 mod schedule;
 mod schedules;
 mod versions;

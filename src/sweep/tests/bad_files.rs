@@ -664,6 +664,29 @@ fn every_column_of_a_zip_or_a_sample_and_every_axis_is_read() {
 }
 
 #[test]
+fn a_condition_on_seeds_that_rounds_choose_is_refused_at_its_line() {
+    let seeds = "seeds = { from = 24, to = 30 }";
+    let precision = format!("[precision]\nof = \"tau_mean\"\nrelative = 0.1\n{seeds}");
+    let refine = format!(
+        "[axes]\nV0 = {{ linear = [1e-4, 2e-4], points = 3 }}\n[refine]\naxis = \"V0\"\n\
+         by = \"tau_mean\"\nthreshold = 1\nto = 1e-6\njobs = 500\n{seeds}"
+    );
+    for (rounds, section) in [(precision, "[precision]"), (refine, "[refine]")] {
+        for condition in [
+            "seed != 1",
+            "V0 * (2 - seed) < 1e-3",
+            "V0 > 1 or -seed > 0 - 9",
+        ] {
+            let text = format!("name = \"a\"\nwhere = [\"V0 > 0\",\n\"{condition}\"]\n{rounds}");
+            let words = &["names seed", section, "seeds = { first = .., from"];
+            assert_refused(&[(&text, 3, words)]);
+        }
+        let text = format!("name = \"a\"\nwhere = \"V0 > 0\"\n{rounds}");
+        Sweep::parse(&text, Path::new("good.toml")).unwrap();
+    }
+}
+
+#[test]
 fn targets_that_cannot_be_are_refused_with_what_is_allowed() {
     let precision = |text: &str| format!("name = \"a\"\n[precision]\n{text}");
     let seeds = "seeds = { from = 4, to = 8 }";
