@@ -4,12 +4,12 @@ use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
 use crate::model::Symbol;
 use crate::reduce::{
-    EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, differing, read_reduced, renew,
-    sets_where,
+    EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing, read_reduced,
+    renew, sets_where,
 };
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::sweep::{label, three_digits};
+use crate::sweep::{Digits, label};
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Table};
 use crate::table::file::Dataset;
@@ -352,10 +352,14 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
             .map(|edge| edge.bracket_high)
             .fold(0.0, f64::max),
     );
-    let number = |value: f64| {
-        let digits: f64 = format!("{:.3e}", factor * value).parse().unwrap_or(value);
-        digits.to_string()
-    };
+    let ends = edges.iter().flat_map(|edge| {
+        let interval = edge.edge_interval.map(|Interval { low, high }| [low, high]);
+        [Some([edge.bracket_low, edge.bracket_high]), interval]
+    });
+    let digits = ends.flatten().fold(Digits::FOUR, |digits, ends| {
+        digits.distinguishing(&ascending(ends.into_iter()))
+    });
+    let number = |value: f64| digits.number(factor * value);
     let mut add = |head: String, cell: &dyn Fn(&EdgeRow) -> String| {
         columns.add(
             true,
@@ -401,6 +405,7 @@ fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
             .abs()
     };
     let (factor, unit) = label.scale((0..values.numbers.len()).map(shown).fold(0.0, f64::max));
+    let digits = values.digits();
     let mut cells = vec![label.short(unit)];
     for (set, &number) in values.numbers.iter().enumerate().take(most) {
         cells.push(match (number, values.intervals[set]) {
@@ -410,10 +415,10 @@ fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
             (Some(value), Some((low, high))) => {
                 with_interval(factor * value, factor * low, factor * high)
             }
-            (Some(value), None) => three_digits(factor * value),
+            (Some(value), None) => digits.number(factor * value),
             (None, _) => bound(set).map_or_else(
                 || "–".to_owned(),
-                |tau| format!("> {}", three_digits(factor * tau)),
+                |tau| format!("> {}", digits.number(factor * tau)),
             ),
         });
     }
@@ -428,7 +433,7 @@ const LOPSIDED: f64 = 0.2;
 fn with_interval(value: f64, low: f64, high: f64) -> String {
     let half = 0.5 * (high - low);
     if half.is_nan() || half <= 0.0 {
-        return three_digits(value);
+        return Digits::THREE.number(value);
     }
     let crosses = low >= 0.0 && value < half || high <= 0.0 && value > -half;
     let is_lopsided = crosses || (value - low - half).abs() > LOPSIDED * half;

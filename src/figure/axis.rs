@@ -1,6 +1,6 @@
 //! Axes: range, scale, and where ticks go.
 
-use crate::sweep::{power_of_ten, typeset};
+use crate::sweep::{Digits, power_of_ten};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,13 +114,14 @@ impl Axis {
         }
     }
 
-    /// The same axis with a number at each of these values and no other tick.
-    pub(super) fn with_ticks_at(self, label: &str, values: impl Iterator<Item = f64>) -> Self {
-        let ticks = values.map(|value| (value, typeset(value))).collect();
+    /// The same axis with a number at each of these values, which differ, and no other tick.
+    pub(super) fn with_ticks_at(self, label: &str, values: &[f64]) -> Self {
+        let digits = Digits::THREE.distinguishing(values);
+        let ticks = values.iter().map(|&value| (value, digits.typeset(value)));
         Self {
             label: label.to_owned(),
             power: None,
-            ticks,
+            ticks: ticks.collect(),
             minor: Vec::new(),
             ..self
         }

@@ -55,7 +55,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let x = if known.len() > MAX_TICKS {
         x
     } else {
-        x.with_ticks_at(&x_label, known.into_iter())
+        x.with_ticks_at(&x_label, &known)
     };
     let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
     let mut statistics: Vec<&str> = Vec::new();

@@ -6,7 +6,7 @@ use super::frame::{Frame, Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Place};
 use super::picture::{Anchor, Fill, Picture, Stroke};
-use super::sets::{modulation, setting};
+use super::sets::{digits, modulation, setting};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{HistogramBin, SetRow, differing};
@@ -164,12 +164,12 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
     let panel = |set: &SetRow| {
         let settings = others
             .iter()
-            .map(|&symbol| setting(&set.parameters, symbol));
+            .map(|&symbol| setting(&set.parameters, symbol, digits(&shown, symbol)));
         let twin = identical
             .iter()
             .find(|twin| !is_identical(&set) && is_twin(twin, set));
         Panel {
-            title: std::iter::once(modulation(&set.parameters))
+            title: std::iter::once(modulation(set, &shown))
                 .chain(settings)
                 .collect::<Vec<_>>()
                 .join(", "),
@@ -179,7 +179,8 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
         }
     };
     shown
-        .into_iter()
+        .iter()
+        .copied()
         .map(panel)
         .filter(|panel| panel.all_bars().next().is_some())
         .collect()

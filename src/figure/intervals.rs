@@ -8,8 +8,8 @@ use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Dot, Picture};
 use super::sets::axis_of;
 use super::style::{GREY, GRID, LIGHT_GREY, Look};
-use crate::reduce::Point;
-use crate::sweep::label;
+use crate::reduce::{Point, ascending};
+use crate::sweep::{Digits, label};
 
 const RADIUS: f64 = 1.8;
 const OTHER: Dot = Dot {
@@ -41,17 +41,17 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
     let few = "τ / T: up to 12 periods";
     let few = Axis::linear(few, 0.0, f64::from(LINES) + 0.5)
-        .with_ticks_at(few, (0..=LINES).map(f64::from));
+        .with_ticks_at(few, &Vec::from_iter((0..=LINES).map(f64::from)));
 
     let phased = slips.iter().filter(|slip| slip.0.has_phase);
     let phased: Vec<f64> = phased.map(|slip| slip.0.drive_velocity).collect();
     // The same colours whatever has a phase.
     let velocity = label("V0");
-    let hues = Hues::of(
-        &velocity.short("m/s"),
-        points.iter().map(|point| point.drive_velocity),
-        |value| velocity.setting(value),
-    );
+    let velocities = ascending(points.iter().map(|point| point.drive_velocity));
+    let digits = Digits::THREE.distinguishing(&velocities);
+    let hues = Hues::of(&velocity.short("m/s"), velocities.into_iter(), |value| {
+        velocity.setting(value, digits)
+    });
     let mut entries: Vec<Entry> = hues.entries(3.0, |value| phased.contains(&value));
     if hues.bar().is_some() {
         entries.push(entry(

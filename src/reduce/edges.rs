@@ -16,7 +16,7 @@ use super::gather::{Gathered, each_chosen};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
 use crate::results::{Results, ResultsError};
-use crate::sweep::{AllButSeed, Refinement, Statistic, Sweep, label, three_digits};
+use crate::sweep::{AllButSeed, Digits, Refinement, Statistic, Sweep, label};
 use crate::table::columns::{Interval, columns, tables};
 use crate::table::value::words;
 use std::collections::BTreeMap;
@@ -73,7 +73,7 @@ impl EdgeRow {
             Some((_, n)) => format!("share of n = {n} is"),
             None => format!("{} =", label(&self.statistic).symbol),
         };
-        format!("{what} {}", three_digits(self.threshold))
+        format!("{what} {}", Digits::THREE.number(self.threshold))
     }
 }
 

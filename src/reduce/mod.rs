@@ -40,7 +40,7 @@ pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
-pub use swept::{Swept, ascending, differing, has_even_steps, is_same, swept};
+pub use swept::{Swept, ascending, differing, has_even_steps, is_same, is_spread, swept};
 pub use values::{FREQUENCY, Values, set_columns, sets_where};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

@@ -5,12 +5,14 @@ use super::SetRow;
 use super::values::{FREQUENCY, Values};
 use crate::model::Symbol;
 
-/// Numbers that differ by less than this share are one: they were computed from others.
-const SAME: f64 = 1e-9;
+/// Numbers that differ by less than this share are one: they were computed from others, which have twelve digits.
+const SAME: f64 = 1e-10;
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
 const EVEN: f64 = 0.02;
 /// Ratio from which two values lie on a logarithmic axis.
 const WIDE: f64 = 9.0;
+/// Ratio of the ends up to which no axis is logarithmic: values would fall on one place.
+const NARROW: f64 = 1.1;
 
 /// A parameter in which sets differ. The period is there as whichever was swept: 1/T, η or T.
 #[derive(Clone, Debug)]
@@ -39,7 +41,7 @@ impl Swept {
         };
         let is_even =
             has_even_steps(&self.distinct) && (self.distinct.len() > 2 || largest < WIDE * least);
-        !self.values.is_worded() && least > 0.0 && !is_even
+        !self.values.is_worded() && is_spread(&self.distinct) && !is_even
     }
 
     /// Whether each of its values goes with one of another: both have few values, or both ascend.
@@ -117,6 +119,11 @@ pub fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 pub fn is_same(value: f64, other: f64) -> bool {
     (value - other).abs() <= SAME * value.abs()
+}
+
+/// Whether values that ascend are > 0 and so far apart that a logarithmic axis shows them.
+pub fn is_spread(values: &[f64]) -> bool {
+    matches!(values, [least, .., largest] if *least > 0.0 && *largest > NARROW * least)
 }
 
 /// Whether values that ascend have even steps.

@@ -1,8 +1,11 @@
 //! Columns of the sets by name, or formulas of them, as numbers: for figures, and for tables that people read.
 
 use super::SetRow;
-use crate::sweep::{Expression, Label, label, nearest};
+use super::swept::ascending;
+use crate::model::Symbol;
+use crate::sweep::{Digits, Expression, Label, label, nearest};
 use crate::table::columns::{Column, Kind, Row, Value, columns};
+use std::collections::BTreeSet;
 
 pub const FREQUENCY: &str = "frequency";
 
@@ -142,11 +145,26 @@ impl Values {
         )
     }
 
+    /// Those that tell its values apart if it is a parameter; of others their intervals say how many count.
+    pub fn digits(&self) -> Digits {
+        let name = &*self.column.name;
+        let numbers = self.numbers.iter().flatten().copied();
+        if name != Symbol::T.key() && Symbol::from_key(name).is_some() {
+            let bits: BTreeSet<u64> = numbers.map(f64::to_bits).collect();
+            let distinct: Vec<f64> = bits.into_iter().map(f64::from_bits).collect();
+            Digits::THREE.distinguishing(&distinct)
+        } else if [Symbol::T.key(), FREQUENCY, "eta"].contains(&name) {
+            Digits::THREE.distinguishing(&ascending(numbers))
+        } else {
+            Digits::THREE
+        }
+    }
+
     /// Its symbol and one of its values or words.
     pub fn setting(&self, value: f64) -> String {
         let label = self.label();
         self.word(value).map_or_else(
-            || label.setting(value),
+            || label.setting(value, self.digits()),
             |word| format!("{}: {word}", label.symbol),
         )
     }

@@ -28,9 +28,10 @@ class Axis {
     if (this.whole) step = Math.max(1, Math.round(step));
     const ticks = [];
     for (let k = Math.ceil(this.low / step); k * step <= this.high && ticks.length < 40; k++) {
-      ticks.push([k * step, number(k * step, 6)]);
+      ticks.push(k * step);
     }
-    return ticks;
+    const digits = distinguishing(ticks, 6);
+    return ticks.map((tick) => [tick, number(tick, digits)]);
   }
 
   logTicks(room) {

@@ -47,12 +47,14 @@ function colouring(report, name) {
   }
   const axis = new Axis({ label: "", log: low > 0 && high / low > 30, low, high });
   const steps = 24;
+  const ends = Array.from({ length: steps + 1 }, (_, k) => column.factor * axis.value(k / steps));
+  const digits = distinguishing(ends.filter((_, k) => k % 6 === 0), 3);
   values.forEach(
     (value, set) => (group[set] = value === null ? steps : Math.min(steps - 1, Math.floor(axis.place(value) * steps))),
   );
   const legend = (k) =>
     k % 6 === 0 || k === steps - 1
-      ? `${k ? "" : `${short(column)}: `}${number(column.factor * axis.value(k === steps - 1 ? 1 : k / steps), 3)}`
+      ? `${k ? "" : `${short(column)}: `}${number(ends[k === steps - 1 ? steps : k], digits)}`
       : "";
   return { group, groups: [...Array.from({ length: steps }, (_, k) => [gradient(k / (steps - 1)), legend(k)]), none] };
 }

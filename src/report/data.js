@@ -38,11 +38,20 @@ function duration(seconds) {
 /** Symbol and unit of a column, as figures name it in short. */
 const short = ({ symbol, unit }) => (unit ? `${symbol} (${unit})` : symbol);
 
+/** Digits with which no two of these values look alike; those that differ by rounding are one. */
+function distinguishing(values, least) {
+  const distinct = (digits) => new Set(values.map((value) => value?.toPrecision(digits))).size;
+  const all = distinct(10);
+  let digits = least;
+  while (digits < 10 && distinct(digits) < all) digits++;
+  return digits;
+}
+
 /** A value of a column in the unit of its label, without that unit. */
-function shownValue({ values, factor = 1, kind }, place, digits = 4) {
+function shownValue({ values, factor = 1, kind, digits = 4 }, place, least = 4) {
   const value = values[place];
   if (kind === "flag") return value ? "yes" : "no";
-  return typeof value === "number" ? number(factor * value, digits) : number(value);
+  return typeof value === "number" ? number(factor * value, Math.max(digits, least)) : number(value);
 }
 
 const withUnit = (column, place) => `${shownValue(column, place)} ${column.unit}`.trim();
@@ -83,6 +92,9 @@ class Report {
     this.readSlips();
     useInks(content);
     const parameters = this.parameters.map((key) => this.columns.get(key));
+    for (const column of [...parameters, this.columns.get("eta"), this.columns.get("frequency")]) {
+      if (column && isNumeric(column)) column.digits = distinguishing(column.values, 4);
+    }
     const isSwept = ({ values }) => new Set(values).size > 1;
     this.swept = parameters.filter(isSwept);
     this.fixed = parameters.filter((parameter) => !isSwept(parameter));

@@ -308,7 +308,7 @@ class Explorer {
     for (let set = 0; set < at.length; set++) {
       if (this.setGroup[set] === HIDDEN || at[set] === null || up[set] === null) continue;
       // Numbers that were computed from others differ by rounding.
-      const key = others.map((values) => number(values[set], 6)).join();
+      const key = others.map((values) => number(values[set], 10)).join();
       lines.set(key, [...(lines.get(key) ?? []), set]);
     }
     const many = [...lines.values()].filter((line) => line.length > 1);

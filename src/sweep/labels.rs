@@ -3,6 +3,7 @@
 use super::set::SetRow;
 use crate::model::{Description, Symbol};
 use crate::table::columns::Row;
+use std::collections::HashSet;
 
 /// Column, symbol, and what it is where its meaning does not say so in a few words.
 const LABELS: [(&str, &str, &str); 31] = [
@@ -70,6 +71,9 @@ const LABELS: [(&str, &str, &str); 31] = [
         "Mean speed of slow fronts",
     ),
 ];
+
+/// Digits that tell all doubles apart.
+const MAX_DIGITS: usize = 17;
 
 /// Longest meaning, in bytes, that is what a column is in a few words.
 const LONGEST: usize = 40;
@@ -188,15 +192,19 @@ impl Label {
     }
 
     /// The symbol and a value, in the unit in which it is read best.
-    pub fn setting(&self, value: f64) -> String {
+    pub fn setting(&self, value: f64, digits: Digits) -> String {
         let (factor, unit) = if value == 0.0 {
             (1.0, "")
         } else {
             self.scale(value.abs())
         };
-        format!("{} = {} {unit}", self.symbol, typeset(factor * value))
-            .trim_end()
-            .to_owned()
+        format!(
+            "{} = {} {unit}",
+            self.symbol,
+            digits.typeset(factor * value)
+        )
+        .trim_end()
+        .to_owned()
     }
 }
 
@@ -233,27 +241,49 @@ pub fn capitalised(text: &str) -> String {
     })
 }
 
-/// Three digits, without those that say nothing.
-pub fn three_digits(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    // Through the decimal form, so that 29.000000000000004 is 29.
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    if (1e-3..1e5).contains(&rounded.abs()) {
-        rounded.to_string()
-    } else {
-        format!("{rounded:e}")
-    }
-}
+/// The significant digits with which people read the values of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Digits(usize);
 
-/// The same as in print: with a power of ten that is one, and a minus that is no hyphen.
-pub fn typeset(value: f64) -> String {
-    match three_digits(value).split_once('e') {
-        Some((mantissa, power)) => {
-            power_of_ten(mantissa.parse().unwrap_or(1.0), power.parse().unwrap_or(0))
+impl Digits {
+    pub const THREE: Self = Self(3);
+    pub const FOUR: Self = Self(4);
+
+    /// At least as many, and enough that no two of these values look alike, which differ.
+    pub fn distinguishing(self, values: &[f64]) -> Self {
+        let differ = |digits: &usize| {
+            let shown = values
+                .iter()
+                .map(|value| Self(*digits).rounded(*value).to_bits());
+            shown.collect::<HashSet<_>>().len() == values.len()
+        };
+        Self((self.0..MAX_DIGITS).find(differ).unwrap_or(MAX_DIGITS))
+    }
+
+    /// Through the decimal form, so that 29.000000000000004 is 29.
+    fn rounded(self, value: f64) -> f64 {
+        format!("{value:.*e}", self.0 - 1).parse().unwrap_or(value)
+    }
+
+    /// A value without digits that say nothing.
+    pub fn number(self, value: f64) -> String {
+        let rounded = self.rounded(value);
+        if rounded == 0.0 || (1e-3..1e5).contains(&rounded.abs()) {
+            (rounded + 0.0).to_string()
+        } else {
+            format!("{rounded:e}")
         }
-        None => three_digits(value).replace('-', "−"),
+    }
+
+    /// The same as in print: with a power of ten that is one, and a minus that is no hyphen.
+    pub fn typeset(self, value: f64) -> String {
+        let number = self.number(value);
+        match number.split_once('e') {
+            Some((mantissa, power)) => {
+                power_of_ten(mantissa.parse().unwrap_or(1.0), power.parse().unwrap_or(0))
+            }
+            None => number.replace('-', "−"),
+        }
     }
 }
 
@@ -313,7 +343,7 @@ mod tests {
             ("V0", 1e-4),
             ("T_to", 0.01),
         ];
-        let settings = settings.map(|(column, value)| label(column).setting(value));
+        let settings = settings.map(|(column, value)| label(column).setting(value, Digits::THREE));
         assert_eq!(
             settings,
             [
@@ -324,6 +354,31 @@ mod tests {
                 "Tₜₒ = 10 ms"
             ]
         );
+    }
+
+    #[test]
+    fn values_have_three_digits_or_as_many_as_distinguish_them() {
+        let shown = |values: &[f64]| {
+            let digits = Digits::THREE.distinguishing(values);
+            let number = |value: &f64| [digits.number(*value), digits.typeset(*value)];
+            values.iter().map(number).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            shown(&[29.000000000000004, 0.0]),
+            [["29", "29"], ["0", "0"]]
+        );
+        assert_eq!(
+            shown(&[1e-4, 1.0002e-4, -2e-4]),
+            [
+                ["1e-4", "10⁻⁴"],
+                ["1.0002e-4", "1.0002·10⁻⁴"],
+                ["-2e-4", "−2·10⁻⁴"]
+            ]
+        );
+        assert_eq!(shown(&[4e7, 4.0004e7])[1], ["4.0004e7", "4.0004·10⁷"]);
+        let neighbours = [0.3, 0.3_f64.next_up()];
+        assert_eq!(shown(&neighbours)[1][0], "0.30000000000000004");
+        assert_eq!(shown(&[-0.0])[0][0], "0");
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub use cost::predicted_cost;
 pub use expression::{Expression, ExpressionError};
 pub use grid::Sweep;
 pub use job::{Identity, Job};
-pub use labels::{Label, capitalised, label, power_of_ten, symbol_of, three_digits, typeset};
+pub use labels::{Digits, Label, capitalised, label, power_of_ten, symbol_of};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{
     Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
