@@ -113,6 +113,9 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     output::warn(&sweep.warnings());
     let default = changes.is_empty().then(|| Layout::default_root(&sweep));
     let root = arguments.out.clone().or(default);
+    if let Some(root) = &root {
+        sweep::warn_of_partitions(root, &sweep);
+    }
     let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let wall_time = totals.cost / threads as f64;

@@ -89,6 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
     let (sweep, root) = arguments.sweep_and_root()?;
     output::warn(&sweep.warnings());
+    sweep::warn_of_partitions(&root, &sweep);
     let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
     let options = Options {
         threads: threads.count,

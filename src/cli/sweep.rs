@@ -1,12 +1,16 @@
 //! The sweep that a command is about: a file, or a preset, one of the files of the folder `sweeps/`.
 
 use super::exit::UsageError;
+use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
+use crate::results::tables::{recorded_schema, tables_of};
 use crate::simulate as single;
 use crate::sweep::{Change, Sweep, SweepError, varied};
+use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
+use arrow_schema::FieldRef;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use std::path::Path;
@@ -135,6 +139,28 @@ pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> 
         (None, None) => return of_flags(&single::sweep_text(changes)),
     };
     vary(sweep?, changes)
+}
+
+/// Warns of a folder in the path of a results directory whose name DuckDB takes for the value of a column in all rows.
+pub fn warn_of_partitions(root: &Path, sweep: &Sweep) {
+    let is_column = |name: &str| {
+        let mut schemas =
+            tables_of(sweep.recording()).map(|table| recorded_schema(table, sweep.recording()));
+        let is_it = |field: &FieldRef| field.name().eq_ignore_ascii_case(name);
+        schemas.any(|schema| schema.fields().iter().any(is_it))
+    };
+    let path = std::path::absolute(root).unwrap_or_default();
+    let names = path
+        .iter()
+        .filter_map(|folder| folder.to_str()?.split_once('='));
+    for (name, value) in names.filter(|(name, _)| is_column(name)) {
+        let folder = format!("{name}={value}");
+        output::warn(&[format!(
+            "{}: is read as a partition by DuckDB, which returns it as {name} of all rows; rename this folder of the \
+             path, or read with hive_partitioning = false",
+            shown(folder.as_ref())
+        )]);
+    }
 }
 
 /// A sweep as varied.

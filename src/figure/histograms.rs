@@ -6,10 +6,9 @@ use super::frame::{Frame, Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Place};
 use super::picture::{Anchor, Fill, Picture, Stroke};
-use super::sets::{digits, modulation, setting};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
 use crate::model::{Parameters, Symbol};
-use crate::reduce::{HistogramBin, SetRow, differing};
+use crate::reduce::{FREQUENCY, HistogramBin, SetRow, Values, differing};
 use crate::sweep::label;
 use kuva::render::color::Color;
 
@@ -161,26 +160,33 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
     });
     let mut others = differing(&shown.iter().copied());
     others.retain(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T));
-    let panel = |set: &SetRow| {
-        let settings = others
+    let names = [Symbol::Delta.key(), FREQUENCY].into_iter();
+    let names = names.chain(others.into_iter().map(Symbol::key));
+    let columns: Vec<Values> = names
+        .filter_map(|name| Values::of(sets, name).ok())
+        .collect();
+    let title = |set: &SetRow| {
+        let place = sets.iter().position(|other| std::ptr::eq(other, set));
+        let setting = |values: &Values| Some(values.setting(values.numbers[place?]?));
+        columns
             .iter()
-            .map(|&symbol| setting(&set.parameters, symbol, digits(&shown, symbol)));
+            .filter_map(setting)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let panel = |set: &SetRow| {
         let twin = identical
             .iter()
             .find(|twin| !is_identical(&set) && is_twin(twin, set));
         Panel {
-            title: std::iter::once(modulation(set, &shown))
-                .chain(settings)
-                .collect::<Vec<_>>()
-                .join(", "),
+            title: title(set),
             bars: bars(set),
             overlay: twin.map(|twin| bars(twin)),
             period: set.parameters.modulation_period,
         }
     };
     shown
-        .iter()
-        .copied()
+        .into_iter()
         .map(panel)
         .filter(|panel| panel.all_bars().next().is_some())
         .collect()
@@ -256,6 +262,7 @@ mod tests {
         };
         SetRow {
             set_id: id.to_owned(),
+            frequency,
             parameters: Selected::new(parameters),
             ..SetRow::default()
         }

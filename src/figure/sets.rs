@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use crate::model::{Parameters, Symbol, Value};
-use crate::reduce::{FREQUENCY, SetRow, Swept, ascending, has_even_steps, is_spread};
+use crate::reduce::{FREQUENCY, SetRow, Swept, has_even_steps, is_spread};
 use crate::sweep::{Digits, label, symbol_of};
 
 /// T, or 1/T if its steps are even and those of T are not.
@@ -16,29 +16,10 @@ pub(super) fn period_column(sets: &[SetRow]) -> &'static str {
     }
 }
 
-/// Amplitude and frequency of the modulation of one of these sets, in symbols.
-pub(super) fn modulation(set: &SetRow, all: &[&SetRow]) -> String {
-    let amplitude = setting(&set.parameters, Symbol::Delta, digits(all, Symbol::Delta));
-    let frequency = set.parameters.modulation_period.map(|period| {
-        let frequency = label(FREQUENCY).setting(1.0 / period, digits(all, Symbol::T));
-        format!(", {frequency}")
-    });
-    amplitude + &frequency.unwrap_or_default()
-}
-
-/// The digits that distinguish a parameter of these sets, or the frequency where it is the period.
-pub(super) fn digits(sets: &[&SetRow], symbol: Symbol) -> Digits {
-    let values = sets.iter().map(|set| match symbol {
-        Symbol::T => set.frequency,
-        _ => set.parameters.get(symbol).number(),
-    });
-    Digits::THREE.distinguishing(&ascending(values.flatten()))
-}
-
 /// A parameter and its value, in symbols.
-pub(super) fn setting(parameters: &Parameters, symbol: Symbol, digits: Digits) -> String {
+fn setting(parameters: &Parameters, symbol: Symbol) -> String {
     match parameters.get(symbol) {
-        Value::Real(real) => label(symbol.key()).setting(real, digits),
+        Value::Real(real) => label(symbol.key()).setting(real, Digits::THREE),
         value => format!("{} = {value}", symbol_of(symbol)),
     }
 }
@@ -70,7 +51,7 @@ pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
     let settings = Symbol::ALL
         .into_iter()
         .filter(is_shown)
-        .map(|symbol| setting(first, symbol, Digits::THREE));
+        .map(|symbol| setting(first, symbol));
     // Lines are not broken within one.
     settings
         .map(|setting| setting.replace(' ', "\u{a0}"))

@@ -5,7 +5,6 @@ use super::swept::ascending;
 use crate::model::Symbol;
 use crate::sweep::{Digits, Expression, Label, label, nearest};
 use crate::table::columns::{Column, Kind, Row, Value, columns};
-use std::collections::BTreeSet;
 
 pub const FREQUENCY: &str = "frequency";
 
@@ -145,18 +144,16 @@ impl Values {
         )
     }
 
-    /// Those that tell its values apart if it is a parameter; of others their intervals say how many count.
+    /// Those that distinguish its values if it is a parameter, or computed from such: of others, intervals say how many count.
     pub fn digits(&self) -> Digits {
         let name = &*self.column.name;
         let numbers = self.numbers.iter().flatten().copied();
-        if name != Symbol::T.key() && Symbol::from_key(name).is_some() {
-            let bits: BTreeSet<u64> = numbers.map(f64::to_bits).collect();
-            let distinct: Vec<f64> = bits.into_iter().map(f64::from_bits).collect();
-            Digits::THREE.distinguishing(&distinct)
-        } else if [Symbol::T.key(), FREQUENCY, "eta"].contains(&name) {
-            Digits::THREE.distinguishing(&ascending(numbers))
-        } else {
-            Digits::THREE
+        match name {
+            "T" | "eta" | FREQUENCY => Digits::THREE.distinguishing(&ascending(numbers)),
+            _ if Symbol::from_key(name).is_some() => {
+                Digits::THREE.distinguishing(&Vec::from_iter(numbers))
+            }
+            _ => Digits::THREE,
         }
     }
 

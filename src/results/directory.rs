@@ -150,6 +150,15 @@ impl<'a> Results<'a> {
             );
         }
         found.refuse(&differences, &way_out)?;
+        if !found.is_of(sweep) {
+            let done = found.done_parts()?.0;
+            let has_results = |number| done.iter().any(|part| part.extension == number);
+            let known = (0..found.extensions.len()).filter(|number| has_results(*number));
+            let twin = |number: usize| sweep.twin_of(&found.extensions[number].sweep);
+            if let Some(problem) = known.into_iter().find_map(twin) {
+                return Err(ResultsError::refused(layout.root(), problem));
+            }
+        }
         Ok(found)
     }
 

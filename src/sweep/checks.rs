@@ -9,8 +9,10 @@ use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
 use super::set::Statistic;
-use super::source::{Refused, Section, Source, all};
+use super::source::{Refused, Section, Source};
 use crate::model::Symbol;
+use crate::model::theory::typical_interval;
+use crate::observe::Recording;
 use crate::solver::{Resolve, Solver};
 use crate::table::value::Shortest;
 use std::ops::RangeInclusive;
@@ -82,8 +84,13 @@ impl<'a> Places<'a> {
 /// each, and longer where earlier sweeps of the directory are asked for them: seconds, in which nothing needs to be watched.
 const MAX_POINTS: u64 = 10_000_000;
 
-/// All checks of a sweep that is read.
-pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), Refused> {
+/// All checks of a sweep that is read. What is new in this program is asked of a new one only.
+pub(super) fn whole(
+    sweep: &Sweep,
+    file: &Section<'_>,
+    places: &Places<'_>,
+    is_new: bool,
+) -> Result<(), Refused> {
     let points = sweep
         .axes
         .iter()
@@ -100,12 +107,18 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
         return Err(file.source.refuse(file.place_of("axes"), problem));
     }
     modulation(sweep, file, places)?;
+    if let Some((quantity, problem)) = sweep.twins().filter(|_| is_new) {
+        return Err(places.refuse(quantity, problem));
+    }
+    let problem_at = |point: &Point| {
+        invalid(point).or_else(|| too_slow(point, &sweep.recording).filter(|_| is_new))
+    };
     if sweep
         .points_of_one_seed()
-        .any(|point| invalid(&point).is_some())
+        .any(|point| problem_at(&point).is_some())
         && let Some(((quantity, problem), point)) = sweep
             .admitted(0..sweep.point_count())
-            .find_map(|(_, point)| Some((invalid(&point)?, point)))
+            .find_map(|(_, point)| Some((problem_at(&point)?, point)))
     {
         return Err(places.refuse(quantity, problem + &place(sweep, &point)));
     }
@@ -136,34 +149,6 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
         .solver
         .check(&first.parameters)
         .map_err(|error| file.source.refuse(time_step, error.to_string()))
-}
-
-/// What a sweep that begins is refused, and one that a results directory holds is not.
-pub(super) fn of_new(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
-    seeds_of_rounds(sweep, file)
-}
-
-/// Rounds count the seeds that a set has, so a condition must not leave some of them out.
-fn seeds_of_rounds(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
-    let (Some(rounds), Some(entry)) = (&sweep.rounds, file.entry("where")) else {
-        return Ok(());
-    };
-    let section = if rounds.refinement.is_some() {
-        "[refine]"
-    } else {
-        "[precision]"
-    };
-    let conditions = entry.list().unwrap_or_else(|| vec![entry]);
-    all(conditions.iter().zip(&sweep.conditions).map(|(entry, condition)| {
-        if condition.names().contains(&&Quantity::Parameter(Symbol::Seed)) {
-            return Err(entry.refuse(format!(
-                "names seed, and {section} chooses the seeds of each set; remove it, and choose the first seed by \
-                 seeds = {{ first = .., from = .., to = .. }} in {section}"
-            )));
-        }
-        Ok(())
-    }))
-    .map(drop)
 }
 
 /// Drive velocity in m/s from which a slip of microseconds would be driven through: micrometres per second were meant.
@@ -278,6 +263,30 @@ fn invalid(point: &Point) -> Option<(Quantity, String)> {
     }
     let error = point.parameters.check_rules().err()?;
     Some((Quantity::Parameter(error.symbol), error.to_string()))
+}
+
+/// Share of the wave crossing time, which separates ruptures, to which the times of a job must be known.
+const RESOLUTION: f64 = 1e-3;
+
+/// A drive so slow that the doubles which hold the time of a job do not resolve its slips.
+fn too_slow(point: &Point, recording: &Recording) -> Option<(Quantity, String)> {
+    let parameters = &point.parameters;
+    let slips = recording.slips as f64 + recording.discard as f64;
+    let time = slips * typical_interval(parameters);
+    let longest = RESOLUTION * parameters.wave_crossing_time() / f64::EPSILON;
+    if time.min(recording.max_time.unwrap_or(f64::INFINITY)) <= longest {
+        return None;
+    }
+    let problem = format!(
+        "V0 = {}: {slips} slips take {time:.1e} s, a time that is known to {:.0e} s, too coarse for fronts that cross the \
+         slider in {:.0e} s; write V0 = {:.2e} or more, fewer slips, or a max_time",
+        Shortest(parameters.drive_velocity),
+        time * f64::EPSILON,
+        parameters.wave_crossing_time(),
+        // Rounded up.
+        1.005 * parameters.drive_velocity * time / longest,
+    );
+    Some((Quantity::Parameter(Symbol::V0), problem))
 }
 
 /// Where a point lies on the axes, and the way out.

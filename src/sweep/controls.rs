@@ -13,17 +13,9 @@ use std::ops::RangeInclusive;
 
 impl Quantity {
     /// Whether it means nothing without modulation, or is the amplitude.
-    fn is_of_modulation(self) -> bool {
-        let symbols = [
-            Symbol::Delta,
-            Symbol::DeltaTo,
-            Symbol::TTo,
-            Symbol::RampTime,
-        ];
-        self.is_period()
-            || symbols
-                .into_iter()
-                .any(|symbol| self == Self::Parameter(symbol))
+    pub(super) fn is_of_modulation(self) -> bool {
+        use Symbol::{Delta, DeltaTo, RampTime, TTo};
+        self.is_period() || matches!(self, Self::Parameter(Delta | DeltaTo | TTo | RampTime))
     }
 }
 

@@ -42,68 +42,30 @@ const COMPARISON: u8 = 3;
 const SUM: u8 = 4;
 const PRODUCT: u8 = 5;
 
+const fn operator(sign: &'static str, precedence: u8, combine: fn(f64, f64) -> f64) -> Operator {
+    Operator {
+        sign,
+        precedence,
+        combine,
+    }
+}
+
 const OPERATORS: [Operator; 12] = [
-    Operator {
-        sign: "or",
-        precedence: OR,
-        combine: f64::max,
-    },
-    Operator {
-        sign: "and",
-        precedence: AND,
-        combine: f64::min,
-    },
-    Operator {
-        sign: "<",
-        precedence: COMPARISON,
-        combine: |a, b| f64::from(a < b),
-    },
-    Operator {
-        sign: "<=",
-        precedence: COMPARISON,
-        combine: |a, b| f64::from(a <= b),
-    },
-    Operator {
-        sign: ">",
-        precedence: COMPARISON,
-        combine: |a, b| f64::from(a > b),
-    },
-    Operator {
-        sign: ">=",
-        precedence: COMPARISON,
-        combine: |a, b| f64::from(a >= b),
-    },
-    Operator {
-        sign: "==",
-        precedence: COMPARISON,
-        combine: |a, b| f64::from(a == b),
-    },
+    operator("or", OR, f64::max),
+    operator("and", AND, f64::min),
+    operator("<", COMPARISON, |a, b| f64::from(a < b)),
+    operator("<=", COMPARISON, |a, b| f64::from(a <= b)),
+    operator(">", COMPARISON, |a, b| f64::from(a > b)),
+    operator(">=", COMPARISON, |a, b| f64::from(a >= b)),
+    operator("==", COMPARISON, |a, b| f64::from(a == b)),
     // Not `a != b`, which holds for what is no number.
-    Operator {
-        sign: "!=",
-        precedence: COMPARISON,
-        combine: |a, b| f64::from(a.partial_cmp(&b).is_some_and(Ordering::is_ne)),
-    },
-    Operator {
-        sign: "+",
-        precedence: SUM,
-        combine: |a, b| a + b,
-    },
-    Operator {
-        sign: "-",
-        precedence: SUM,
-        combine: |a, b| a - b,
-    },
-    Operator {
-        sign: "*",
-        precedence: PRODUCT,
-        combine: |a, b| a * b,
-    },
-    Operator {
-        sign: "/",
-        precedence: PRODUCT,
-        combine: |a, b| a / b,
-    },
+    operator("!=", COMPARISON, |a, b| {
+        f64::from(a.partial_cmp(&b).is_some_and(Ordering::is_ne))
+    }),
+    operator("+", SUM, |a, b| a + b),
+    operator("-", SUM, |a, b| a - b),
+    operator("*", PRODUCT, |a, b| a * b),
+    operator("/", PRODUCT, |a, b| a / b),
 ];
 
 /// What is wrong with an expression, and where.

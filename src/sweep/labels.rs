@@ -249,15 +249,17 @@ impl Digits {
     pub const THREE: Self = Self(3);
     pub const FOUR: Self = Self(4);
 
-    /// At least as many, and enough that no two of these values look alike, which differ.
+    /// At least as many, and enough that no two of these values look alike unless they are the same.
     pub fn distinguishing(self, values: &[f64]) -> Self {
-        let differ = |digits: &usize| {
+        let distinct = |digits| {
             let shown = values
                 .iter()
-                .map(|value| Self(*digits).rounded(*value).to_bits());
-            shown.collect::<HashSet<_>>().len() == values.len()
+                .map(|value| Self(digits).rounded(*value).to_bits());
+            shown.collect::<HashSet<_>>().len()
         };
-        Self((self.0..MAX_DIGITS).find(differ).unwrap_or(MAX_DIGITS))
+        let all = distinct(MAX_DIGITS);
+        let enough = (self.0..MAX_DIGITS).find(|digits| distinct(*digits) == all);
+        Self(enough.unwrap_or(MAX_DIGITS))
     }
 
     /// Through the decimal form, so that 29.000000000000004 is 29.
@@ -278,12 +280,13 @@ impl Digits {
     /// The same as in print: with a power of ten that is one, and a minus that is no hyphen.
     pub fn typeset(self, value: f64) -> String {
         let number = self.number(value);
-        match number.split_once('e') {
+        let typeset = match number.split_once('e') {
             Some((mantissa, power)) => {
                 power_of_ten(mantissa.parse().unwrap_or(1.0), power.parse().unwrap_or(0))
             }
-            None => number.replace('-', "−"),
-        }
+            None => number,
+        };
+        typeset.replace('-', "−")
     }
 }
 

@@ -8,6 +8,7 @@
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
 //! set.rs: what is known of a set; labels.rs: how it is called before people
+//! twins.rs: values that differ in the last digits alone
 //! variation.rs: a file with other values, as text
 //! ```
 //!
@@ -35,6 +36,7 @@ mod set;
 mod source;
 #[cfg(test)]
 mod tests;
+mod twins;
 mod variation;
 
 pub use cost::predicted_cost;

@@ -14,7 +14,7 @@ use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{MAX_SETS, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
-use crate::model::Parameters;
+use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver, TOLERANCES};
 use crate::table::storage::{Disk, Storage};
@@ -101,9 +101,10 @@ fn read(source: &Source<'_>, is_new: bool) -> Result<Sweep, Refused> {
         let problem = "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
         source.refuse(precision.at, problem);
     }
+    let rounds = file.entry(key).filter(|_| is_new).map(|_| title);
     let conditions = file
         .entry("where")
-        .map_or(Ok(Vec::new()), |entry| read_conditions(&entry));
+        .map_or(Ok(Vec::new()), |entry| read_conditions(&entry, rounds));
     let recording = read_section(&file, "record", "[record]", read_recording);
     let solver = read_section(&file, "solver", "[solver]", read_solver);
     source.passed()?;
@@ -143,10 +144,7 @@ fn read(source: &Source<'_>, is_new: bool) -> Result<Sweep, Refused> {
         controls: None,
     };
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
-    checks::whole(&sweep, &file, &places)?;
-    if is_new {
-        checks::of_new(&sweep, &file)?;
-    }
+    checks::whole(&sweep, &file, &places, is_new)?;
     if let Some(Rounds { seeds, .. }) = &sweep.rounds {
         let sets = sweep.first_sets().len() as u64;
         if sets > MAX_SETS {
@@ -246,7 +244,18 @@ fn read_model(
     Ok((parameters, period))
 }
 
-fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Expression<Quantity>>, Refused> {
+/// Reads the conditions; `rounds` is the section that chooses the seeds, if there is one.
+fn read_conditions(
+    entry: &Entry<'_>,
+    rounds: Option<&str>,
+) -> Result<Vec<Expression<Quantity>>, Refused> {
+    let quantity = |name: &str| match (Quantity::comparable(name)?, rounds) {
+        (Quantity::Parameter(Symbol::Seed), Some(section)) => Err(format!(
+            "seed is chosen by {section}; leave it out of conditions, and begin at another seed by \
+             seeds = {{ first = .., from = .., to = .. }}"
+        )),
+        (quantity, _) => Ok(quantity),
+    };
     all(entry
         .list()
         .unwrap_or_else(|| vec![*entry])
@@ -257,8 +266,7 @@ fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Expression<Quantity>>, Refus
                     "a condition in quotes, or a list of them, such as where = \"frequency < 500\"",
                 )
             })?;
-            Expression::condition(text, &Quantity::comparable)
-                .map_err(|error| entry.refuse(error.to_string()))
+            Expression::condition(text, &quantity).map_err(|error| entry.refuse(error.to_string()))
         }))
 }
 

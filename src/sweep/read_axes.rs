@@ -89,8 +89,7 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refus
         let (value, at) = values[later];
         let (earlier, later) = (earlier + 1, later + 1);
         let problem = format!(
-            "{} = {value}: repeats value {earlier} of this axis, or nearly, as value {later}; \
-             keep one, or take fewer points",
+            "{} = {value}: repeats value {earlier} of this axis as value {later}; keep one, or take fewer points",
             entry.key
         );
         entry.source.refuse(at, problem)

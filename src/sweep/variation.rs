@@ -22,16 +22,11 @@ const RIVALS: [&[&str]; 3] = [
     &["relative", "absolute"],
     &["seed", "seeds"],
 ];
-/// What has no effect without modulation.
-const OF_MODULATION: [&str; 7] = [
-    "T",
-    "eta",
-    "frequency",
-    "ramp_time",
-    "T_to",
-    "Delta_to",
-    "control",
-];
+/// Whether a key has no effect without modulation.
+fn is_of_modulation(key: &str) -> bool {
+    let quantity = Quantity::from_key(key).filter(|_| key != "Delta");
+    key == "control" || quantity.is_some_and(Quantity::is_of_modulation)
+}
 
 impl Change {
     /// A key with one value. The sweep file's reader refuses what is unknown, in the section of what it is nearest to.
@@ -142,8 +137,7 @@ pub fn varied(text: &str, changes: &[Change]) -> String {
                         .iter()
                         .any(|keys| keys.contains(&new) && keys.contains(&key))
             };
-            changes.iter().any(|change| replaces(&*change.key))
-                || is_still && OF_MODULATION.contains(&key)
+            changes.iter().any(|change| replaces(&*change.key)) || is_still && is_of_modulation(key)
         };
         let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
         for key in keys.iter().filter(|key| goes(key) && !stays(key)) {

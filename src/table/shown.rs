@@ -36,10 +36,15 @@ impl fmt::Display for Shown<'_> {
     }
 }
 
-/// Whether a terminal shows a character, and nothing else happens.
+/// Whether a terminal shows a character for what it is, and nothing else happens: neither one that turns the direction of
+/// writing, nor one that cannot be seen, or not be told from a space.
 pub fn is_plain(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    !c.is_control() && !turns
+    let has_no_width = matches!(
+        c,
+        '\u{ad}' | '\u{180e}' | '\u{200b}'..='\u{200d}' | '\u{2060}' | '\u{feff}'
+    );
+    !c.is_control() && !turns && !has_no_width && (c == ' ' || !c.is_whitespace())
 }
 
 /// A path in JSON, which holds texts alone: exact if it is UTF-8, else with `\xff` for each byte that is not.

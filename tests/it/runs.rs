@@ -644,3 +644,40 @@ fn a_plan_says_what_of_the_sweep_is_in_its_directory() {
         "a plan writes nothing"
     );
 }
+
+#[test]
+fn an_extension_with_a_value_that_differs_in_the_last_digits_is_refused() {
+    let folder = Folder::new();
+    let sweep = |values: &str| TINY.replace("[29, 58]", values);
+    folder.write("tiny.toml", &sweep("[29, 58]"));
+    folder.ends(0, "run tiny.toml --no-reduce");
+    let before = folder.contents("results/tiny");
+    folder.write("tiny.toml", &sweep("[29, 57.99999999999999]"));
+    for command in ["run tiny.toml", "run tiny.toml --out results/tiny"] {
+        let ended = folder.ends(2, command);
+        assert!(
+            ended.stderr.contains("write frequency = 58"),
+            "{}",
+            ended.stderr
+        );
+    }
+    let planned = folder.ends(0, "plan tiny.toml").stdout;
+    assert!(planned.contains("write frequency = 58"), "{planned}");
+    assert!(
+        folder.contents("results/tiny") == before,
+        "nothing was changed"
+    );
+    folder.write("tiny.toml", &sweep("[29, 57.9999, 58]"));
+    folder.ends(0, "run tiny.toml --no-reduce");
+    folder.write("tiny.toml", &sweep("[29, 58, 57.99999999999999]"));
+    let ended = folder.ends(2, "plan tiny.toml --out none");
+    assert!(
+        ended
+            .stderr
+            .contains("tiny.toml:7: frequency = 57.99999999999999: agrees with 58"),
+        "{}",
+        ended.stderr
+    );
+    let simulated = folder.ends(0, "simulate --set V0=0.30000000000000004 --time 1e-3");
+    assert!(simulated.stderr.is_empty() || simulated.stderr.contains("warning"));
+}

@@ -92,3 +92,22 @@ def test_every_table_folder_reads_without_options(results, table, rows):
     }
     assert len(shapes) == 1, shapes
     assert rows is None or shapes.pop()[0] == rows
+
+
+@pytest.mark.parametrize("folder, is_column", [("V0=9", True), ("v0=9", True), ("eta=2/deeper", True), ("run=3", False)])
+def test_a_folder_that_duckdb_takes_for_a_column_is_warned_of_and_the_documented_option_reads_it(
+    program, tmp_path, folder, is_column
+):
+    above = tmp_path / folder
+    above.mkdir(parents=True)
+    (above / "a.toml").write_text('name = "a"\n[model]\nN = 3\nNs = 2\n[record]\nslips = 3\n')
+    for command in (["plan", "a.toml", "-o", "r"], ["run", "a.toml", "-o", "r", "--no-reduce"]):
+        done = subprocess.run([program, *command], cwd=above, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+        assert ("hive_partitioning = false" in done.stderr) == is_column, done.stderr
+    files = f"{above}/r/tables/slips/*.parquet"
+    columns = 'V0, eta, "interval"'
+    plain = duckdb.sql(f"select {columns} from '{files}'").fetchall()
+    right = duckdb.sql(f"select {columns} from read_parquet('{files}', hive_partitioning = false)").fetchall()
+    assert (plain != right) == is_column, plain
+    assert [row[:2] for row in right] == [(1e-4, 0.0)] * 3

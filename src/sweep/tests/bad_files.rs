@@ -460,7 +460,7 @@ fn contradictions_and_settings_without_effect_are_refused_with_the_other_place()
         (
             "name = \"a\"\n[axes]\nDelta = [1]\neta = [1, 1.00000000000001]",
             4,
-            &["eta", "repeats value 1"],
+            &["eta", "agrees with 1 in twelve digits"],
         ),
         (
             "name = \"a\"\n[model]\ndfs = 2",
@@ -678,12 +678,50 @@ fn a_condition_on_seeds_that_rounds_choose_is_refused_at_its_line() {
             "V0 > 1 or -seed > 0 - 9",
         ] {
             let text = format!("name = \"a\"\nwhere = [\"V0 > 0\",\n\"{condition}\"]\n{rounds}");
-            let words = &["names seed", section, "seeds = { first = .., from"];
+            let words = &["seed is chosen by", section, "seeds = { first = .., from"];
             assert_refused(&[(&text, 3, words)]);
         }
         let text = format!("name = \"a\"\nwhere = \"V0 > 0\"\n{rounds}");
         Sweep::parse(&text, Path::new("good.toml")).unwrap();
     }
+}
+
+#[test]
+fn a_drive_whose_slips_the_clock_does_not_resolve_is_refused_with_the_least_that_works() {
+    let slow =
+        |velocity: &str, rest: &str| format!("name = \"a\"\n[model]\nV0 = {velocity}\n{rest}");
+    for rest in [
+        "",
+        "N = 1",
+        "K = 1e14",
+        "Kd = 1e3\n[record]\nslips = 4000",
+        "tau_r = 50",
+    ] {
+        let text = slow("1e-18", rest);
+        let [Mistake { line: 3, problem }] = &refused(&text)[..] else {
+            panic!("{text}");
+        };
+        let least = problem
+            .split("write V0 = ")
+            .nth(1)
+            .unwrap()
+            .split(' ')
+            .next()
+            .unwrap();
+        Sweep::parse(&slow(least, rest), Path::new("least.toml")).unwrap();
+        let below = 0.97 * least.parse::<f64>().unwrap();
+        refused(&slow(&format!("{below:e}"), rest));
+    }
+    let axis = "name = \"a\"\nwhere = \"V0 > 0\"\n[axes]\nV0 = [1e-4, 1e-18]\nN = [3]";
+    assert_refused(&[(axis, 4, &["V0 = 1e-18", "at the point V0 = 1e-18"])]);
+    for rest in [
+        "[record]\nmax_time = 1e3",
+        "[axes]\nN = [70]\n[record]\nmax_time = 1",
+    ] {
+        Sweep::parse(&slow("1e-18", rest), Path::new("short.toml")).unwrap();
+    }
+    let dropped = axis.replace("V0 > 0", "V0 > 1e-9");
+    Sweep::parse(&dropped, Path::new("dropped.toml")).unwrap();
 }
 
 #[test]

@@ -123,9 +123,9 @@ proptest! {
 
     #[test]
     fn numbers_in_a_file_are_read_to_their_last_bit(value in prop::num::f64::POSITIVE) {
-        let text = format!("[model]\nK = {}\n[axes]\nFN = [{value:?}]", Shortest(value));
+        let text = format!("[model]\nL = {}\n[axes]\nFN = [{value:?}]", Shortest(value));
         let parameters = sweep(&text).jobs().next().unwrap().parameters;
-        prop_assert_eq!(parameters.slider_stiffness.to_bits(), value.to_bits());
+        prop_assert_eq!(parameters.slider_length.to_bits(), value.to_bits());
         prop_assert_eq!(parameters.normal_force.to_bits(), value.to_bits());
     }
 
