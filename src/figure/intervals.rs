@@ -41,7 +41,7 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
     let few = "τ / T: up to 12 periods";
     let few = Axis::linear(few, 0.0, f64::from(LINES) + 0.5)
-        .with_ticks_at(few, &Vec::from_iter((0..=LINES).map(f64::from)));
+        .with_ticks_at(few, &(0..=LINES).map(f64::from).collect::<Vec<_>>());
 
     let phased = slips.iter().filter(|slip| slip.0.has_phase);
     let phased: Vec<f64> = phased.map(|slip| slip.0.drive_velocity).collect();

@@ -857,8 +857,8 @@ impl Asked<'_> {
         };
         let has_few = (2..=MAX_TICKS).contains(&self.column.distinct.len());
         if self.symbol.is_some() && self.limits == (None, None) && has_few {
-            let axis =
-                axis(&label, low, high).with_ticks_at(&label, &Vec::from_iter(self.distinct()));
+            let values: Vec<f64> = self.distinct().collect();
+            let axis = axis(&label, low, high).with_ticks_at(&label, &values);
             return Ok(axis.with_short_label(short_label));
         }
         let short_label = short_label.map(|label| axis(&label, low, high).label);

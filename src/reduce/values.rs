@@ -151,7 +151,7 @@ impl Values {
         match name {
             "T" | "eta" | FREQUENCY => Digits::THREE.distinguishing(&ascending(numbers)),
             _ if Symbol::from_key(name).is_some() => {
-                Digits::THREE.distinguishing(&Vec::from_iter(numbers))
+                Digits::THREE.distinguishing(&numbers.collect::<Vec<_>>())
             }
             _ => Digits::THREE,
         }

@@ -188,7 +188,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 self.report_long_jobs(under_way)?;
                 self.events.send(&RunEvent::Tick)?;
             }
-            let must_end = self.joined.must_end(self.walltime);
+            let must_end = self.joined.must_end();
             if must_end && !interrupt.swap(true, Ordering::Relaxed) {
                 self.events.send(&RunEvent::Stopping)?;
             }

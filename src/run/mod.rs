@@ -90,6 +90,7 @@ pub struct Joined<'a> {
     parts: &'a [Outline],
     member: &'a Member<'a>,
     begin: Instant,
+    walltime: Walltime,
     threads: usize,
     options: Options<'a>,
 }
@@ -123,6 +124,7 @@ pub fn join<T, E: From<ResultsError>>(
             parts: &parts,
             member,
             begin,
+            walltime: Walltime::new(begin, options.walltime),
             threads,
             options,
         })?;
@@ -144,7 +146,6 @@ impl Joined<'_> {
         self.results.sync_names()?;
         self.member.tidy()?;
         let (mut events, mut report) = (Events { log: None, display }, RunReport::default());
-        let walltime = Walltime::new(self.begin, self.options.walltime);
         let mut retry_failed = self.options.retry_failed;
         let mut round = (Cow::Borrowed(self.results), Cow::Borrowed(self.parts));
         loop {
@@ -154,7 +155,6 @@ impl Joined<'_> {
                 parts,
                 retry_failed,
                 kernel,
-                &walltime,
                 &mut events,
                 &mut report,
             )?;
@@ -163,7 +163,7 @@ impl Joined<'_> {
             if report.jobs_left > 0 {
                 break;
             }
-            if self.must_end(&walltime) && results.round().is_some_and(|round| !round.is_end()) {
+            if self.must_end() && results.round().is_some_and(|round| !round.is_end()) {
                 report.stopped = true;
                 break;
             }
@@ -184,8 +184,8 @@ impl Joined<'_> {
     }
 
     /// Whether a signal came, or the time is over.
-    fn must_end(&self, walltime: &Walltime) -> bool {
-        self.options.stop.load(Ordering::Relaxed) || walltime.is_over()
+    fn must_end(&self) -> bool {
+        self.options.stop.load(Ordering::Relaxed) || self.walltime.is_over()
     }
 
     /// Runs the parts that are there now: all, or those of the rounds so far.
@@ -195,7 +195,6 @@ impl Joined<'_> {
         parts: &[Outline],
         retry_failed: bool,
         kernel: &Kernel<'_>,
-        walltime: &Walltime,
         events: &mut Events<'_>,
         report: &mut RunReport,
     ) -> Result<(), ResultsError> {
@@ -245,7 +244,7 @@ impl Joined<'_> {
                     predicted_cost,
                 })?;
             }
-            let mut collector = Collector::new(self, &pending, walltime, events, report);
+            let mut collector = Collector::new(self, &pending, &self.walltime, events, report);
             let ended = loop {
                 match collector.run(kernel) {
                     Ok(true) => (),
@@ -258,7 +257,7 @@ impl Joined<'_> {
                             jobs: 1..,
                             has_abandoned: false,
                             ..
-                        }) if results.round().is_some() && !self.must_end(walltime) => {
+                        }) if results.round().is_some() && !self.must_end() => {
                             std::thread::sleep(LOOK);
                         }
                         left => break left,
@@ -270,7 +269,7 @@ impl Joined<'_> {
                         has_abandoned: true,
                         ..
                     }) => (),
-                    Ok(Left { jobs: 1.., .. }) if self.must_end(walltime) => break Ok(None),
+                    Ok(Left { jobs: 1.., .. }) if self.must_end() => break Ok(None),
                     left => break left.map(Some),
                 }
             };

@@ -367,7 +367,7 @@ mod tests {
             values.iter().map(number).collect::<Vec<_>>()
         };
         assert_eq!(
-            shown(&[29.000000000000004, 0.0]),
+            shown(&[29.000_000_000_000_004, 0.0]),
             [["29", "29"], ["0", "0"]]
         );
         assert_eq!(

@@ -111,7 +111,7 @@ mod tests {
                 "Delta = [1e-6]\nT = [0.03]\nramp_time = [0.1]"
             }
             Quantity::Parameter(Symbol::RampTime) => "Delta = [1e-6]\nT = [0.03]\nT_to = [0.02]",
-            _ => "",
+            Quantity::Parameter(_) => "",
         }
     }
 
