@@ -158,7 +158,7 @@ fn of_flags(text: &str) -> Result<Sweep> {
             };
             UsageError(problem + hint).into()
         }
-        unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
+        unreadable => unreadable.into(),
     })
 }
 
