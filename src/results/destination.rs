@@ -173,7 +173,7 @@ impl Destination {
 
 /// A folder that takes its place as a whole.
 pub struct NewFolder {
-    place: PathBuf,
+    pub place: PathBuf,
     /// Where its files are prepared.
     pub draft: TempDir,
 }

@@ -55,15 +55,15 @@ impl Results<'_> {
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
         let folder = NewFolder::new(path)?;
-        let exported = self.write_all(folder.draft.path(), format, stop, progress)?;
-        refuse_stopped(stop, path)?;
+        let exported = self.write_all(&folder, format, stop, progress)?;
+        refuse_stopped(stop, &folder.place)?;
         folder.publish(self.layout().storage)?;
         Ok(exported)
     }
 
     fn write_all(
         &self,
-        to: &Path,
+        to: &NewFolder,
         format: Format,
         stop: &AtomicBool,
         progress: &mut dyn FnMut(u64, u64),
@@ -82,14 +82,14 @@ impl Results<'_> {
         let total = (names.len() * parts.len()) as u64;
         for (number, table) in names.into_iter().enumerate() {
             let name = format!("{table}.{}", format.extension());
-            let path = to.join(&name);
+            let path = to.draft.path().join(&name);
             let file = storage.create(&path)?;
             let schema =
                 schema_of(self.joined(&tables::recorded_schema(table, self.sweep().recording())));
             let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
             let mut rows = 0;
             for (done, &part) in parts.iter().enumerate() {
-                refuse_stopped(stop, to)?;
+                refuse_stopped(stop, &to.place)?;
                 progress((number * parts.len() + done) as u64, total);
                 let copied = self.copy_part(table, part, &schema, &mut writer);
                 // A part has lost what is not there.
