@@ -231,6 +231,8 @@ mod tests {
     use crate::table::columns::{Column, Row};
     use crate::table::file::Dataset;
 
+    static NEVER: AtomicBool = AtomicBool::new(false);
+
     fn findings() -> Findings {
         let (parameters, solver) = (
             Parameters::default(),
@@ -294,7 +296,6 @@ mod tests {
         };
         let findings = findings();
         check(folder.path()).unwrap();
-        static NEVER: AtomicBool = AtomicBool::new(false);
         let files = write(&study, &findings, folder.path(), || Ok(&NEVER)).unwrap();
         let left = std::fs::read_dir(folder.path()).unwrap().count();
         assert_eq!(left, files.len(), "a draft stayed");

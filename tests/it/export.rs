@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::PathBuf;
+use std::process::Child;
 
 /// Cheap jobs in several parts, and a parameter that no table of slips has.
 fn sweep(seeds: u64) -> String {
@@ -209,7 +210,7 @@ fn of_exports_into_one_folder_one_wins_and_the_others_are_refused() {
     let folder = folder_with_results();
     folder.ends(0, "export r -o alone");
     let exports: Vec<_> = (0..4).map(|_| folder.start("export r -o out")).collect();
-    let ended = exports.into_iter().map(|export| export.wait_with_output());
+    let ended = exports.into_iter().map(Child::wait_with_output);
     let mut codes: Vec<_> = ended.map(|ended| ended.unwrap().status.code()).collect();
     codes.sort_unstable();
     assert_eq!(codes, [Some(0), Some(2), Some(2), Some(2)]);
