@@ -63,7 +63,7 @@ pub fn in_text(error: stickslip::sweep::SweepError, source: &str) -> Error {
         stickslip::sweep::SweepError::Invalid { mistakes, .. } => {
             Error::Sweep(mistakes_in(source, &mistakes))
         }
-        error @ stickslip::sweep::SweepError::Unreadable { .. } => error.into(),
+        unreadable => unreadable.into(),
     }
 }
 

@@ -18,7 +18,7 @@ mod verdict;
 
 pub use cost::Cost;
 pub use distance::Distances;
-pub use report::{to_json, write};
+pub use report::{check, to_json, write};
 pub use study::{DistanceRow, Findings, MethodRow, QUANTITIES, Study};
 pub use verdict::verdict;
 

@@ -1,12 +1,12 @@
-//! What a command of accuracy leaves behind: tables as Parquet, everything as JSON, and figures, put in place together.
+//! What a command of accuracy leaves behind: tables as Parquet, everything as JSON, and figures.
 
 use super::distance::Distances;
 use super::study::{Findings, MethodRow, Study};
 use super::{cost, other_settings, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
-use crate::results::commit::Commit;
-use crate::results::layout::Layout;
+use crate::results::ResultsError;
+use crate::results::destination::{Destination, Kind, refuse_reserved};
 use crate::table::arrow;
 use crate::table::columns::Table;
 use crate::table::file::{Footer, PROGRAM, TableWriter};
@@ -14,6 +14,7 @@ use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 const FORMAT: u32 = 5;
 
@@ -34,9 +35,29 @@ pub fn to_json(study: &Study, findings: &Findings) -> Value {
     })
 }
 
+/// What says whether a signal came to stop the command.
+type Stop = fn() -> Result<&'static AtomicBool>;
+
+/// Refuses a folder in which something would be lost.
+pub fn check(folder: &Path) -> Result<()> {
+    refuse_reserved(folder)?;
+    for name in Disk.list(folder)? {
+        let file = folder.join(name);
+        if let Some(kind) = Kind::of_name(&file) {
+            Destination::new(&file, kind)?;
+        }
+    }
+    Ok(())
+}
+
 /// Writes what a study found into a folder, over what an earlier one left there, with a figure for the sets that differ in the
 /// modulation alone; returns the files.
-pub fn write(study: &Study, findings: &Findings, folder: &Path) -> Result<Vec<PathBuf>> {
+pub fn write(
+    study: &Study,
+    findings: &Findings,
+    folder: &Path,
+    stop: Stop,
+) -> Result<Vec<PathBuf>> {
     let mut sets: Vec<Parameters> = Vec::new();
     for set in study.sets.iter().map(unmodulated) {
         if !sets.contains(&set) {
@@ -59,32 +80,31 @@ pub fn write(study: &Study, findings: &Findings, folder: &Path) -> Result<Vec<Pa
         documents.push((format!("{name}.png"), picture.png()?));
     }
     Disk.ensure_folder(folder)?;
-    let staging = folder.join("staging");
-    let mut commit = Commit::begin(&Layout::new(&Disk, folder), &staging)?;
     let mut files = vec![
-        stage(&mut commit, folder, &findings.methods)?,
-        stage(&mut commit, folder, &findings.distances)?,
+        write_table(folder, &findings.methods, stop)?,
+        write_table(folder, &findings.distances, stop)?,
     ];
     for (name, bytes) in documents {
         let file = folder.join(name);
-        commit.stage_bytes(&file, &bytes)?;
+        destination(&file)?.write(stop, |mut file| Ok(file.write(&bytes)?))?;
         files.push(file);
     }
-    commit.publish()?;
-    // Empty now; should it not go, it does no harm.
-    let _ = std::fs::remove_dir(staging);
     Ok(files)
 }
 
-fn stage<R: Table>(commit: &mut Commit<'_>, folder: &Path, rows: &[R]) -> Result<PathBuf> {
-    let file = folder.join(format!("{}.parquet", R::NAME));
-    let mut writer = TableWriter::new(
-        commit.stage(&file)?,
-        &Footer::default().with("processor", &cost::processor()),
-    )?;
-    rows.iter().try_for_each(|row| writer.push(row))?;
-    writer.finish()?;
-    Ok(file)
+fn destination(file: &Path) -> Result<Destination, ResultsError> {
+    Destination::new(file, Kind::of_name(file).unwrap_or(Kind::NEW))
+}
+
+fn write_table<R: Table>(folder: &Path, rows: &[R], stop: Stop) -> Result<PathBuf> {
+    let path = folder.join(format!("{}.parquet", R::NAME));
+    destination(&path)?.write(stop, |file| {
+        let footer = Footer::default().with("processor", &cost::processor());
+        let mut writer = TableWriter::new(file, &footer)?;
+        rows.iter().try_for_each(|row| writer.push(row))?;
+        Ok(writer.finish()?)
+    })?;
+    Ok(path)
 }
 
 /// The figure of the sets that are this one without modulation: cost against the error of break times, and against
@@ -211,6 +231,8 @@ mod tests {
     use crate::table::columns::{Column, Row};
     use crate::table::file::Dataset;
 
+    static NEVER: AtomicBool = AtomicBool::new(false);
+
     fn findings() -> Findings {
         let (parameters, solver) = (
             Parameters::default(),
@@ -273,7 +295,10 @@ mod tests {
             ..Study::quick()
         };
         let findings = findings();
-        let files = write(&study, &findings, folder.path()).unwrap();
+        check(folder.path()).unwrap();
+        let files = write(&study, &findings, folder.path(), || Ok(&NEVER)).unwrap();
+        let left = std::fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(left, files.len(), "a draft stayed");
         let names: Vec<_> = files
             .iter()
             .map(|file| file.file_name().unwrap().to_str().unwrap())
@@ -307,10 +332,14 @@ mod tests {
         );
         assert_eq!(json["methods"][1]["median_break_error"], Value::Null);
         assert_eq!(json["distances"][0]["quantity"], "interval");
-        assert!(
-            !folder.path().join("staging").exists(),
-            "the staging folder must not stay"
-        );
+        check(folder.path()).expect("over an earlier study");
+        for file in &files {
+            let bytes = std::fs::read(file).unwrap();
+            std::fs::write(file, "mine").unwrap();
+            let error = check(folder.path()).unwrap_err();
+            assert!(error.to_string().contains("was not replaced"), "{error}");
+            std::fs::write(file, bytes).unwrap();
+        }
     }
 
     #[test]

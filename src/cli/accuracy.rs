@@ -2,6 +2,7 @@
 
 use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
+use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
 use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, verdict};
 use crate::model::Parameters;
@@ -122,8 +123,9 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool =
         pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
+    accuracy::check(&out)?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
-    let files = accuracy::write(&study, &findings, &out)?;
+    let files = accuracy::write(&study, &findings, &out, signals::catch)?;
     if arguments.json {
         output::plain_json(&accuracy::to_json(&study, &findings))?;
     } else {

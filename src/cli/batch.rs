@@ -89,6 +89,15 @@ const SLURM: &str = include_str!("batch/slurm.sh");
 const HYPERQUEUE: &str = include_str!("batch/hyperqueue.sh");
 
 pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
+    let program = match program {
+        Some(program) => program.to_owned(),
+        None => std::env::current_exe().context("cannot find out where this program lies")?,
+    };
+    output::print(&script(arguments, &program)?)?;
+    Ok(Exit::Done)
+}
+
+fn script(arguments: &Arguments, program: &Path) -> Result<String> {
     let Arguments {
         time,
         threads,
@@ -98,19 +107,6 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
     } = arguments;
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &[])?;
     output::warn(&sweep.warnings());
-    let root = arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| Layout::default_root(&sweep));
-    let program = match program {
-        Some(program) => program.to_owned(),
-        None => std::env::current_exe().context("cannot find out where this program lies")?,
-    };
-    let (program, root) = (whole_path(&program)?, whole_path(&root)?);
-    let source = match (&arguments.sweep, arguments.preset.preset) {
-        (Some(file), _) => quoted(&whole_path(file)?),
-        (None, preset) => format!("--preset {}", preset.map_or("", |preset| preset.name)),
-    };
     let starts = arguments.starts.unwrap_or(*workers);
     if starts < *workers {
         return Err(UsageError(format!(
@@ -124,56 +120,77 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
     {
         return Err(UsageError(format!("{option:?}: must hold no control characters")).into());
     }
-    let (program, out, logs) = (quoted(&program), quoted(&root), format!("{root}/run/batch"));
+    let root = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| Layout::default_root(&sweep));
+    let root = whole_path(&root)?;
+    let logs = format!("{root}/run/batch");
+    let mut command = vec![whole_path(program)?, "run".to_owned()];
+    match (&arguments.sweep, arguments.preset.preset) {
+        (Some(file), _) => command.push(whole_path(file)?),
+        (None, preset) => {
+            command.push("--preset".to_owned());
+            command.extend(preset.map(|preset| preset.name.to_owned()));
+        }
+    }
     let walltime = time::with_units(time.saturating_sub(margin(*time)));
-    let command = format!("{program} run {source} --out {out} --worker --walltime {walltime}");
-    let (script, array, time, options) = match arguments.engine {
+    command.extend(["--out", &root, "--worker", "--walltime", &walltime].map(str::to_owned));
+    let name = sweep.name();
+    let (template, own_options, as_read): (_, _, fn(&str) -> String) = match arguments.engine {
         Engine::Slurm => {
             let limit = if starts > *workers {
                 format!("%{workers}")
             } else {
                 String::new()
             };
-            let minutes = format!("{}:{:02}", time.as_secs() / 60, time.as_secs() % 60);
-            let output = format!("--output={}/%A_%a.log", logs.replace('%', "%%"));
-            let warning =
-                (margin(*time) == MAX_MARGIN).then(|| format!("--signal=B:USR1@{WARNING}"));
-            let options = [output]
-                .iter()
-                .chain(&warning)
-                .chain(options)
-                .map(|text| directive(text))
-                .collect();
-            (SLURM, format!("1-{starts}{limit}"), minutes, options)
+            let mut own_options = vec![
+                format!("--job-name={name}"),
+                format!("--array=1-{starts}{limit}"),
+                format!("--cpus-per-task={threads}"),
+                format!("--time={}:{:02}", time.as_secs() / 60, time.as_secs() % 60),
+                format!("--output={}/%A_%a.log", logs.replace('%', "%%")),
+            ];
+            if margin(*time) == MAX_MARGIN {
+                own_options.push(format!("--signal=B:USR1@{WARNING}"));
+            }
+            (SLURM, own_options, directive)
         }
         Engine::Hyperqueue => {
-            let options: String = options.iter().map(|option| quoted(option) + " ").collect();
-            (
-                HYPERQUEUE,
-                format!("1-{starts}"),
-                time::with_units(*time),
-                options,
-            )
+            command.extend(["--threads".to_owned(), threads.to_string()]);
+            let own_options = vec![
+                format!("--name={name}"),
+                format!("--array=1-{starts}"),
+                format!("--cpus={threads}"),
+                format!("--time-limit={}", time::with_units(*time)),
+            ];
+            let as_read = |option: &str| quoted(option) + " \\\n    ";
+            (HYPERQUEUE, own_options, as_read)
         }
     };
-    // Last what may hold braces itself.
+    let options = own_options.iter().chain(options);
+    let command: Vec<String> = command.iter().map(|word| quoted(word)).collect();
     let values = [
-        ("{{name}}", sweep.name()),
-        ("{{array}}", &array),
-        ("{{threads}}", &threads.to_string()),
-        ("{{time}}", &time),
-        ("{{logs}}", &quoted(&logs)),
-        ("{{command}}", &command),
-        ("{{options}}", &options),
+        ("name", name),
+        ("logs", &quoted(&logs)),
+        (
+            "options",
+            &options.map(|option| as_read(option)).collect::<String>(),
+        ),
+        ("command", &command.join(" ")),
     ];
-    output::print(
-        &values
-            .iter()
-            .fold(script.to_owned(), |script, (name, value)| {
-                script.replace(name, value)
-            }),
-    )?;
-    Ok(Exit::Done)
+    Ok(filled(template, &values))
+}
+
+/// A template with values in place of its {{names}}. What a value holds is not looked at again.
+fn filled(template: &str, values: &[(&str, &str)]) -> String {
+    let mut pieces = template.split("{{");
+    let first = pieces.next().unwrap_or_default().to_owned();
+    pieces.fold(first, |filled, piece| {
+        let (name, rest) = piece.split_once("}}").unwrap_or((piece, ""));
+        let value = values.iter().find(|(known, _)| *known == name);
+        filled + value.map_or("", |(_, value)| value) + rest
+    })
 }
 
 /// How long before the end of its time a worker stops.
@@ -208,13 +225,149 @@ fn whole_path(mut path: &Path) -> Result<String> {
 /// The line of an option as sbatch reads it from a script: with quotes, and a backslash before what else would mean
 /// something.
 fn directive(option: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
-    if option.chars().all(plain) {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
+    if !option.is_empty() && option.chars().all(plain) {
         format!("#SBATCH {option}\n")
     } else {
-        format!(
-            "#SBATCH \"{}\"\n",
-            option.replace('\\', r"\\").replace('"', "\\\"")
-        )
+        let escaped = option.replace('\\', r"\\").replace('"', "\\\"");
+        format!("#SBATCH \"{escaped}\"\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+    use std::process::Command;
+
+    /// Writes what it is called with, each on a line, to the file that `RECORD` names.
+    const RECORDER: &str = "#!/bin/sh\nprintf '%s\\n' \"$@\" > \"$RECORD\"\n";
+    /// Takes a job script as sbatch does.
+    const SBATCH: &str = "#!/bin/sh\nexec cat > \"$JOB\"\n";
+    /// Runs the command of a job as hq does.
+    const HQ: &str = "#!/bin/sh\nwhile [ \"$1\" != -- ]; do shift; done\nshift\nexec \"$@\"\n";
+
+    fn make_program(file: &Path, text: &str) {
+        fs::write(file, text).unwrap();
+        fs::set_permissions(file, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
+    /// Names that a shell or a template might take for something else.
+    fn hostile_name() -> impl Strategy<Value = String> {
+        let pieces = [
+            "{{command}}",
+            "{{logs}}",
+            "{{",
+            "}}",
+            "$(touch PWNED)",
+            "`touch PWNED`",
+            "; touch PWNED;",
+            "| touch PWNED",
+            "& touch PWNED",
+            "$HOME",
+            "${IFS}",
+            "'",
+            "\"",
+            "\\",
+            "*",
+            "?",
+            "[a]",
+            "~",
+            "#",
+            "!",
+            "%",
+            "%A",
+            "-",
+            "--",
+            "=",
+            ":",
+            " ",
+            "EOF",
+            "ä",
+            "Δ",
+            "\u{a0}",
+            "🐍",
+            "a",
+        ];
+        prop::collection::vec(prop::sample::select(pieces.to_vec()), 1..6)
+            .prop_map(|pieces| pieces.concat())
+            .prop_filter("an option that ends options", |name| name != "--")
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
+
+        #[test]
+        fn no_text_of_a_path_or_an_option_is_a_command_of_the_script(
+            name in hostile_name(),
+            option in hostile_name(),
+        ) {
+            let folder = tempfile::tempdir().unwrap();
+            let hostile = folder.path().join(&name);
+            let [fake, jobs] = ["fake", "jobs"].map(|name| folder.path().join(name));
+            for made in [&hostile, &fake, &jobs] {
+                fs::create_dir(made).unwrap();
+            }
+            let sweep = hostile.join("s.toml");
+            fs::write(&sweep, "name = \"b\"\n[axes]\nseed = { count = 2 }\n").unwrap();
+            let program = hostile.join("program");
+            make_program(&program, RECORDER);
+            make_program(&fake.join("sbatch"), SBATCH);
+            make_program(&fake.join("hq"), HQ);
+            let path = format!("{}:{}", fake.display(), std::env::var("PATH").unwrap());
+            for (engine, shell) in [
+                (Engine::Slurm, "dash"),
+                (Engine::Slurm, "bash"),
+                (Engine::Hyperqueue, "dash"),
+                (Engine::Hyperqueue, "bash"),
+            ] {
+                let out = hostile.join("out");
+                let arguments = Arguments {
+                    engine,
+                    sweep: Some(sweep.clone()),
+                    preset: PresetFlag { preset: None },
+                    out: Some(out.clone()),
+                    workers: NonZeroU32::MIN,
+                    threads: NonZeroUsize::MIN,
+                    time: Duration::from_hours(1),
+                    starts: None,
+                    options: vec![option.clone()],
+                };
+                let [record, job, submission] =
+                    ["record", "job", "submission"].map(|name| folder.path().join(name));
+                let run = |file: &Path| {
+                    let ended = Command::new(shell)
+                        .arg(file)
+                        .env("PATH", &path)
+                        .env("RECORD", &record)
+                        .env("JOB", &job)
+                        .current_dir(&jobs)
+                        .output()
+                        .unwrap();
+                    assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
+                };
+                fs::write(&submission, script(&arguments, &program).unwrap()).unwrap();
+                run(&submission);
+                if matches!(engine, Engine::Slurm) {
+                    run(&job);
+                }
+                let record = fs::read_to_string(&record).unwrap();
+                let words = ["run", sweep.to_str().unwrap(), "--out", out.to_str().unwrap()];
+                prop_assert!(record.starts_with(&(words.join("\n") + "\n--worker\n")), "{record}");
+                let logs = out.join("run/batch");
+                for looked_at in [&jobs, &logs] {
+                    prop_assert_eq!(fs::read_dir(looked_at).unwrap().count(), 0);
+                }
+                fs::remove_dir_all(out).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn values_are_filled_in_once() {
+        let values = [("a", "{{b}}"), ("b", "{{a}} }}")];
+        assert_eq!(filled("{{a}} {b}} {{b}}", &values), "{{b}} {b}} {{a}} }}");
     }
 }

@@ -2,6 +2,7 @@
 
 use super::exit::Exit;
 use super::output;
+use super::signals;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::table::formats::Format;
@@ -10,7 +11,6 @@ use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// Write the tables of a results directory to a folder: one file each, every row with all swept parameters
@@ -20,12 +20,14 @@ Examples:
   stickslip export results/fig3 -o fig3-tables
   stickslip export results/fig3 -o fig3-csv --format csv     for spreadsheets
 
-The same jobs give the same bytes, whatever runs and interruptions came before. The directory is not changed.")]
+Rows are in the order of the plan, extensions one after another. Whatever threads, shards and interruptions came
+before, the bytes are the same; equal jobs after other extensions are the same rows in another order. The directory
+is not changed. If the export fails or is stopped, FOLDER is not made.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Folder to write to; it must be empty, and is made if need be
+    /// Folder to make, outside of results directories; an empty one is replaced
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
     /// Format of the files
@@ -41,15 +43,14 @@ const FORMAT: u32 = 1;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
-    let bar = if std::io::stderr().is_terminal() {
-        ProgressBar::new(0)
-    } else {
-        ProgressBar::hidden()
-    };
+    // Shown on a terminal only.
+    let bar = ProgressBar::new(0);
     bar.set_style(ProgressStyle::with_template(
         "{wide_bar} {percent} % of the parts, {eta} left",
     )?);
-    let exported = results.export(&arguments.out, arguments.format, &mut |done, total| {
+    let stop = signals::catch()?;
+    let out = &arguments.out;
+    let exported = results.export(out, arguments.format, stop, &mut |done, total| {
         bar.set_length(total);
         bar.set_position(done);
     })?;

@@ -1,8 +1,10 @@
 //! `stickslip init`: a commented sweep file to start from.
 
-use super::exit::{Exit, UsageError};
+use super::exit::Exit;
 use super::output;
+use super::signals;
 use super::sweep::{Preset, Variation, changes, vary};
+use crate::results::destination::{Destination, Kind};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
@@ -114,14 +116,8 @@ pub fn init(arguments: &Arguments) -> Result<Exit> {
         ),
         None => text,
     };
-    if file.symlink_metadata().is_ok() {
-        let problem = format!(
-            "{}: is there already and was not changed; choose another name",
-            shown(file)
-        );
-        return Err(UsageError(problem).into());
-    }
-    output::replace(file, |draft| Ok(std::fs::write(draft, &text)?))?;
+    let destination = Destination::new(file, Kind::NEW)?;
+    destination.write(signals::catch, |mut file| Ok(file.write(text.as_bytes())?))?;
     let quoted = output::quoted_path(file);
     output::report(&format!(
         "wrote {}. See what it would run: stickslip plan {quoted}",

@@ -1,14 +1,12 @@
 //! Text for people and JSON for programs.
 
-use super::exit::UsageError;
 use crate::results::rounds::RoundsSoFar;
 use crate::sweep::Standing;
-use crate::table::shown::{is_plain, shown};
+use crate::table::shown::is_plain;
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use serde::Serialize;
 use std::fmt;
-use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::time::Duration;
@@ -168,29 +166,6 @@ pub fn rounds(rounds: &RoundsSoFar) -> String {
         .fold(sets, |text, more| text + &more)
 }
 
-/// Writes a file whole: beside its place, and then moved there, so that no half of it looks whole. Where a link leads to a
-/// file, that is its place; a pipe or a device is written to.
-pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let cannot = || format!("cannot write {}", shown(path));
-    let refused = |problem| Err(UsageError(format!("{}: {problem}", shown(path))).into());
-    let place = match fs::metadata(path) {
-        Ok(there) if there.is_dir() => return refused("is a folder; name a file in it"),
-        Ok(there) if !there.is_file() => return write(path).with_context(cannot),
-        Ok(_) => fs::canonicalize(path).with_context(cannot)?,
-        Err(_) if path.is_symlink() => {
-            return refused("is a link that leads nowhere; remove it, or name another file");
-        }
-        Err(_) => path.to_owned(),
-    };
-    let draft = place.with_file_name(format!(".stickslip-{}.draft", std::process::id()));
-    let written = write(&draft).and_then(|()| Ok(fs::rename(&draft, &place)?));
-    if written.is_err() {
-        // What remains of a draft is of no use; the first error is the one to report.
-        let _ = fs::remove_file(&draft);
-    }
-    written.with_context(cannot)
-}
-
 /// A line on a terminal, with the time so far, until it is dropped.
 pub fn waiting(what: String) -> ProgressBar {
     let style = ProgressStyle::with_template("{elapsed_precise} {msg}")
@@ -208,7 +183,7 @@ pub fn quoted(text: &str) -> String {
     if !text.is_empty()
         && text
             .chars()
-            .all(|c| c.is_alphanumeric() || "/._-+=:,@".contains(c))
+            .all(|c| c.is_ascii_alphanumeric() || "/._-+=:,@".contains(c))
     {
         text.to_owned()
     } else {
@@ -229,66 +204,4 @@ pub fn quoted_path(path: &Path) -> String {
         })
         .collect();
     format!("$'{escaped}'")
-}
-
-#[cfg(all(test, unix))]
-mod tests {
-    use super::*;
-    use std::io;
-    use std::os::unix::fs::{FileTypeExt, symlink};
-    use std::process::Command;
-
-    fn put(path: &Path, text: &str) -> Result<()> {
-        replace(path, |draft| Ok(fs::write(draft, text)?))
-    }
-
-    #[test]
-    fn a_file_is_replaced_where_its_links_lead_and_no_draft_remains() {
-        let folder = tempfile::tempdir().unwrap();
-        let [file, link] = ["page", "link"].map(|name| folder.path().join(name));
-        symlink("page", &link).unwrap();
-        assert!(
-            put(&link, "a")
-                .unwrap_err()
-                .to_string()
-                .contains("is a link that leads nowhere")
-        );
-        put(&file, "b").unwrap();
-        put(&link, "c").unwrap();
-        assert!(link.is_symlink());
-        assert_eq!(fs::read_to_string(&file).unwrap(), "c");
-        assert!(
-            put(folder.path(), "d")
-                .unwrap_err()
-                .to_string()
-                .contains("is a folder")
-        );
-        replace(&file, |draft| {
-            fs::write(draft, "half")
-                .and(Err(io::Error::other("full")))
-                .map_err(Into::into)
-        })
-        .unwrap_err();
-        assert_eq!(fs::read_to_string(&file).unwrap(), "c");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
-    }
-
-    #[test]
-    fn a_pipe_is_written_to_and_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let pipe = folder.path().join("pipe");
-        assert!(
-            Command::new("mkfifo")
-                .arg(&pipe)
-                .status()
-                .unwrap()
-                .success()
-        );
-        std::thread::scope(|scope| {
-            let read = scope.spawn(|| fs::read_to_string(&pipe).unwrap());
-            put(&pipe, "page").unwrap();
-            assert_eq!(read.join().unwrap(), "page");
-        });
-        assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
-    }
 }

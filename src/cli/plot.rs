@@ -2,9 +2,11 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
+use super::signals;
 use crate::figure::{Format, Look, OwnFigure, Size, Style, draw_all, draw_own, write_own};
 use crate::reduce::{renew, set_columns};
 use crate::results::Results;
+use crate::results::destination::{Destination, Kind};
 use crate::results::layout::Layout;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
@@ -80,6 +82,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let Some(directory) = &arguments.directory else {
         return Ok(Exit::Done);
     };
+    let out = arguments.out.as_deref().map(picture_file).transpose()?;
     let results = renew(&Results::read(&Layout::new(&Disk, directory))?)?;
     let (layout, look) = (results.layout(), arguments.look(&results));
     let files = if arguments.own.x.is_none() {
@@ -89,14 +92,12 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         if look.style == Style::Print {
             output::report(&format!("for the caption: {}", picture.note()));
         }
-        match &arguments.out {
+        match &out {
             None => write_own(layout, picture, &look, arguments.formats())?,
-            Some(file) => {
-                let format = format_of(file)?;
-                output::replace(file, |draft| {
-                    Ok(std::fs::write(draft, picture.encoded(format)?)?)
-                })?;
-                vec![file.clone()]
+            Some((out, format)) => {
+                let bytes = picture.encoded(*format)?;
+                out.write(signals::catch, |mut file| Ok(file.write(&bytes)?))?;
+                arguments.out.iter().cloned().collect()
             }
         }
     };
@@ -109,15 +110,16 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// The format that a file's name ends in.
-pub fn format_of(file: &Path) -> Result<Format> {
+/// Where a picture goes, and the format that the name ends in.
+pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
     let extension = file.extension().and_then(|extension| extension.to_str());
     let format = Format::ALL
         .into_iter()
         .find(|format| extension == Some(format.extension()));
-    format.ok_or_else(|| {
-        UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into()
-    })
+    match format.zip(Kind::of_name(file)) {
+        Some((format, kind)) => Ok((Destination::new(file, kind)?, format)),
+        None => Err(UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into()),
+    }
 }
 
 /// Prints the columns of the table of sets.

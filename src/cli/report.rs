@@ -1,9 +1,10 @@
 //! `stickslip report`, and `--report` of `run`: a results directory as one HTML page.
 
 use super::exit::Exit;
-use super::{message, output};
+use super::{message, output, signals};
 use crate::reduce::NoJobs;
 use crate::results::Results;
+use crate::results::destination::{Destination, Kind};
 use crate::results::layout::Layout;
 use crate::run::{RunEvent, RunReport};
 use crate::table::shown::shown;
@@ -28,7 +29,7 @@ pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// File to write [default: report.html in DIR]
+    /// File to write, over an earlier report [default: report.html in DIR]
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -38,8 +39,9 @@ pub fn report(arguments: &Arguments) -> Result<Exit> {
     let path = match &arguments.out {
         None => crate::report::write(&results, None)?,
         Some(path) => {
+            let destination = Destination::new(path, Kind::REPORT)?;
             let page = crate::report::page(&results, None)?;
-            output::replace(path, |draft| Ok(std::fs::write(draft, &page)?))?;
+            destination.write(signals::catch, |mut file| Ok(file.write(page.as_bytes())?))?;
             path.clone()
         }
     };

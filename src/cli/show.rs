@@ -105,7 +105,8 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
                 .filter(|difference| !difference.starts_with("name"));
             differences.try_for_each(|difference| output::print(&format!("{difference}\n")))?;
         }
-        return print(arguments, &columns, &[], &[]);
+        let count = columns.first().map_or(0, |values| values.numbers.len());
+        return print(arguments, &columns, count, &[], &[]);
     }
     let results = renew(&results)?;
     let mut rows = sets(&results, usize::MAX)?;
@@ -120,6 +121,11 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     }
     if let Some(column) = &arguments.sort {
         sort(&mut rows, column)?;
+    }
+    let matching = rows.len();
+    if arguments.csv && rows.is_empty() {
+        // The names of the columns are those of all sets.
+        rows = sets(&results, usize::MAX)?;
     }
     let asked = |name: &String| {
         Values::of(&rows, name)
@@ -148,7 +154,7 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
         }
         output::print(&table_of_edges(&edges))?;
     }
-    print(arguments, &columns, &rows, &edges)?;
+    print(arguments, &columns, matching, &rows, &edges)?;
     if is_text {
         for note in notes(&results, &rows) {
             output::print(&format!("{note}\n"))?;
@@ -157,14 +163,14 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Prints columns as is asked, as JSON with the edges; `rows` are the sets, if they are of one directory.
+/// Prints columns of so many sets as is asked, as JSON with the edges; `rows` are the sets, if they are of one directory.
 fn print(
     arguments: &Arguments,
     columns: &[Values],
+    count: usize,
     rows: &[SetRow],
     edges: &[EdgeRow],
 ) -> Result<Exit> {
-    let count = columns.first().map_or(0, |values| values.numbers.len());
     if arguments.json {
         let sets: Vec<Map<String, Json>> = (0..count)
             .map(|set| record(columns, set).into_iter().collect())
@@ -289,13 +295,13 @@ fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
     record
 }
 
+/// Prints the first sets, under the names of the columns of all.
 fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
     let mut writer = csv::Writer::from_writer(Vec::new());
+    let first = record(columns, 0);
+    writer.write_record(first.iter().map(|(name, _)| name))?;
     for set in 0..sets {
         let record = record(columns, set);
-        if set == 0 {
-            writer.write_record(record.iter().map(|(name, _)| name))?;
-        }
         writer.write_record(record.iter().map(|(_, value)| match value {
             Json::Null => String::new(),
             Json::String(word) => word.clone(),

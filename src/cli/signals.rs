@@ -6,17 +6,12 @@
 
 use super::exit::Exit;
 use anyhow::{Context, Result};
-use signal_hook::consts::signal::{SIGINT, SIGTERM};
-#[cfg(unix)]
-use signal_hook::consts::signal::{SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
+use signal_hook::consts::signal::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
 use signal_hook::flag::{register, register_conditional_shutdown};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-#[cfg(unix)]
 const WARNING: &[i32] = &[SIGUSR1, SIGUSR2, SIGXCPU];
-#[cfg(not(unix))]
-const WARNING: &[i32] = &[];
 const CANCELLING: &[i32] = &[SIGINT, SIGTERM];
 
 /// Set by the first signal that stops.
@@ -26,12 +21,16 @@ static CANCELLED: AtomicBool = AtomicBool::new(false);
 /// Set by the first SIGINT.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// Set when a file would pass the limit on its size; the write then fails, and its error is reported.
-#[cfg(unix)]
 static FILE_TOO_LARGE: AtomicBool = AtomicBool::new(false);
+
+/// Whether the signals are caught.
+static CAUGHT: AtomicBool = AtomicBool::new(false);
 
 /// Catches the signals; the flag turns true with the first.
 pub fn catch() -> Result<&'static AtomicBool> {
-    register_all().context("cannot catch signals")?;
+    if !CAUGHT.swap(true, Ordering::Relaxed) {
+        register_all().context("cannot catch signals")?;
+    }
     Ok(&STOP)
 }
 
@@ -44,7 +43,6 @@ fn register_all() -> io::Result<()> {
     // Before the flag that it looks at, so that the first SIGINT does not exit.
     register_conditional_shutdown(SIGINT, Exit::Stopped as i32, &INTERRUPTED)?;
     register(SIGINT, &INTERRUPTED)?;
-    #[cfg(unix)]
     register(SIGXFSZ, &FILE_TOO_LARGE)?;
     // Before the flag that stops, so that whoever stops finds it set.
     CANCELLING

@@ -5,7 +5,7 @@
 
 mod outputs;
 
-use self::outputs::{check_outputs, write_pictures, write_table};
+use self::outputs::{Tables, check_outputs, write_pictures};
 use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
 use super::sweep::{self, PresetFlag, Variation, changes};
@@ -194,7 +194,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     )?;
     let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
-    check_outputs(arguments, &sweep, parameters).map_err(UsageError)?;
+    check_outputs(arguments, &sweep, parameters)?;
     output::warn(&sweep.warnings());
     let begin = Instant::now();
     let never = AtomicBool::new(false);
@@ -210,43 +210,21 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
         .with_sweep(sweep.name(), sweep.text())
         .with("parameters", &as_json(parameters));
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
-    let TableFlags {
-        trace,
-        map,
-        profile,
-        contacts,
-        slip_table,
-        ..
-    } = &arguments.tables;
-    write_table(
-        trace.as_deref(),
-        &footer,
-        &[],
-        recorded.trace.iter().copied(),
-    )?;
-    write_table(map.as_deref(), &footer, &[], recorded.map.iter().copied())?;
-    write_table(
-        profile.as_deref(),
-        &footer,
-        &[],
-        recorded.profile.iter().copied(),
-    )?;
-    write_table(
-        contacts.as_deref(),
-        &footer,
-        &[],
-        recorded.contacts.iter().map(ContactRow::from),
-    )?;
     let slips = result
         .slips
         .iter()
         .map(|slip| -> SlipRow<'_> { (&label, slip) });
-    write_table(
-        slip_table.as_deref(),
-        &footer,
-        &sweep.recording().left_out(),
-        slips,
-    )?;
+    let tables = Tables {
+        footer: &footer,
+        left_out: &sweep.recording().left_out(),
+    };
+    let files = &arguments.tables;
+    tables.write(files.trace.as_deref(), recorded.trace.iter().copied())?;
+    tables.write(files.map.as_deref(), recorded.map.iter().copied())?;
+    tables.write(files.profile.as_deref(), recorded.profile.iter().copied())?;
+    let contacts = recorded.contacts.iter().map(ContactRow::from);
+    tables.write(files.contacts.as_deref(), contacts)?;
+    tables.write(files.slip_table.as_deref(), slips)?;
     write_pictures(arguments, parameters, &recorded, &result.slips)?;
     report(arguments.json, &label.0.job_id, &result, wall)?;
     Ok(Exit::Done)

@@ -184,7 +184,7 @@ fn of_flags(text: &str) -> Result<Sweep> {
             };
             UsageError(problem + hint).into()
         }
-        unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
+        unreadable => unreadable.into(),
     })
 }
 

@@ -84,6 +84,9 @@ impl Picture {
 
     pub fn svg(&self) -> String {
         let svg = SvgBackend::new().render_scene(&self.scene);
+        // XML has no way to write these.
+        let is_not_xml = |c| matches!(c, '\0'..='\x08' | '\x0b'..='\x0c' | '\x0e'..='\x1f' | '\u{fffe}'..='\u{ffff}');
+        let svg = svg.replace(is_not_xml, "\u{fffd}");
         if self.style == Style::Screen {
             return svg;
         }

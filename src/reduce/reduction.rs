@@ -62,6 +62,7 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
     let edges = layout.reduced_file(EdgeRow::NAME);
     if results.sweep().refinement().is_none() && layout.storage.exists(&edges)? {
         // Of a sweep before.
+        layout.refuse_link(&edges)?;
         layout.storage.remove(&edges)?;
     }
     Ok(summary)

@@ -50,8 +50,9 @@ impl<'a> Commit<'a> {
         let mut name = OsString::from(format!("{}-{}-", self.token, self.staged.len()));
         name.push(target.file_name().unwrap_or_default());
         let staged = self.staging.join(name);
-        self.staged.push((staged.clone(), target.to_owned()));
-        self.storage.create(&staged)
+        let file = self.storage.create(&staged)?;
+        self.staged.push((staged, target.to_owned()));
+        Ok(file)
     }
 
     /// Stages a small file of which all bytes are known.
@@ -119,6 +120,7 @@ pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, Storage
     if matches!(lock, Lock::Ours(_)) {
         let staging = layout.staging(writer);
         for name in layout.storage.list(&staging)? {
+            layout.refuse_link(&staging.join(&name))?;
             layout.storage.remove(&staging.join(name))?;
         }
     }

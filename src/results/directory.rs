@@ -1,6 +1,7 @@
 //! A results directory as it was found: opened once, valid from then on. Any version is read; only this one is run.
 
 use crate::results::commit::Commit;
+use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
 use crate::results::layout::{DoneParts, Layout, PartName, RUN, RUN_FOLDERS};
 use crate::results::tables::{TABLES, tables_of};
@@ -133,6 +134,7 @@ impl<'a> Results<'a> {
                 return Err(ResultsError::refused(layout.root(), problem));
             }
             if is_fresh {
+                refuse_reserved(layout.root())?;
                 return Ok(found);
             }
             let problem = "is neither empty nor a results directory (there is no run/extension-000.json); choose another \
@@ -239,7 +241,7 @@ impl<'a> Results<'a> {
     }
 
     /// The parts that have a file in a table. Names that no part of this directory can have are refused.
-    fn parts_of(&self, table: &str) -> Result<HashSet<PartName>, ResultsError> {
+    pub(super) fn parts_of(&self, table: &str) -> Result<HashSet<PartName>, ResultsError> {
         let folder = self.layout.table(table);
         let mut parts = HashSet::new();
         for name in self.layout.storage.list(&folder)? {
@@ -317,6 +319,7 @@ impl<'a> Results<'a> {
                     part.extension < self.extensions.len() && (is_spill || !done.0.contains(part))
                 });
                 for part in &parts {
+                    layout.refuse_link(&folder.join(part.file()))?;
                     storage.remove(&folder.join(part.file()))?;
                 }
                 if !parts.is_empty() {

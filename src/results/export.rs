@@ -4,6 +4,7 @@
 //! how it came to that. Every row has all swept parameters, so that no table need be joined. Nothing of the directory is
 //! changed. Memory: one part, and one row group.
 
+use crate::results::destination::{NewFolder, refuse_stopped};
 use crate::results::directory::Results;
 use crate::results::layout::PartName;
 use crate::results::parts::row_count;
@@ -12,21 +13,19 @@ use crate::table::arrow::{schema, schema_of};
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, Dataset};
 use crate::table::formats::{Format, RowWriter};
-use crate::table::storage::Storage;
 use arrow_array::cast::AsArray;
-use arrow_array::{RecordBatch, UInt32Array, new_null_array};
+use arrow_array::{RecordBatch, StringArray, UInt32Array, new_null_array};
 use arrow_schema::{ArrowError, Field, SchemaRef};
 use arrow_select::concat::concat_batches;
 use arrow_select::take::take;
 use serde::Serialize;
 use std::collections::{HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Column by which rows are joined with those of the jobs.
 const JOB_ID: &str = "job_id";
-/// What the name of the folder begins with in which an export is prepared, within the one that it is for.
-const UNFINISHED: &str = ".unfinished-";
 
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Exported {
@@ -46,38 +45,31 @@ pub struct ExportedFile {
 }
 
 impl Results<'_> {
-    /// Writes the tables to a folder, which must be empty and is made if need be. `progress` hears how many of how many parts
-    /// of all tables are done.
+    /// Writes the tables to a new folder, which is there as a whole or not at all. `progress` hears how many of how many
+    /// parts of all tables are done.
     pub fn export(
         &self,
-        folder: &Path,
+        path: &Path,
         format: Format,
+        stop: &AtomicBool,
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
-        let storage = self.layout().storage;
-        let unfinished = prepare(storage, folder)?;
-        let exported = self
-            .write_all(&unfinished, format, progress)
-            .and_then(|exported| {
-                for ExportedFile { name, .. } in &exported.files {
-                    storage.rename(&unfinished.join(name), &folder.join(name))?;
-                }
-                storage.sync_folder(folder)?;
-                Ok(exported)
-            });
-        // What stays is removed by the next export.
-        let _ = storage.remove_folder(&unfinished);
-        exported
+        let folder = NewFolder::new(path)?;
+        let exported = self.write_all(&folder, format, stop, progress)?;
+        refuse_stopped(stop, &folder.place)?;
+        folder.publish(self.layout().storage)?;
+        Ok(exported)
     }
 
     fn write_all(
         &self,
-        to: &Path,
+        to: &NewFolder,
         format: Format,
+        stop: &AtomicBool,
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
-        let (storage, done) = (self.layout().storage, self.done_parts()?);
-        let mut parts: Vec<PartName> = done.0.iter().copied().collect();
+        let storage = self.layout().storage;
+        let mut parts: Vec<PartName> = self.parts_of(tables::JOBS)?.into_iter().collect();
         parts.sort_unstable();
         let (parts_missing, jobs_missing) = self.missing()?.unwrap_or_default();
         let mut exported = Exported {
@@ -90,20 +82,27 @@ impl Results<'_> {
         let total = (names.len() * parts.len()) as u64;
         for (number, table) in names.into_iter().enumerate() {
             let name = format!("{table}.{}", format.extension());
-            let file = storage.create(&to.join(&name))?;
+            let path = to.draft.path().join(&name);
+            let file = storage.create(&path)?;
             let schema =
                 schema_of(self.joined(&tables::recorded_schema(table, self.sweep().recording())));
             let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
             let mut rows = 0;
             for (done, &part) in parts.iter().enumerate() {
+                refuse_stopped(stop, &to.place)?;
                 progress((number * parts.len() + done) as u64, total);
-                rows += self.copy_part(table, part, &schema, &mut writer)?;
+                let copied = self.copy_part(table, part, &schema, &mut writer);
+                // A part has lost what is not there.
+                rows += copied.map_err(|error| match error.damage() {
+                    Ok((path, problem)) => ResultsError::damaged(&path, problem),
+                    Err(error) => error,
+                })?;
             }
             writer.finish()?;
             if table == tables::JOBS {
                 exported.jobs = rows;
             }
-            let bytes = storage.length(&to.join(&name))?;
+            let bytes = storage.length(&path)?;
             exported.files.push(ExportedFile { name, rows, bytes });
         }
         progress(total, total);
@@ -113,24 +112,16 @@ impl Results<'_> {
     /// The columns of a table, with those that are joined to it.
     fn joined(&self, columns: &SchemaRef) -> Vec<Field> {
         let of_jobs = schema::<JobRow>();
-        let mut fields: Vec<Field> = columns
-            .fields()
-            .iter()
-            .map(|field| Field::clone(field))
-            .collect();
-        let swept: HashSet<String> = self
+        let swept_keys: HashSet<String> = self
             .extensions()
             .iter()
             .flat_map(|extension| extension.sweep.swept())
             .collect();
         let is_new = |field: &&Arc<Field>| columns.field_with_name(field.name()).is_err();
-        let swept = of_jobs
-            .fields()
-            .iter()
-            .filter(is_new)
-            .filter(|field| swept.contains(field.name()));
-        fields.extend(swept.map(|field| Field::clone(field)));
-        fields
+        let swept = of_jobs.fields().iter().filter(is_new);
+        let swept = swept.filter(|field| swept_keys.contains(field.name()));
+        let all = columns.fields().iter().chain(swept);
+        all.map(|field| Field::clone(field)).collect()
     }
 
     /// Copies the rows of a part; returns their number.
@@ -155,33 +146,12 @@ impl Results<'_> {
         let mut copied = 0;
         for batch in rows.batches() {
             let Batch { path, rows } = batch?;
-            writer.write(
-                &jobs
-                    .join(&rows, schema)
-                    .map_err(ResultsError::damage_at(&path))?,
-            )?;
+            let joined = jobs.join(&rows, schema);
+            writer.write(&joined.map_err(ResultsError::damage_at(&path))?)?;
             copied += rows.num_rows() as u64;
         }
         Ok(copied)
     }
-}
-
-/// The folder in which an export is prepared. The one that it is for may hold what a killed export left, and nothing else.
-fn prepare(storage: &dyn Storage, folder: &Path) -> Result<PathBuf, ResultsError> {
-    storage.ensure_folder(folder)?;
-    for name in storage.list(folder)? {
-        if !name.to_string_lossy().starts_with(UNFINISHED) {
-            let problem = "is not empty, and nothing in it was changed; choose another folder, or empty this one";
-            return Err(ResultsError::refused(folder, problem));
-        }
-        storage.remove_folder(&folder.join(name))?;
-    }
-    let unfinished = folder.join(format!(
-        "{UNFINISHED}{:016x}",
-        crate::results::commit::own_number()
-    ));
-    storage.create_folder(&unfinished)?;
-    Ok(unfinished)
 }
 
 struct Jobs {
@@ -195,18 +165,10 @@ impl Jobs {
             .batches()
             .map(|batch| Ok(batch?.rows))
             .collect::<Result<Vec<_>, ResultsError>>()?;
-        let first = batches.first().map(RecordBatch::schema);
-        let rows = first.map_or_else(
-            || Ok(RecordBatch::new_empty(schema::<JobRow>())),
-            |of| concat_batches(&of, &batches),
-        );
-        let rows = rows.map_err(ResultsError::damage_at(path))?;
-        let ids = rows
-            .column_by_name(JOB_ID)
-            .and_then(|column| column.as_string_opt::<i32>());
-        let ids = ids
-            .ok_or("there is no column job_id")
-            .map_err(ResultsError::damage_at(path))?;
+        let first = batches.first();
+        let columns = first.map_or_else(schema::<JobRow>, RecordBatch::schema);
+        let rows = concat_batches(&columns, &batches).map_err(ResultsError::damage_at(path))?;
+        let ids = job_ids(&rows).map_err(ResultsError::damage_at(path))?;
         let by_id = ids
             .iter()
             .zip(0..)
@@ -217,19 +179,10 @@ impl Jobs {
 
     /// Rows with the columns of a schema: their own, and those of their jobs.
     fn join(&self, rows: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
-        let missing = |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
-        let ids = rows
-            .column_by_name(JOB_ID)
-            .and_then(|column| column.as_string_opt::<i32>());
         let job = |id: Option<&str>| id.and_then(|id| self.by_id.get(id)).copied();
-        let jobs: Option<Vec<u32>> = ids
-            .ok_or_else(|| missing(JOB_ID))?
-            .iter()
-            .map(job)
-            .collect();
-        let jobs = UInt32Array::from(
-            jobs.ok_or_else(|| ArrowError::SchemaError("it has rows of other jobs".to_owned()))?,
-        );
+        let jobs: Option<Vec<u32>> = job_ids(rows)?.iter().map(job).collect();
+        let others = || ArrowError::SchemaError("it has rows of other jobs".to_owned());
+        let jobs = UInt32Array::from(jobs.ok_or_else(others)?);
         let column_of = |field: &Arc<Field>| match (
             rows.column_by_name(field.name()),
             self.rows.column_by_name(field.name()),
@@ -249,4 +202,15 @@ impl Jobs {
             .collect::<Result<Vec<_>, _>>()?;
         RecordBatch::try_new(Arc::clone(schema), columns)
     }
+}
+
+fn job_ids(rows: &RecordBatch) -> Result<&StringArray, ArrowError> {
+    let ids = rows
+        .column_by_name(JOB_ID)
+        .and_then(|column| column.as_string_opt());
+    ids.ok_or_else(|| missing(JOB_ID))
+}
+
+fn missing(column: &str) -> ArrowError {
+    ArrowError::SchemaError(format!("there is no column {column}"))
 }

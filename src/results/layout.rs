@@ -20,6 +20,7 @@ use crate::table::storage::{Storage, StorageError};
 use std::collections::{BTreeSet, HashSet};
 use std::ffi::OsString;
 use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -178,6 +179,19 @@ impl<'a> Layout<'a> {
                     .any(|name| self.extension(number).ends_with(name))
             })
             .collect())
+    }
+
+    /// Refuses to remove something through a link below the root: where it leads may be somebody else's.
+    pub fn refuse_link(&self, path: &Path) -> Result<(), StorageError> {
+        let roots = [self.root.as_path(), self.reduced_root()];
+        let folders = path.ancestors().skip(1);
+        let mut below = folders.take_while(|folder| !roots.contains(folder));
+        below
+            .find(|folder| folder.is_symlink())
+            .map_or(Ok(()), |link| {
+                let problem = io::Error::other("it is a link; put the folder itself in its place");
+                Err(StorageError::at("remove anything in it", link)(problem))
+            })
     }
 
     /// Where one writer, known by a name of its own, prepares files.

@@ -13,10 +13,12 @@
 //!   events.rs                 what happens, and its log
 //!   verify.rs                 what is damaged, and its repair
 //!   export.rs                 a few large files for other tools
+//! destination.rs              files and folders outside of it, which a command writes
 //! ```
 
 pub mod claims;
 pub mod commit;
+pub mod destination;
 pub mod directory;
 pub mod events;
 pub mod export;

@@ -109,11 +109,9 @@ impl Results<'_> {
     fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
         // Jobs first: what is spilled without them is nothing.
         for table in self.tables().rev() {
-            match self
-                .layout()
-                .storage
-                .remove(&self.spilled_file(table, part))
-            {
+            let file = self.spilled_file(table, part);
+            self.layout().refuse_link(&file)?;
+            match self.layout().storage.remove(&file) {
                 // Another worker was first.
                 Err(error) if error.kind() == ErrorKind::NotFound => (),
                 removed => removed?,

@@ -304,6 +304,8 @@ impl<'a> Member<'a> {
             self.layout.workers().join(format!("{}{NEW}", self.name)),
         );
         loop {
+            // A beat that failed may have left it.
+            let _ = storage.remove(&new);
             storage.create(&new)?.write(text.as_bytes())?;
             match storage.rename(&new, &self.file()) {
                 // A worker that does not see this one yet, nor any other, took it for a dead one's, and does so each time that
@@ -395,13 +397,16 @@ impl<'a> Member<'a> {
             .map(|name| name.to_string_lossy())
             .filter(|name| is_dead(name))
         {
+            layout.refuse_link(&layout.staging(&name))?;
             storage.remove_folder(&layout.staging(&name))?;
             let file = layout.workers().join(&*name);
             if storage.exists(&file)? {
+                layout.refuse_link(&file)?;
                 gone_is_fine(storage.remove(&file))?;
             }
         }
         if others.is_empty() {
+            layout.refuse_link(&layout.claims().join("any"))?;
             claims
                 .iter()
                 .try_for_each(|claim| gone_is_fine(storage.remove(&layout.claims().join(claim))))?;

@@ -1,20 +1,9 @@
 //! CPU time of the calling thread.
 
-/// CPU time that the calling thread has used since some instant, in s. Elsewhere than on Unix: time on the clock.
+/// CPU time that the calling thread has used since some instant, in s.
 pub fn thread_seconds() -> f64 {
-    #[cfg(unix)]
-    {
-        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-        time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-    }
-    #[cfg(not(unix))]
-    {
-        static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-        BEGIN
-            .get_or_init(std::time::Instant::now)
-            .elapsed()
-            .as_secs_f64()
-    }
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 /// CPU seconds of the calling thread that a computation takes, and its result.

@@ -18,7 +18,6 @@ use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver, TOLERANCES};
 use crate::table::storage::{Disk, Storage};
-use std::io;
 use std::path::Path;
 
 /// Longest name of a sweep, in characters: it becomes a folder.
@@ -26,18 +25,13 @@ const MAX_NAME: usize = 100;
 
 impl Sweep {
     pub fn from_file(path: &Path) -> Result<Self, SweepError> {
-        let text = Disk
-            .read(path)
-            .map_err(|error| error.source)
-            .and_then(|bytes| {
-                String::from_utf8(bytes)
-                    .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
-            });
+        let bytes = Disk.read(path).map_err(|error| SweepError::Unreadable {
+            path: path.to_owned(),
+            source: error.source,
+        })?;
+        let text = String::from_utf8(bytes);
         Self::parse(
-            &text.map_err(|source| SweepError::Unreadable {
-                path: path.to_owned(),
-                source,
-            })?,
+            &text.map_err(|_| SweepError::NotUtf8(path.to_owned()))?,
             path,
         )
     }

@@ -27,6 +27,8 @@ pub enum SweepError {
         path: PathBuf,
         source: std::io::Error,
     },
+    #[error("{}: is not UTF-8 text; save it as UTF-8, or name a sweep file", shown(.0))]
+    NotUtf8(PathBuf),
     /// The file does not say what to run.
     #[error("{}", listed(path, mistakes))]
     Invalid {

@@ -15,7 +15,7 @@ pub enum ErrorKind {
     Refused,
     /// Another process has the directory, or a share of it. Nothing was changed.
     Busy,
-    /// Others have taken over the work of this process.
+    /// A signal stopped this process, or others have taken over its work.
     Stopped,
     /// A file is not as it was written: cut off, changed or no table.
     Damaged,

@@ -8,7 +8,6 @@ use std::error::Error;
 use std::ffi::OsString;
 use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write};
-#[cfg(unix)]
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -73,7 +72,7 @@ impl Write for StoredFile {
 pub trait Storage: Sync {
     /// Creates a folder within one that is there; nothing happens if it is there itself.
     fn create_folder(&self, folder: &Path) -> Result<(), StorageError>;
-    /// Creates a file, or empties it.
+    /// Creates a file, of which nothing has the name.
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError>;
     /// Renames a file within the file system, over another if there is one; or a folder.
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
@@ -264,7 +263,6 @@ fn open_regular(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
         metadata => check(metadata?)?,
     }
     // Something else may have taken its place.
-    #[cfg(unix)]
     options.custom_flags(libc::O_NONBLOCK);
     let file = options.open(path)?;
     check(file.metadata()?)?;
@@ -276,7 +274,6 @@ fn open_folder(path: &Path) -> io::Result<File> {
     let path = if path == "" { Path::new(".") } else { path };
     let mut options = File::options();
     options.read(true);
-    #[cfg(unix)]
     options.custom_flags(libc::O_DIRECTORY);
     options.open(path)
 }
@@ -305,7 +302,7 @@ impl Storage for Disk {
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
         Ok(StoredFile::new(
             file,
-            File::create(file).map_err(StorageError::at("create", file))?,
+            File::create_new(file).map_err(StorageError::at("create", file))?,
         ))
     }
 
@@ -407,6 +404,21 @@ mod tests {
         assert!(matches!(Disk.lock(&file).unwrap(), Lock::Taken));
         drop(held);
         assert!(matches!(Disk.lock(&file).unwrap(), Lock::Ours(_)));
+    }
+
+    #[test]
+    fn a_file_is_never_created_over_another_or_where_a_link_leads() {
+        let folder = tempfile::tempdir().unwrap();
+        let [there, link, missing] =
+            ["there", "link", "missing"].map(|name| folder.path().join(name));
+        fs::write(&there, "mine").unwrap();
+        std::os::unix::fs::symlink(&missing, &link).unwrap();
+        for planted in [&there, &link] {
+            let error = Disk.create(planted).err().unwrap();
+            assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        }
+        assert_eq!(fs::read_to_string(there).unwrap(), "mine");
+        assert!(!missing.exists());
     }
 
     #[test]

@@ -167,12 +167,12 @@ fn the_script_for_slurm_submits_as_it_is_and_its_job_runs_what_is_left() {
     let root = folder.path("").display().to_string();
     let output = format!("{root}it's \\\"50%%\\\" $HOME/out/run/batch/%A_%a.log");
     let expected = [
+        "--requeue",
+        "--open-mode=append",
         "--job-name=small",
         "--array=1-40",
         "--cpus-per-task=2",
         "--time=1530:00",
-        "--requeue",
-        "--open-mode=append",
         &format!("\"--output={output}\""),
         "--signal=B:USR1@15",
         "--account=physics",
@@ -236,9 +236,9 @@ fn the_script_for_hyperqueue_submits_as_it_is_and_its_tasks_run_what_is_left() {
     let ended = submit(&folder, "hyperqueue", &flags, &["--pin=taskset"]);
     assert_eq!(ended.code, Some(0), "{}", ended.stderr);
     let expected = "\
-submit\n--name=small\n--array=1-40\n--cpus=2\n--time-limit=4h
+submit
 --stdout=%{JOB_ID}_%{TASK_ID}_%{INSTANCE_ID}.out\n--stderr=%{JOB_ID}_%{TASK_ID}_%{INSTANCE_ID}.err
---priority\n3\n--pin=taskset\n";
+--name=small\n--array=1-40\n--cpus=2\n--time-limit=4h\n--priority\n3\n--pin=taskset\n";
     assert!(ended.stdout.starts_with(expected), "{}", ended.stdout);
     assert!(folder.path(&format!("{ODD}/out/run/batch")).is_dir());
     assert!(

@@ -3,7 +3,9 @@
 use crate::program::{Folder, json};
 use std::collections::BTreeMap;
 use std::fs;
+use std::os::unix::fs::symlink;
 use std::path::PathBuf;
+use std::process::Child;
 
 /// Cheap jobs in several parts, and a parameter that no table of slips has.
 fn sweep(seeds: u64) -> String {
@@ -126,31 +128,93 @@ fn every_row_of_an_export_has_all_swept_parameters_and_the_frequency_in_the_orde
     assert_eq!(in_plan_order, folder.table("r", "jobs").texts("job_id"));
 }
 
+/// A small sweep of three parts, run.
+fn folder_with_results() -> Folder {
+    let folder = Folder::new();
+    folder.write("cheap.toml", &sweep(SEEDS));
+    folder.ends(0, "run cheap.toml --out r --no-reduce");
+    folder
+}
+
 #[test]
-fn a_folder_that_is_not_empty_is_refused_and_what_is_missing_is_said() {
+fn what_is_there_is_kept_and_a_place_in_a_results_directory_is_refused() {
+    let folder = folder_with_results();
+    fs::create_dir_all(folder.path("mine/.unfinished-thesis")).unwrap();
+    folder.write("mine/.unfinished-thesis/ch1.txt", "precious");
+    fs::create_dir(folder.path("empty")).unwrap();
+    folder.write("file", "mine");
+    symlink("r/figures", folder.path("link")).unwrap();
+    folder.ends(0, "run cheap.toml --out other --no-reduce --shard 1/2");
+    let before = folder.contents("");
+    for there in ["mine", "empty", "file", "link", "r"] {
+        let ended = folder.ends(2, &format!("export r -o {there}"));
+        assert!(
+            ended.stderr.contains("is there already"),
+            "{}",
+            ended.stderr
+        );
+    }
+    for within in [
+        "r/x",
+        "r/tables/x",
+        "r/tables/slips/x",
+        "r/run/x",
+        "r/reduced/x",
+        "r/figures/x/y",
+        "other/tables/jobs/x",
+        "mine/../r/tables/x",
+    ] {
+        let ended = folder.ends(2, &format!("export r -o {within}"));
+        let words = "lies in the results directory";
+        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+    }
+    assert!(folder.contents("") == before);
+    folder.ends(0, "verify r");
+    folder.ends(0, "export r -o r/../beside/new");
+    assert_eq!(folder.contents("beside/new").len(), 2);
+}
+
+#[test]
+fn what_is_missing_is_said_and_what_a_killed_export_left_is_no_export() {
     let folder = Folder::new();
     folder.write("cheap.toml", &sweep(SEEDS));
     folder.ends(0, "run cheap.toml --out r --shard 1/2 --no-reduce");
-    for made in ["full", "killed/.unfinished-0"] {
-        fs::create_dir_all(folder.path(made)).unwrap();
+    let left = ".stickslip-abcdef.unfinished";
+    fs::create_dir(folder.path(left)).unwrap();
+    folder.write(&format!("{left}/slips.parquet"), "half");
+    let ended = folder.ends(0, "export r -o out");
+    let words = "jobs are missing; stickslip run continues with them";
+    assert!(ended.stderr.contains(words), "{}", ended.stderr);
+    assert_eq!(folder.contents("out").len(), 2);
+    assert_eq!(folder.contents(left).len(), 1);
+}
+
+#[test]
+fn a_part_without_its_slips_ends_an_export_with_damage_and_nothing_is_written() {
+    let folder = folder_with_results();
+    let slips = folder.parts("r", "slips");
+    fs::remove_file(slips.last().unwrap()).unwrap();
+    let before = folder.contents("");
+    for flags in ["", " --format csv", " --json"] {
+        let ended = folder.ends(4, &format!("export r -o a/b{flags}"));
+        assert!(ended.stderr.contains("it is missing"), "{}", ended.stderr);
     }
-    folder.write("full/mine.txt", "mine");
-    let refused = folder.ends(2, "export r -o full");
-    assert!(
-        refused.stderr.contains("full: is not empty"),
-        "{}",
-        refused.stderr
-    );
-    assert_eq!(folder.contents("full").len(), 1);
-    // As a killed export leaves it.
-    folder.write("killed/.unfinished-0/slips.parquet", "half");
-    let ended = folder.ends(0, "export r -o killed");
-    assert!(
-        ended
-            .stderr
-            .contains("jobs are missing; stickslip run continues with them"),
-        "{}",
-        ended.stderr
-    );
-    assert_eq!(folder.contents("killed").len(), 2);
+    assert!(folder.contents("") == before);
+    fs::remove_dir_all(folder.path("r/tables/slips")).unwrap();
+    folder.ends(4, "export r -o out");
+    assert!(!folder.path("out").exists());
+}
+
+#[test]
+fn of_exports_into_one_folder_one_wins_and_the_others_are_refused() {
+    let folder = folder_with_results();
+    folder.ends(0, "export r -o alone");
+    let exports: Vec<_> = (0..4).map(|_| folder.start("export r -o out")).collect();
+    let ended = exports.into_iter().map(Child::wait_with_output);
+    let mut codes: Vec<_> = ended.map(|ended| ended.unwrap().status.code()).collect();
+    codes.sort_unstable();
+    assert_eq!(codes, [Some(0), Some(2), Some(2), Some(2)]);
+    assert!(folder.contents("out") == folder.contents("alone"));
+    let left = fs::read_dir(folder.path("")).unwrap();
+    assert_eq!(left.count(), 4, "the sweep, its results and two exports");
 }

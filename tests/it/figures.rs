@@ -119,6 +119,8 @@ fn each_option_of_a_figure_changes_what_it_says() {
             "not shown: 10 of 16 sets",
         ),
         ("--xlabel speed", ">speed<"),
+        // XML cannot hold it.
+        ("--xlabel a\u{fffe}b", ">a\u{fffd}b<"),
         ("--ylabel τ", ">τ<"),
         ("--ylabel \u{7}", r">\u{7}<"),
         ("--style print", r#"width="86.00mm""#),

@@ -26,6 +26,7 @@ mod grid_hard_cases;
 mod hard_cases;
 mod kills;
 mod moved;
+mod outputs;
 mod program;
 mod ramp;
 mod regimes;

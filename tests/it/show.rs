@@ -40,6 +40,15 @@ fn run_ends_with_the_result_and_show_tells_it_again() {
         .map(|set| set["tau_mean"].as_f64().unwrap())
         .collect();
     assert_eq!(of_json, of_table);
+    // A table without rows has its columns, too.
+    for columns in ["", " --columns frequency,tau_mean"] {
+        let csv = |condition: &str| {
+            let show = format!("show out --csv{columns}{condition}");
+            folder.ends(0, &show).stdout
+        };
+        let head = csv("").lines().next().unwrap().to_owned() + "\n";
+        assert_eq!(csv(" --where frequency<0"), head);
+    }
     // Each column stands once, whether it is asked for or goes with another.
     let ends = "show out --csv --columns tau_sd_high,tau_sd,tau_sd_low";
     assert!(

@@ -176,7 +176,7 @@ class Scenario:
         problem = self.lost(folder)
         if problem:
             return f"{case}\n{problem}"
-        # What is there of an export is whole, but it is one only in a folder of its own.
+        # An export is there as a whole or not at all; the next one needs a free name.
         shutil.rmtree(folder / "exported", ignore_errors=True)
         again = self.call(folder, self.command)
         if again.returncode not in (DONE, STOPPED) or results(folder) != self.after:

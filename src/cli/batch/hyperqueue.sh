@@ -3,8 +3,7 @@
 # Tasks share what is left, whatever their number, and as many run as have room. More tasks follow those whose time is
 # over until all is done; those that find nothing to do end at once.
 mkdir -p {{logs}} && cd {{logs}} && exec hq submit \
-    --name={{name}} --array={{array}} --cpus={{threads}} --time-limit={{time}} \
     --stdout='%{JOB_ID}_%{TASK_ID}_%{INSTANCE_ID}.out' \
     --stderr='%{JOB_ID}_%{TASK_ID}_%{INSTANCE_ID}.err' \
     {{options}}"$@" -- \
-    {{command}} --threads {{threads}}
+    {{command}}

@@ -2,10 +2,6 @@
 # Submits the sweep {{name}} to Slurm. Run it with sh; its options go to sbatch.
 mkdir -p {{logs}} && exec sbatch "$@" <<'EOF'
 #!/bin/sh
-#SBATCH --job-name={{name}}
-#SBATCH --array={{array}}
-#SBATCH --cpus-per-task={{threads}}
-#SBATCH --time={{time}}
 #SBATCH --requeue
 #SBATCH --open-mode=append
 {{options}}# Elements share what is left, whatever their number; any of them may be missing or come twice. More elements than

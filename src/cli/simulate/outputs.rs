@@ -1,18 +1,18 @@
 //! The files of `stickslip simulate`: tables and pictures, checked before anything runs.
 
 use super::super::exit::UsageError;
-use super::super::output::replace;
-use super::super::plot::format_of;
+use super::super::plot::picture_file;
+use super::super::signals;
 use super::{Arguments, Panel, PlotFlags};
 use crate::figure::simulation;
 use crate::model::Parameters;
 use crate::observe::{MapRow, Slip};
+use crate::results::destination::{Destination, Kind};
 use crate::simulate::Records;
 use crate::sweep::Sweep;
 use crate::table::columns::Table;
 use crate::table::file::{Footer, TableWriter};
 use crate::table::shown::shown;
-use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
 use std::borrow::Cow;
 use std::path::Path;
@@ -22,14 +22,35 @@ pub(super) fn check_outputs(
     arguments: &Arguments,
     sweep: &Sweep,
     parameters: &Parameters,
+) -> Result<()> {
+    check_times(arguments, sweep, parameters).map_err(UsageError)?;
+    let tables = &arguments.tables;
+    let tables = [
+        &tables.trace,
+        &tables.map,
+        &tables.profile,
+        &tables.contacts,
+        &tables.slip_table,
+    ];
+    let mut all = Vec::new();
+    for table in tables.into_iter().flatten() {
+        if table.exists() && !table.is_file() {
+            return Err(UsageError(format!("{}: must be a file", shown(table))).into());
+        }
+        all.push(Destination::new(table, Kind::PARQUET)?);
+    }
+    for file in &arguments.plot.files {
+        all.push(picture_file(file)?.0);
+    }
+    Ok(Destination::refuse_same(&all)?)
+}
+
+fn check_times(
+    arguments: &Arguments,
+    sweep: &Sweep,
+    parameters: &Parameters,
 ) -> Result<(), String> {
-    let Arguments {
-        tables,
-        plot: PlotFlags {
-            files, from, until, ..
-        },
-        ..
-    } = arguments;
+    let PlotFlags { from, until, .. } = &arguments.plot;
     let longest = sweep.recording().max_time.unwrap_or(f64::INFINITY);
     arguments
         .request()
@@ -48,59 +69,31 @@ pub(super) fn check_outputs(
             "--until {until}: must be a finite number > {from}, the first instant, in s"
         ));
     }
-    files
-        .iter()
-        .try_for_each(|path| format_of(path).map(drop))
-        .map_err(|error| format!("--plot {error}"))?;
-    let tables = [
-        ("--trace", &tables.trace),
-        ("--map", &tables.map),
-        ("--profile", &tables.profile),
-        ("--contacts", &tables.contacts),
-        ("--slip-table", &tables.slip_table),
-    ];
-    let tables = tables
-        .into_iter()
-        .filter_map(|(flag, path)| Some((flag, path.as_ref()?)));
-    let mut paths = Vec::new();
-    for (flag, path) in tables.chain(files.iter().map(|path| ("--plot", path))) {
-        let folder = path
-            .parent()
-            .filter(|folder| !folder.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
-        let flag = format!("{flag} {}", shown(path));
-        // A device is not to be replaced by a file.
-        if !folder.is_dir() || (path.exists() && !path.is_file()) {
-            return Err(format!(
-                "{flag}: cannot be written; its folder must exist, and it must be a file"
-            ));
-        }
-        if paths.contains(&path) {
-            return Err(format!(
-                "{flag}: another flag writes this file, too; give each its own"
-            ));
-        }
-        paths.push(path);
-    }
     Ok(())
 }
 
-/// Writes a table, if it was asked for.
-pub(super) fn write_table<R: Table>(
-    path: Option<&Path>,
-    footer: &Footer,
-    left_out: &[Cow<'static, str>],
-    rows: impl Iterator<Item = R>,
-) -> Result<()> {
-    let Some(path) = path else { return Ok(()) };
-    replace(path, |draft| {
-        let mut writer = TableWriter::without(left_out, Disk.create(draft)?, footer)?;
-        for row in rows {
-            writer.push(&row)?;
-        }
-        writer.finish()?;
-        Ok(())
-    })
+/// What the tables of a job have in common.
+pub(super) struct Tables<'a> {
+    pub footer: &'a Footer,
+    pub left_out: &'a [Cow<'static, str>],
+}
+
+impl Tables<'_> {
+    /// Writes a table, if it was asked for.
+    pub fn write<R: Table>(
+        &self,
+        path: Option<&Path>,
+        rows: impl Iterator<Item = R>,
+    ) -> Result<()> {
+        let Some(path) = path else { return Ok(()) };
+        Destination::new(path, Kind::PARQUET)?.write(signals::catch, |file| {
+            let mut writer = TableWriter::without(self.left_out, file, self.footer)?;
+            for row in rows {
+                writer.push(&row)?;
+            }
+            Ok(writer.finish()?)
+        })
+    }
 }
 
 /// Draws the plot into each file that was asked for.
@@ -148,8 +141,9 @@ pub(super) fn write_pictures(
     )
     .map_err(|error| UsageError(format!("--from {}: {error}", arguments.plot.from)))?;
     for path in &arguments.plot.files {
-        let bytes = picture.encoded(format_of(path)?)?;
-        replace(path, |draft| Ok(std::fs::write(draft, &bytes)?))?;
+        let (destination, format) = picture_file(path)?;
+        let bytes = picture.encoded(format)?;
+        destination.write(signals::catch, |mut file| Ok(file.write(&bytes)?))?;
     }
     Ok(())
 }

@@ -339,8 +339,10 @@ impl Storage for FaultyDisk {
 
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
         self.on(Operation::Create, file, |state| {
+            if state.seen.contains_key(file) {
+                return Err(io::ErrorKind::AlreadyExists.into());
+            }
             let bytes = state.touch(file)?;
-            bytes.lock().unwrap().seen.clear();
             Ok(StoredFile::new(
                 file,
                 FaultyFile {

@@ -87,7 +87,12 @@ impl Process {
                     .root()
                     .with_file_name(format!("export-{:016x}", own_number()));
                 Ok(Results::read(layout)?
-                    .export(&folder, Format::Arrow, &mut |_, _| ())
+                    .export(
+                        &folder,
+                        Format::Arrow,
+                        &AtomicBool::new(false),
+                        &mut |_, _| (),
+                    )
                     .map(|_| ())?)
             }
             Self::Repair => assert_sound(&Results::repair(layout)?),

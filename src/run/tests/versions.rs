@@ -63,9 +63,16 @@ fn a_directory_of_another_version_is_reduced_and_exported_as_it_is_and_not_run()
         Results::read(&layout).unwrap(),
         tempfile::tempdir().unwrap(),
     );
-    let exported = own.export(out.path(), Format::Csv, &mut |_, _| ()).unwrap();
+    let exported = own
+        .export(
+            &out.path().join("x"),
+            Format::Csv,
+            &AtomicBool::new(false),
+            &mut |_, _| (),
+        )
+        .unwrap();
     assert_eq!((exported.jobs, exported.jobs_missing), (2 * SEEDS, 0));
-    let jobs = fs::read_to_string(out.path().join("jobs.csv")).unwrap();
+    let jobs = fs::read_to_string(out.path().join("x/jobs.csv")).unwrap();
     let place = jobs
         .lines()
         .next()

@@ -43,7 +43,7 @@ impl<T: OverDisk> Storage for T {
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
         let created = self
             .before(Access::Change)
-            .and_then(|()| File::create(file));
+            .and_then(|()| File::create_new(file));
         let sink = self.wrap(created.map_err(StorageError::at("create", file))?);
         Ok(StoredFile {
             path: file.to_owned(),
