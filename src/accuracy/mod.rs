@@ -19,7 +19,7 @@ mod verdict;
 pub use cost::Cost;
 pub use distance::Distances;
 pub use report::{check, to_json, write};
-pub use study::{DistanceRow, Findings, MethodRow, QUANTITIES, Study};
+pub use study::{DistanceRow, Findings, MethodRow, Study};
 pub use verdict::verdict;
 
 use crate::model::{Parameters, Symbol, Value};

@@ -1,15 +1,13 @@
-//! What a command of accuracy leaves behind: tables as Parquet, everything as JSON, and figures.
+//! What a command of accuracy leaves behind: everything as JSON, and figures.
 
 use super::distance::Distances;
 use super::study::{Findings, MethodRow, Study};
 use super::{cost, other_settings, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
-use crate::results::ResultsError;
 use crate::results::destination::{Destination, Kind, refuse_reserved};
 use crate::table::arrow;
-use crate::table::columns::Table;
-use crate::table::file::{Footer, PROGRAM, TableWriter};
+use crate::table::file::PROGRAM;
 use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
 use serde_json::{Value, json};
@@ -80,31 +78,14 @@ pub fn write(
         documents.push((format!("{name}.png"), picture.png()?));
     }
     Disk.ensure_folder(folder)?;
-    let mut files = vec![
-        write_table(folder, &findings.methods, stop)?,
-        write_table(folder, &findings.distances, stop)?,
-    ];
+    let mut files = Vec::new();
     for (name, bytes) in documents {
         let file = folder.join(name);
-        destination(&file)?.write(stop, |mut file| Ok(file.write(&bytes)?))?;
+        let kind = Kind::of_name(&file).unwrap_or(Kind::NEW);
+        Destination::new(&file, kind)?.write(stop, |mut file| Ok(file.write(&bytes)?))?;
         files.push(file);
     }
     Ok(files)
-}
-
-fn destination(file: &Path) -> Result<Destination, ResultsError> {
-    Destination::new(file, Kind::of_name(file).unwrap_or(Kind::NEW))
-}
-
-fn write_table<R: Table>(folder: &Path, rows: &[R], stop: Stop) -> Result<PathBuf> {
-    let path = folder.join(format!("{}.parquet", R::NAME));
-    destination(&path)?.write(stop, |file| {
-        let footer = Footer::default().with("processor", &cost::processor());
-        let mut writer = TableWriter::new(file, &footer)?;
-        rows.iter().try_for_each(|row| writer.push(row))?;
-        Ok(writer.finish()?)
-    })?;
-    Ok(path)
 }
 
 /// The figure of the sets that are this one without modulation: cost against the error of break times, and against
@@ -229,7 +210,6 @@ mod tests {
     use crate::model::selected::Selected;
     use crate::solver::Solver;
     use crate::table::columns::{Column, Row};
-    use crate::table::file::Dataset;
 
     static NEVER: AtomicBool = AtomicBool::new(false);
 
@@ -288,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_study_is_written_as_tables_json_and_figures() {
+    fn a_study_is_written_as_json_and_figures() {
         let folder = tempfile::tempdir().unwrap();
         let study = Study {
             sets: vec![Parameters::default()],
@@ -306,22 +286,13 @@ mod tests {
         assert_eq!(
             names,
             [
-                "methods.parquet",
-                "distances.parquet",
                 "accuracy.json",
                 "work-precision-V0-1e-4.svg",
                 "work-precision-V0-1e-4.png"
             ]
         );
         assert!(files.iter().all(|file| file.is_file()));
-        let batches = Dataset::new(&Disk, files[..1].to_vec()).batches();
-        assert_eq!(
-            batches
-                .map(|batch| batch.unwrap().rows.num_rows())
-                .sum::<usize>(),
-            2
-        );
-        let json: Value = serde_json::from_slice(&std::fs::read(&files[2]).unwrap()).unwrap();
+        let json: Value = serde_json::from_slice(&std::fs::read(&files[0]).unwrap()).unwrap();
         assert_eq!(json["methods"][0]["timed_slips"], 0);
         assert_eq!(
             (
@@ -379,7 +350,7 @@ mod tests {
                 assert!(row.contains(&format!("`{column}`")), "{name}.{column}");
             }
         };
-        described(MethodRow::NAME, MethodRow::columns());
-        described(DistanceRow::NAME, DistanceRow::columns());
+        described("methods", MethodRow::columns());
+        described("distances", DistanceRow::columns());
     }
 }

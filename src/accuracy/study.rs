@@ -18,7 +18,7 @@ use crate::run::cpu;
 use crate::solver::{
     Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate, simulate_audited,
 };
-use crate::table::columns::{columns, tables};
+use crate::table::columns::columns;
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -197,13 +197,11 @@ columns! {
     }
 }
 
-tables! { MethodRow = "methods", "One row per set of parameters and solver setting"; }
-
 /// A quantity of slips whose distributions are compared.
 type Quantity = (&'static str, fn(&Slip) -> Option<f64>);
 
 /// By their columns in the table of slips.
-pub const QUANTITIES: [Quantity; 6] = [
+const QUANTITIES: [Quantity; 6] = [
     ("interval", |slip| slip.interval),
     ("phase", |slip| slip.phase),
     ("drop", |slip| Some(slip.drop)),
@@ -228,11 +226,6 @@ columns! {
         reference_deviation: f64 = "", "standard deviation of the reference";
         distances: Distances;
     }
-}
-
-tables! {
-    DistanceRow = "distances",
-        "One row per set of parameters, solver setting and quantity, in the unit of its column in `slips`";
 }
 
 impl DistanceRow {

@@ -4,7 +4,7 @@ use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
 use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
-use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, verdict};
+use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, verdict};
 use crate::model::Parameters;
 use crate::results::layout::Layout;
 use crate::run::threads::{self, Threads};
@@ -41,7 +41,7 @@ are those of the study.
 
 Examples:
   stickslip accuracy --quick                 a first look, in about a minute
-  stickslip accuracy --all                   the full study of the paper's parameters, with a table for each set
+  stickslip accuracy                         the full study of the paper's parameters
   stickslip accuracy --set Kd=1e8 --set V0=1e-5
   stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver")]
 pub struct Arguments {
@@ -55,9 +55,6 @@ pub struct Arguments {
     /// Folder for tables, JSON and figures [default: results/<name of the sweep>-accuracy, or results/accuracy]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print the tables of each set: timings, how long trajectories stay together, ledgers, biases of all quantities
-    #[arg(long)]
-    all: bool,
     /// Take fewer slips
     #[arg(long)]
     quick: bool,
@@ -129,7 +126,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     if arguments.json {
         output::plain_json(&accuracy::to_json(&study, &findings))?;
     } else {
-        output::print(&study_text(&study, &findings, arguments.all))?;
+        output::print(&study_text(&study, &findings))?;
         files
             .iter()
             .try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
@@ -167,46 +164,29 @@ fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, u64)>> {
     Ok(sets)
 }
 
-/// The verdict, and what is behind it: costs, errors of break times and biases of the interval, or of all quantities.
-fn study_text(study: &Study, findings: &Findings, all: bool) -> String {
+/// The verdict, and what is behind it: costs, errors of break times and biases of the interval.
+fn study_text(study: &Study, findings: &Findings) -> String {
     let mut lines = verdict(study, findings);
     lines.push(format!(
         "\n{}; one thread\n\
          ms/slip: CPU time in the cheapest of {} realisations, * extrapolated from that of a step\n\
-         break times: median (largest) error of the first {}; others: bias of the mean ± 95 % interval, each one of many,\n\
-         those of a column against the same reference",
+         break times: median (largest) error of the first {}; interval: bias of the mean ± 95 % interval, each one of many,\n\
+         all against the same reference; accuracy.json has more quantities",
         accuracy::cost::processor(),
         study.seeds,
         study.breaks
     ));
-    if all {
-        lines.push(
-            "median: cost of the median realisation over that of the cheapest; together: breaks and model time until\n\
-             the trajectory leaves that of the reference, or > at least; ledger: residual of the energy over the\n\
-             work of the drive"
-                .to_owned(),
-        );
-    }
-    let tables = study
-        .sets
-        .iter()
-        .map(|set| table(study, findings, set, all));
+    let tables = study.sets.iter().map(|set| table(study, findings, set));
     lines.join("\n") + "\n" + &tables.collect::<String>()
 }
 
 /// A line for each solver at a set; -> before that of the sweep.
-fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> String {
+fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
     let rows: Vec<&MethodRow> = findings
         .methods
         .iter()
         .filter(|row| *row.parameters == *set)
         .collect();
-    let is_there = |quantity: &str| {
-        rows.iter()
-            .any(|row| findings.distances_of(row, quantity).is_some())
-    };
-    let quantities = QUANTITIES.map(|(quantity, _)| quantity).into_iter();
-    let quantities = quantities.filter(|&name| (all || name == "interval") && is_there(name));
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     let mut columns = Columns::default();
     let mut add = |is_worded: bool, head: &str, cell: &dyn Fn(&MethodRow) -> String| {
@@ -243,47 +223,12 @@ fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> Str
             or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
         },
     );
-    for name in quantities {
-        let unit = if name == "phase" { "rad" } else { "%" };
-        add(false, &format!("{name} ({unit})"), &|row| {
-            or_none(findings.distances_of(row, name).map(|row| {
-                let scale = if unit == "%" {
-                    100.0 / row.reference_mean.abs()
-                } else {
-                    1.0
-                };
-                format!(
-                    "{:+.3} ± {:.3}",
-                    scale * row.distances.mean_bias,
-                    scale * row.half_width()
-                )
-            }))
-        });
-    }
-    if all {
-        add(false, "median", &|row| {
-            format!("{:.2}", row.median_per_slip / row.cost.per_slip)
-        });
-        add(false, "ns/step", &|row| {
-            format!("{:.0}", 1e9 * row.cost.per_step)
-        });
-        add(false, "together", &|MethodRow { break_times, .. }| {
-            let mark = if break_times.together_throughout {
-                ">"
-            } else {
-                ""
-            };
-            let together = break_times.together.zip(break_times.together_seconds);
-            or_none(
-                together.map(|(breaks, seconds)| format!("{mark}{breaks} breaks, {seconds:.3} s")),
-            )
-        });
-        add(false, "ledger", &|row| {
-            or_none(
-                row.ledger_residual
-                    .map(|residual| format!("{:.1e}", residual.abs())),
-            )
-        });
-    }
+    add(false, "interval (%)", &|row| {
+        or_none(findings.distances_of(row, "interval").map(|row| {
+            let scale = 100.0 / row.reference_mean.abs();
+            let bias = scale * row.distances.mean_bias;
+            format!("{bias:+.3} ± {:.3}", scale * row.half_width())
+        }))
+    });
     format!("\n{}\n{columns}", set_in_words(set))
 }

@@ -31,7 +31,7 @@ fn no_output_replaces_what_is_not_of_its_kind() {
     let folder = folder_with_results();
     folder.write("thesis.html", "<!doctype html>\n<title>thesis</title>");
     fs::create_dir(folder.path("study")).unwrap();
-    for name in ["a.svg", "a.png", "a.pdf", "study/methods.parquet"] {
+    for name in ["a.svg", "a.png", "a.pdf", "study/accuracy.json"] {
         folder.write(name, "mine");
     }
     // Found to be wrong after a computation of days, this would come too late.
