@@ -22,12 +22,12 @@ Examples:
 
 Rows are in the order of the plan, extensions one after another. Whatever threads, shards and interruptions came
 before, the bytes are the same; equal jobs after other extensions are the same rows in another order. The directory
-is not changed. If the export fails or is stopped, FOLDER is not made.")]
+is not changed. If the export fails or is stopped, FOLDER is as before.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Folder to make, outside of results directories; an empty one is replaced
+    /// Folder to make, outside of results directories; it may be there if it is empty
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
     /// Format of the files

@@ -179,19 +179,25 @@ pub struct NewFolder {
 }
 
 impl NewFolder {
-    /// Refuses a place where something is, or in a results directory.
+    /// Refuses a place in a results directory, and one where something is but an empty folder, which is replaced.
     pub fn new(path: &Path) -> Result<Self, ResultsError> {
-        if path.symlink_metadata().is_ok() {
-            return Err(ResultsError::refused(path, THERE));
-        }
         refuse_within_results(path, |_| true)?;
         let place = resolved(path)?;
-        let above = place.ancestors().find(|above| above.exists());
+        let there = fs::metadata(&place).ok();
+        let is_empty = || fs::read_dir(&place).is_ok_and(|mut names| names.next().is_none());
+        if there.is_some() && !is_empty() {
+            return Err(ResultsError::refused(path, THERE));
+        }
+        if std::env::current_dir().is_ok_and(|current| current == place) {
+            let problem = "is the current folder, which would be replaced; name a new one";
+            return Err(ResultsError::refused(path, problem));
+        }
+        let mut above = place.ancestors().skip(1);
         let draft = Builder::new()
             .prefix(PREFIX)
             .suffix(".unfinished")
-            .permissions(Permissions::from_mode(0o777))
-            .tempdir_in(above.unwrap_or(&place))
+            .permissions(there.map_or(Permissions::from_mode(0o777), |there| there.permissions()))
+            .tempdir_in(above.find(|above| above.exists()).unwrap_or(&place))
             .map_err(StorageError::at("create", path))?;
         Ok(Self { place, draft })
     }
@@ -495,19 +501,20 @@ mod tests {
         let folder = folder_with_results();
         let path = |name: &str| folder.path().join(name);
         symlink("d/figures", path("link")).unwrap();
-        fs::create_dir(path("mine")).unwrap();
+        fs::create_dir_all(path("mine/thesis")).unwrap();
         for (refused, words) in [
             ("d/x", "lies in the results directory"),
             ("d/tables/slips/x", "lies in the results directory"),
             ("d/figures/a/b", "lies in the results directory"),
             ("link/x", "lies in the results directory"),
             ("mine/../d/x", "lies in the results directory"),
-            ("d", "is there already"),
-            ("link", "is there already"),
+            ("d", "lies in the results directory"),
             ("mine", "is there already"),
         ] {
             assert_refused(NewFolder::new(&path(refused)), words);
         }
+        let current = std::env::current_dir().unwrap();
+        assert!(NewFolder::new(&current).is_err());
         let before = names(folder.path());
         drop(NewFolder::new(&path("a/b")).unwrap());
         assert_eq!(names(folder.path()), before);
@@ -518,7 +525,14 @@ mod tests {
         assert_refused(second.publish(&Disk), "is there already");
         assert_eq!(fs::read_to_string(path("a/b/file")).unwrap(), "first");
         assert_eq!(names(&path("a")), ["b"]);
-        let modes = ["a", "a/b"].map(|name| fs::metadata(path(name)).unwrap().mode());
-        assert_eq!(modes[0], modes[1]);
+        let mode = |name: &str| fs::metadata(path(name)).unwrap().mode();
+        assert_eq!(mode("a"), mode("a/b"));
+        fs::create_dir(path("empty")).unwrap();
+        fs::set_permissions(path("empty"), Permissions::from_mode(0o750)).unwrap();
+        let third = NewFolder::new(&path("empty")).unwrap();
+        fs::write(third.draft.path().join("file"), "third").unwrap();
+        third.publish(&Disk).unwrap();
+        assert_eq!(mode("empty") & 0o777, 0o750);
+        assert_eq!(names(&path("empty")), ["file"]);
     }
 }
