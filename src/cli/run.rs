@@ -243,9 +243,14 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
         output::report(&format!(
             "{failed} failed; tables/jobs has the reasons. --retry-failed runs them again."
         ));
-        return Exit::Failed;
     }
-    Exit::Done
+    if report.jobs_left > 0 && !arguments.worker {
+        Exit::Stopped
+    } else if report.jobs_failed > 0 {
+        Exit::Failed
+    } else {
+        Exit::Done
+    }
 }
 
 /// What is told of a reduction.
