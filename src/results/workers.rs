@@ -55,11 +55,40 @@ pub struct Worker {
     system: String,
     /// When it began, in the ticks of its system: another process may get its id.
     process_start: Option<u64>,
+    /// The directory that it works at, if its host says.
+    #[serde(default)]
+    directory: Option<Directory>,
     /// Checksum of the sweep file that it works at.
     sweep: String,
     pub threads: usize,
     /// Jobs that it has finished, in a second.
     pub jobs_per_second: f64,
+}
+
+/// What a host knows a directory by, wherever it is moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Directory {
+    device: u64,
+    inode: u64,
+}
+
+impl Directory {
+    fn of(root: &Path) -> Option<Self> {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::MetadataExt;
+            let metadata = std::fs::metadata(root).ok()?;
+            Some(Self {
+                device: metadata.dev(),
+                inode: metadata.ino(),
+            })
+        }
+        #[cfg(not(unix))]
+        {
+            _ = root;
+            None
+        }
+    }
 }
 
 /// Names of the workers of this process, and their threads: one that died under a test leaves a file like a living one's.
@@ -80,20 +109,32 @@ impl Worker {
             process,
             system,
             process_start,
+            directory: None,
             sweep,
             threads,
             jobs_per_second: 0.0,
         }
     }
 
-    /// Whether the process lives, if it is one that can be looked up.
-    fn lives_here(&self, name: &str) -> Option<bool> {
+    /// Whether the process lives and works at this directory, if it is one that can be looked up.
+    fn lives_here(&self, name: &str, directory: Option<Directory>) -> Option<bool> {
         let can_look =
             !self.system.is_empty() && self.system == system() && self.process_start.is_some();
-        can_look.then(|| {
-            let is_lost = self.process == std::process::id() && !own().contains_key(name);
-            !is_lost && process_start(self.process) == self.process_start
-        })
+        if !can_look {
+            return None;
+        }
+        let is_lost = self.process == std::process::id() && !own().contains_key(name);
+        if is_lost || process_start(self.process) != self.process_start {
+            return Some(false);
+        }
+        match (self.directory, directory) {
+            // The file of one that works at the original came with a copy.
+            (Some(its), Some(here)) if its.device == here.device => Some(its.inode == here.inode),
+            // Another device may be another mount of the same directory: its beats decide, and taking a living worker
+            // for dead is worse than waiting.
+            (Some(_), Some(_)) => None,
+            _ => Some(true),
+        }
     }
 }
 
@@ -185,6 +226,7 @@ impl Layout<'_> {
     /// The workers that live, by their names. Compares beats with `now`, by the clock of the file system.
     pub fn living(&self, now: SystemTime) -> Result<BTreeMap<String, Living>, StorageError> {
         let mut living = BTreeMap::new();
+        let directory = Directory::of(self.root());
         for name in self.storage.list(&self.workers())? {
             let (name, path) = (
                 name.to_string_lossy().into_owned(),
@@ -210,7 +252,7 @@ impl Layout<'_> {
             let Ok(worker) = serde_json::from_slice::<Worker>(&text) else {
                 continue;
             };
-            let lives_here = worker.lives_here(&name);
+            let lives_here = worker.lives_here(&name, directory);
             let is_recent =
                 || now.duration_since(beat).is_ok_and(|age| age < SILENCE) || beat > now;
             if lives_here.unwrap_or_else(is_recent) {
@@ -294,6 +336,7 @@ impl<'a> Member<'a> {
         let jobs_per_second =
             self.jobs.load(Ordering::Relaxed) as f64 / self.begin.elapsed().as_secs_f64();
         let worker = Worker {
+            directory: Directory::of(self.layout.root()),
             jobs_per_second,
             ..self.worker.clone()
         };
