@@ -205,6 +205,9 @@ fn work(
 
 /// Says what is left and what to do, and how the command ends.
 fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
+    for marked in &report.marked {
+        output::report(&marked.to_string());
+    }
     if report.stopped {
         let hint = match arguments.walltime {
             Some(_) if report.jobs_run == 0 => {

@@ -15,10 +15,11 @@ use crate::sweep::Sweep;
 use crate::table::checksum;
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::shown::shown_text;
-use crate::table::storage::StorageError;
+use crate::table::storage::{StorageError, gone_is_fine};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -74,20 +75,11 @@ struct Directory {
 
 impl Directory {
     fn of(root: &Path) -> Option<Self> {
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::MetadataExt;
-            let metadata = std::fs::metadata(root).ok()?;
-            Some(Self {
-                device: metadata.dev(),
-                inode: metadata.ino(),
-            })
-        }
-        #[cfg(not(unix))]
-        {
-            _ = root;
-            None
-        }
+        let metadata = std::fs::metadata(root).ok()?;
+        Some(Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+        })
     }
 }
 
@@ -102,15 +94,13 @@ fn own() -> MutexGuard<'static, BTreeMap<String, ThreadId>> {
 impl Worker {
     fn here(sweep: &Sweep, threads: usize) -> Self {
         let process = std::process::id();
-        let (system, process_start) = (system(), process_start(process));
-        let sweep = checksum::of_text(sweep.text());
         Self {
             host: host(),
             process,
-            system,
-            process_start,
+            system: system(),
+            process_start: process_start(process),
             directory: None,
-            sweep,
+            sweep: checksum::of_text(sweep.text()),
             threads,
             jobs_per_second: 0.0,
         }
@@ -148,6 +138,11 @@ pub fn host() -> String {
         .map(|name| name.trim().to_owned())
         .filter(|name| !name.is_empty());
     name.unwrap_or_else(|| "unknown".to_owned())
+}
+
+/// The name of a host as names of files hold it.
+pub fn plain(host: &str) -> String {
+    host.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-', "_")
 }
 
 /// The boot of the kernel and the name space of processes.
@@ -272,14 +267,7 @@ impl Layout<'_> {
 
 impl<'a> Member<'a> {
     fn join(layout: &Layout<'a>, worker: Worker) -> Result<Self, ResultsError> {
-        let plain = |c: char| {
-            if c.is_ascii_alphanumeric() || c == '-' {
-                c
-            } else {
-                '_'
-            }
-        };
-        let host: String = worker.host.chars().map(plain).collect();
+        let host = plain(&worker.host);
         let number = own_number();
         let name = format!("{PREFIX}{host}-{}-{number:016x}", worker.process);
         own().insert(name.clone(), std::thread::current().id());
@@ -418,14 +406,10 @@ impl<'a> Member<'a> {
         commit.publish_new()
     }
 
-    /// Removes what workers left that live no more. Their claims go only once nobody else is there, as one who is may have
-    /// looked up what is done before they ended.
+    /// Removes what dead workers left, and marks the parts that they were at. Their claims go only once nobody else is there,
+    /// as another may have looked up what is done before they ended.
     pub fn tidy(&self) -> Result<(), StorageError> {
         let (layout, storage) = (&self.layout, self.layout.storage);
-        let gone_is_fine = |removed: Result<(), StorageError>| match removed {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            removed => removed,
-        };
         // In this order: whoever comes later is not in these lists, and whoever came before is among the living.
         let claims = storage.list(&layout.claims())?;
         let mut left = storage.list(&layout.workers())?;
@@ -441,6 +425,7 @@ impl<'a> Member<'a> {
             .filter(|name| is_dead(name))
         {
             layout.refuse_link(&layout.staging(&name))?;
+            layout.mark_deaths(&name)?;
             storage.remove_folder(&layout.staging(&name))?;
             let file = layout.workers().join(&*name);
             if storage.exists(&file)? {
