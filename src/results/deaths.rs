@@ -120,9 +120,12 @@ impl Layout<'_> {
         }
         let done = self.parts_in(&self.table(tables::JOBS))?;
         let of_done = marks.into_iter().filter(|(part, _)| done.contains(part));
-        of_done
-            .flat_map(|(_, marks)| marks)
-            .try_for_each(|mark| gone_is_fine(self.storage.remove(&self.deaths().join(mark))))
+        for mark in of_done.flat_map(|(_, marks)| marks) {
+            let mark = self.deaths().join(mark);
+            self.refuse_link(&mark)?;
+            gone_is_fine(self.storage.remove(&mark))?;
+        }
+        Ok(())
     }
 }
 
