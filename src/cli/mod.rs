@@ -68,7 +68,7 @@ enum Command {
 /// default the executable itself; the first of the arguments is its name.
 pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let command = Cli::parse_from(arguments).command;
-    let ended = match command {
+    let ended = signals::outlive_limit_of_files().and_then(|()| match command {
         Command::Init(arguments) => init::init(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
         Command::Run(arguments) => run::run(&arguments),
@@ -83,7 +83,7 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Generate(arguments) => generate::generate(&arguments),
-    };
+    });
     let exit = ended.unwrap_or_else(|error| {
         output::report(&format!("error: {}", message(&error)));
         Exit::of(&error)

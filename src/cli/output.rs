@@ -1,8 +1,9 @@
 //! Text for people and JSON for programs.
 
 use crate::results::rounds::RoundsSoFar;
+use crate::run::Reasons;
 use crate::sweep::Standing;
-use crate::table::shown::is_plain;
+use crate::table::shown::{is_plain, shown_text};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use serde::Serialize;
@@ -10,6 +11,9 @@ use std::fmt;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::time::Duration;
+
+/// Reasons of failures that are listed.
+const MAX_REASONS: usize = 10;
 
 /// Writes to standard output. That its reader has seen enough, as `head` has, is no error.
 pub fn print(text: &str) -> Result<()> {
@@ -110,15 +114,6 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// Bytes of memory, rounded up.
-pub fn memory(bytes: f64) -> String {
-    if bytes < 1e9 {
-        format!("{:.0} MB", (1e-6 * bytes).ceil())
-    } else {
-        format!("{:.1} GB", 1e-9 * bytes)
-    }
-}
-
 /// A count with its noun, in the plural where that fits.
 pub fn count(number: u64, noun: &str) -> String {
     if number == 1 {
@@ -126,6 +121,23 @@ pub fn count(number: u64, noun: &str) -> String {
     } else {
         format!("{number} {noun}s")
     }
+}
+
+/// Lines of the most frequent reasons of failures.
+pub fn by_reason(reasons: &Reasons) -> String {
+    let reasons = reasons.sorted();
+    let line = |(reason, jobs): &(&str, u64)| {
+        format!(
+            "failed  {} in all: {}\n",
+            count(*jobs, "job"),
+            shown_text(reason)
+        )
+    };
+    let mut lines: String = reasons.iter().take(MAX_REASONS).map(line).collect();
+    if reasons.len() > MAX_REASONS {
+        lines += "failed  for other reasons, too: see outcome and reason in tables/jobs\n";
+    }
+    lines
 }
 
 /// How far the rounds of a sweep are.

@@ -6,9 +6,10 @@ use super::sweep::{self, PresetFlag, Variation};
 use crate::results::layout::Layout;
 use crate::results::rounds::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
+use crate::run::threads::{self, Threads};
 use crate::run::{Overview, status};
 use crate::sweep::{Bounds, Extension, Plan, Sweep};
-use crate::table::shown::{serialize_path, shown};
+use crate::table::shown::{serialize_path, shown, shown_bytes};
 use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
 use clap::Args;
@@ -43,11 +44,8 @@ pub struct Arguments {
 /// Version of the JSON.
 const FORMAT: u32 = 1;
 
-/// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction; and for each thread, for
-/// a contact of its job, and for a slip of a part that is not whole yet. As measured, rounded up.
+/// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction. As measured, rounded up.
 const MEMORY: f64 = 80e6;
-const MEMORY_OF_A_CONTACT: f64 = 350.0;
-const MEMORY_OF_A_SLIP: f64 = 600.0;
 
 /// What of the sweep is in its results directory, or why it cannot be run there.
 #[derive(Serialize)]
@@ -117,10 +115,10 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         sweep::warn_of_partitions(root, &sweep);
     }
     let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
-    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    let threads = Threads::choose(None, |variable| std::env::var_os(variable))?;
+    let threads = threads::or_all_cores(threads.count);
     let wall_time = totals.cost / threads as f64;
-    let thread_memory =
-        MEMORY_OF_A_CONTACT * totals.contacts as f64 + MEMORY_OF_A_SLIP * totals.slips_of_part;
+    let thread_memory = totals.memory + totals.memory_of_slips;
     let slips = totals.jobs.saturating_mul(sweep.recording().slips);
     // What all rounds of a sweep that decides for itself may add up to; the other numbers are those of the first.
     let at_most = sweep.bounds();
@@ -190,14 +188,18 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
             ),
             (
                 "predicted wall time",
-                format!("{} on {threads} cores", output::duration(wall_time)),
+                format!(
+                    "{} on {}",
+                    output::duration(wall_time),
+                    output::count(threads as u64, "thread")
+                ),
             ),
             (
                 "worker memory",
                 format!(
                     "{} and {} for each thread",
-                    output::memory(MEMORY),
-                    output::memory(thread_memory)
+                    shown_bytes(MEMORY),
+                    shown_bytes(thread_memory)
                 ),
             ),
         ];

@@ -2,7 +2,8 @@
 
 use super::output;
 use crate::run::threads::Threads;
-use crate::run::{RunEvent, Tally};
+use crate::run::{MAX_FAILURES, Reasons, RunEvent, Tally};
+use crate::table::shown::shown_bytes;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -24,6 +25,9 @@ pub struct Progress {
     /// Where more may come, what is to be done now.
     of_round: &'static str,
     has_results: bool,
+    /// Of this worker's failed jobs, and how many there are.
+    reasons: Reasons,
+    failures: u64,
 }
 
 impl Progress {
@@ -38,6 +42,8 @@ impl Progress {
             threads,
             of_round: if has_rounds { " of this round" } else { "" },
             has_results: false,
+            reasons: Reasons::default(),
+            failures: 0,
         }
     }
 
@@ -115,14 +121,27 @@ impl Progress {
                 command,
                 ..
             } => {
-                self.say(&format!(
-                    "job {job_id} failed: {reason}\n  alone: {command}"
-                ));
+                self.failures = self.reasons.add(reason);
+                if self.failures <= MAX_FAILURES {
+                    self.say(&format!(
+                        "job {job_id} failed: {reason}\n  alone: {command}"
+                    ));
+                }
                 self.draw();
             }
+            RunEvent::ShortOfMemory { allowed, needed } => self.say(&format!(
+                "memory limits the jobs at once: {} free, the next is predicted to take {}",
+                shown_bytes(*allowed),
+                shown_bytes(*needed)
+            )),
             RunEvent::Stopping => self.say("stopping: jobs in flight end, finished jobs are kept"),
             RunEvent::OutOfTime => self.say("not enough time left to start another part"),
-            RunEvent::Finished(_) => self.bar.finish_and_clear(),
+            RunEvent::Finished(_) => {
+                self.bar.finish_and_clear();
+                if self.failures > MAX_FAILURES {
+                    output::report(output::by_reason(&self.reasons).trim_end());
+                }
+            }
             _ => {}
         }
     }
@@ -137,35 +156,26 @@ impl Progress {
 
     /// Draws the bar, which counts the jobs of all workers since this one began, or says a line if the last is long ago.
     fn draw(&mut self) {
-        let (
-            Tally {
-                jobs,
-                jobs_done,
-                jobs_of_others,
-                ..
-            },
-            share,
-        ) = (self.tally, self.tally.share());
+        let share = self.tally.share();
         let elapsed = self.begin.elapsed().as_secs_f64();
+        let guess = if share < GUESS {
+            ", a guess so far"
+        } else {
+            ""
+        };
         let left = if share > 0.0 {
-            let guess = if share < GUESS {
-                ", a guess so far"
-            } else {
-                ""
-            };
-            format!(
-                "{} left{}{guess}",
-                output::duration(elapsed * (1.0 - share) / share),
-                self.of_round
-            )
+            let left = output::duration(elapsed * (1.0 - share) / share);
+            format!("{left} left{}{guess}", self.of_round)
         } else {
             "time left unknown".to_owned()
         };
-        let others = if jobs_of_others == 0 {
-            String::new()
-        } else {
-            format!(" ({jobs_of_others} by others)")
+        let others = match self.tally.jobs_of_others {
+            0 => String::new(),
+            jobs => format!(" ({jobs} by others)"),
         };
+        let Tally {
+            jobs, jobs_done, ..
+        } = self.tally;
         let text = format!("{jobs_done} of {jobs} jobs{others}, {left}");
         #[expect(
             clippy::cast_possible_truncation,

@@ -205,6 +205,9 @@ fn work(
 
 /// Says what is left and what to do, and how the command ends.
 fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
+    for marked in &report.marked {
+        output::report(&marked.to_string());
+    }
     if report.stopped {
         let hint = match arguments.walltime {
             Some(_) if report.jobs_run == 0 => {
@@ -243,9 +246,14 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
         output::report(&format!(
             "{failed} failed; tables/jobs has the reasons. --retry-failed runs them again."
         ));
-        return Exit::Failed;
     }
-    Exit::Done
+    if report.jobs_left > 0 && !arguments.worker {
+        Exit::Stopped
+    } else if report.jobs_failed > 0 {
+        Exit::Failed
+    } else {
+        Exit::Done
+    }
 }
 
 /// What is told of a reduction.

@@ -20,7 +20,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 /// Set by the first SIGINT.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-/// Set when a file would pass the limit on its size; the write then fails, and its error is reported.
+/// Set when a file would pass the limit on its size.
 static FILE_TOO_LARGE: AtomicBool = AtomicBool::new(false);
 
 /// Whether the signals are caught.
@@ -34,6 +34,12 @@ pub fn catch() -> Result<&'static AtomicBool> {
     Ok(&STOP)
 }
 
+/// Lets the write of a file that passes the limit on its size fail, where a signal would end the program.
+pub fn outlive_limit_of_files() -> Result<()> {
+    register(SIGXFSZ, &FILE_TOO_LARGE).context("cannot catch signals")?;
+    Ok(())
+}
+
 /// Whether a signal came that cancels, alone or with others.
 pub fn is_cancelled() -> bool {
     CANCELLED.load(Ordering::Relaxed)
@@ -43,7 +49,6 @@ fn register_all() -> io::Result<()> {
     // Before the flag that it looks at, so that the first SIGINT does not exit.
     register_conditional_shutdown(SIGINT, Exit::Stopped as i32, &INTERRUPTED)?;
     register(SIGINT, &INTERRUPTED)?;
-    register(SIGXFSZ, &FILE_TOO_LARGE)?;
     // Before the flag that stops, so that whoever stops finds it set.
     CANCELLING
         .iter()

@@ -4,7 +4,6 @@ use super::exit::Exit;
 use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::results::workers::Worker;
 use crate::run::{Failure, Overview, Present};
 use crate::table::shown::shown_text;
 use crate::table::storage::Disk;
@@ -81,17 +80,12 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
         );
         output::pairs(&pairs)?;
         for Present { worker, last_beat } in &status.workers {
-            let Worker {
-                host,
-                process,
-                threads,
-                jobs_per_second,
-                ..
-            } = worker;
             output::print(&format!(
-                "worker  process {process} on {}: {}, {jobs_per_second:.2} jobs/s, last beat {last_beat:.0} s ago\n",
-                shown_text(host),
-                output::count(*threads as u64, "thread")
+                "worker  process {} on {}: {}, {:.2} jobs/s, last beat {last_beat:.0} s ago\n",
+                worker.process,
+                shown_text(&worker.host),
+                output::count(worker.threads as u64, "thread"),
+                worker.jobs_per_second
             ))?;
         }
         for Failure {
@@ -106,7 +100,10 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             ))?;
         }
         if overview.jobs_failed > status.failures.len() as u64 {
-            output::print("failed  and more: see outcome and reason in tables/jobs\n")?;
+            output::print(&output::by_reason(&status.failure_reasons))?;
+        }
+        for marked in &status.marked {
+            output::print(&format!("deaths  {marked}\n"))?;
         }
     }
     Ok(match overview {

@@ -19,7 +19,7 @@ use serde_json::{Value as Json, json};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Failed jobs that are listed.
-const MAX_FAILURES: usize = 200;
+const MAX_FAILURES: u64 = 200;
 /// Parts that the chart of cost shows; of more, every k-th.
 const MAX_PARTS: usize = 4_000;
 /// Runs that are listed: the last ones.

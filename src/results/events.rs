@@ -4,9 +4,10 @@
 //! other's. Tables never depend on it.
 
 use crate::results::commit::own_number;
+use crate::results::deaths::Marked;
 use crate::results::directory::Results;
 use crate::results::rounds::RoundsSoFar;
-use crate::results::workers::host;
+use crate::results::workers::{host, plain};
 use crate::table::error::ResultsError;
 use crate::table::storage::{StorageError, StoredFile};
 use serde::{Deserialize, Serialize};
@@ -50,6 +51,11 @@ pub enum RunEvent {
         command: String,
         predicted_cost: f64,
         wall: f64,
+    },
+    /// Memory, and not threads, limits the jobs at once: in bytes, what all may take, and what the next is predicted to.
+    ShortOfMemory {
+        allowed: f64,
+        needed: f64,
     },
     Tick,
     /// What other workers have committed since the run began.
@@ -100,6 +106,9 @@ pub struct RunReport {
     pub parts_committed: u64,
     /// Whether the run was stopped, or its time did not suffice, before all was done.
     pub stopped: bool,
+    /// Parts that are not done and at which workers died.
+    #[serde(default)]
+    pub marked: Vec<Marked>,
     /// Hosts of the workers that run the jobs which are left.
     pub hosts: Vec<String>,
     /// Predicted CPU time of the jobs run, in s.
@@ -161,21 +170,10 @@ impl Results<'_> {
         self.check_place()?;
         let folder = self.layout().logs();
         self.layout().ensure_folder(&folder)?;
-        let plain: String = host()
-            .chars()
-            .map(|c| {
-                if c.is_ascii_alphanumeric() || c == '-' {
-                    c
-                } else {
-                    '_'
-                }
-            })
-            .collect();
-        let (process, number) = (std::process::id(), own_number());
-        let path = folder.join(format!(
-            "{:.3}-{plain}-{process}-{number:016x}.jsonl",
-            now()
-        ));
+        let host = plain(&host());
+        let process = std::process::id();
+        let number = own_number();
+        let path = folder.join(format!("{:.3}-{host}-{process}-{number:016x}.jsonl", now()));
         Ok(Log(self.layout().storage.create(&path)?))
     }
 

@@ -5,6 +5,7 @@
 //!                reduced/  figures/  report.html                         made from the tables
 //!                run/extension-EEE.json                                  what the tables belong to; written once
 //!                run/{workers,claims,staging,lock,log}/                  of no use once nothing runs
+//!                run/deaths/                                             parts at which workers died
 //!                run/spill/{slips,precursors,jobs}/                      finished jobs of parts that are not done
 //!                run/quarantine/                                         damaged files that a repair took away
 //! ```
@@ -28,8 +29,8 @@ use std::time::{Duration, Instant};
 pub const RUN: &str = "run";
 /// Folder of the results directories that nobody placed elsewhere.
 const RESULTS: &str = "results";
-pub const RUN_FOLDERS: [&str; 7] = [
-    "staging", "lock", "log", "workers", "claims", "spill", "batch",
+pub const RUN_FOLDERS: [&str; 8] = [
+    "staging", "lock", "log", "workers", "claims", "spill", "batch", "deaths",
 ];
 /// What the name of an extension's file begins with.
 const EXTENSION: &str = "extension-";
@@ -219,6 +220,8 @@ places! {
     /// Everything that is no result.
     run = RUN;
     claims = "run/claims";
+    /// The parts that dead workers were at.
+    deaths = "run/deaths";
     logs = "run/log";
     /// What a repair took away, as it was damaged.
     quarantine = "run/quarantine";
@@ -239,16 +242,17 @@ impl PartName {
     /// What the name of a file says; `None` if it is not that of a part's.
     pub fn of_path(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_str()?;
-        let (extension, index) = name
-            .strip_suffix(FILE_EXTENSION)?
-            .strip_suffix('.')?
-            .strip_prefix("part-")?
-            .split_once('-')?;
+        Self::parse(name.strip_suffix(FILE_EXTENSION)?.strip_suffix('.')?)
+    }
+
+    /// What a name without the ending of a file says.
+    pub fn parse(name: &str) -> Option<Self> {
+        let (extension, index) = name.strip_prefix("part-")?.split_once('-')?;
         let part = Self {
             extension: extension.parse().ok()?,
             index: index.parse().ok()?,
         };
-        (part.file() == name).then_some(part)
+        (part.to_string() == name).then_some(part)
     }
 
     pub fn file(self) -> String {

@@ -10,6 +10,7 @@
 //!   pending.rs                what runs again
 //!   rounds.rs                 what a sweep that decides for itself runs next
 //!   workers.rs, claims.rs     who is at work, and at what
+//!   deaths.rs                 at what workers died
 //!   events.rs                 what happens, and its log
 //!   verify.rs                 what is damaged, and its repair
 //!   export.rs                 a few large files for other tools
@@ -18,6 +19,7 @@
 
 pub mod claims;
 pub mod commit;
+pub mod deaths;
 pub mod destination;
 pub mod directory;
 pub mod events;

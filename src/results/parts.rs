@@ -17,9 +17,8 @@ use crate::sweep::{Outline, Part};
 use crate::table::columns::{Table, columns};
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
-use crate::table::storage::StorageError;
+use crate::table::storage::{StorageError, gone_is_fine};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
-use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -111,11 +110,7 @@ impl Results<'_> {
         for table in self.tables().rev() {
             let file = self.spilled_file(table, part);
             self.layout().refuse_link(&file)?;
-            match self.layout().storage.remove(&file) {
-                // Another worker was first.
-                Err(error) if error.kind() == ErrorKind::NotFound => (),
-                removed => removed?,
-            }
+            gone_is_fine(self.layout().storage.remove(&file))?;
         }
         Ok(())
     }

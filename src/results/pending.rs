@@ -5,18 +5,20 @@
 //! | directory | whether what is there may count at all: the same versions, model, recording | `directory.rs`, `extension_file.rs` | `another_model_recording_or_version_is_refused_with_the_difference_and_nothing_is_written` |
 //! | extensions | which extension has a job: the first that keeps it, else the last | `sweep/plan.rs` | `what_is_taken_out_of_the_sweep_is_kept_if_done_and_else_not_run` |
 //! | parts | a part is done if all its files are there | [`Results::done_parts`] | `a_part_without_its_slips_is_run_again` |
-//! | retries | of a part that is done, jobs that failed, or that a shorter `max_time` cut off | [`Pending::state`] | `failing_and_panicking_jobs_become_rows_others_go_on_and_a_retry_mends_them`, `a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others` |
+//! | retries | of a part that is done, jobs that failed, that needed more memory than was allowed, or that a shorter `max_time` cut off | [`Pending::runs_again`] | `failing_and_panicking_jobs_become_rows_others_go_on_and_a_retry_mends_them`, `a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others` |
 //! | spill | of one that is not, all jobs but those that a stopped run has finished | [`Pending::state`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
 //!
 //! Who runs it is another question: see `claims.rs`, and `run/take.rs`.
 
+use crate::results::deaths::Deaths;
 use crate::results::directory::Results;
 use crate::results::layout::{DoneParts, PartName, settled};
 use crate::results::tables::{self, JobOutcome, RowOfJob};
-use crate::sweep::{Extension, Outline, Part};
+use crate::sweep::{Extension, Job, LARGE, Outline, Part, certain_memory};
 use crate::table::columns::columns;
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::Dataset;
+use crate::table::shown::shown_bytes;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::io;
@@ -42,15 +44,27 @@ pub enum Again {
     CutOff,
 }
 
+/// Which failed jobs are to be run again.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Retry {
+    pub all: bool,
+    /// Memory that a job may take, in bytes: those that failed where less was allowed.
+    pub memory: f64,
+}
+
+/// What the reason of a job that failed for lack of memory begins with, and no other.
+const MEMORY: &str = "memory: ";
+
 /// Parts that are a worker's to take, and what of them is done and spilled, as the names in a directory said at one instant.
 #[derive(Debug)]
 pub struct Pending<'a> {
     pub results: &'a Results<'a>,
     /// In plan order.
     pub parts: &'a [Outline],
-    /// Whether failed jobs are to be run again.
-    pub retry_failed: bool,
+    pub retry: Retry,
     pub done: DoneParts,
+    /// Looked up again, since workers die.
+    deaths: RefCell<Deaths>,
     /// Looked up again, since workers that end spill.
     spilled: RefCell<HashSet<PartName>>,
 }
@@ -59,17 +73,19 @@ impl<'a> Pending<'a> {
     pub fn look_up(
         results: &'a Results<'a>,
         parts: &'a [Outline],
-        retry_failed: bool,
+        retry: Retry,
     ) -> Result<Self, ResultsError> {
         let done = results.done_parts()?;
         let pending = Self {
             results,
             parts,
-            retry_failed,
+            retry,
             done,
+            deaths: RefCell::default(),
             spilled: RefCell::default(),
         };
         pending.look_at_spill()?;
+        pending.look_at_deaths()?;
         Ok(pending)
     }
 
@@ -79,19 +95,62 @@ impl<'a> Pending<'a> {
         Ok(())
     }
 
+    /// Looks up again at which parts workers died.
+    pub fn look_at_deaths(&self) -> Result<(), ResultsError> {
+        *self.deaths.borrow_mut() = self.results.layout().marks()?;
+        Ok(())
+    }
+
+    /// The same, for a command that makes no marks.
+    pub fn look_at_all_deaths(&self) -> Result<(), ResultsError> {
+        *self.deaths.borrow_mut() = self.results.layout().marks_and_notes()?;
+        Ok(())
+    }
+
+    /// How many workers died at a part.
+    pub fn deaths(&self, part: &Outline) -> usize {
+        let deaths = self.deaths.borrow();
+        deaths.get(&part.into()).map_or(0, Vec::len)
+    }
+
     pub fn part(&self, outline: &Outline) -> Part {
         self.results.plan().part(outline)
     }
 
     /// Whether a part that is done may have jobs to be run: failed ones, or such as a shorter time has cut off.
-    pub fn may_run_again(&self) -> bool {
+    pub fn may_run_again(&self, part: &Outline) -> bool {
         let max_time = |extension: &Extension| extension.sweep.recording().max_time;
-        self.retry_failed
+        self.retry.all
+            || part.memory >= LARGE
             || self
                 .results
                 .extensions()
                 .windows(2)
                 .any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
+    }
+
+    /// Whether a job of a part that is done runs again.
+    pub fn runs_again(&self, job: &Job, why: &Again) -> bool {
+        match why {
+            Again::CutOff => true,
+            Again::Failed(reason) => {
+                let was_too_large = reason.starts_with(MEMORY);
+                self.retry.all || (was_too_large && self.refusal(job).is_none())
+            }
+        }
+    }
+
+    /// Why a job cannot be run here: hard limits allow less memory than it takes in any case.
+    pub fn refusal(&self, job: &Job) -> Option<String> {
+        let needed = certain_memory(&job.parameters);
+        let allowed = self.retry.memory;
+        (needed > allowed).then(|| {
+            format!(
+                "{MEMORY}needs at least {}, {} allowed here; run it again where more is allowed",
+                shown_bytes(needed),
+                shown_bytes(allowed)
+            )
+        })
     }
 
     /// What is not finished of a part: by position missing, spilled, failed or cut off. Of one that is done, this reads its

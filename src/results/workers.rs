@@ -15,10 +15,11 @@ use crate::sweep::Sweep;
 use crate::table::checksum;
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::shown::shown_text;
-use crate::table::storage::StorageError;
+use crate::table::storage::{StorageError, gone_is_fine};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -55,11 +56,31 @@ pub struct Worker {
     system: String,
     /// When it began, in the ticks of its system: another process may get its id.
     process_start: Option<u64>,
+    /// The directory that it works at, if its host says.
+    #[serde(default)]
+    directory: Option<Directory>,
     /// Checksum of the sweep file that it works at.
     sweep: String,
     pub threads: usize,
     /// Jobs that it has finished, in a second.
     pub jobs_per_second: f64,
+}
+
+/// What a host knows a directory by, wherever it is moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Directory {
+    device: u64,
+    inode: u64,
+}
+
+impl Directory {
+    fn of(root: &Path) -> Option<Self> {
+        let metadata = std::fs::metadata(root).ok()?;
+        Some(Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+        })
+    }
 }
 
 /// Names of the workers of this process, and their threads: one that died under a test leaves a file like a living one's.
@@ -73,27 +94,37 @@ fn own() -> MutexGuard<'static, BTreeMap<String, ThreadId>> {
 impl Worker {
     fn here(sweep: &Sweep, threads: usize) -> Self {
         let process = std::process::id();
-        let (system, process_start) = (system(), process_start(process));
-        let sweep = checksum::of_text(sweep.text());
         Self {
             host: host(),
             process,
-            system,
-            process_start,
-            sweep,
+            system: system(),
+            process_start: process_start(process),
+            directory: None,
+            sweep: checksum::of_text(sweep.text()),
             threads,
             jobs_per_second: 0.0,
         }
     }
 
-    /// Whether the process lives, if it is one that can be looked up.
-    fn lives_here(&self, name: &str) -> Option<bool> {
+    /// Whether the process lives and works at this directory, if it is one that can be looked up.
+    fn lives_here(&self, name: &str, directory: Option<Directory>) -> Option<bool> {
         let can_look =
             !self.system.is_empty() && self.system == system() && self.process_start.is_some();
-        can_look.then(|| {
-            let is_lost = self.process == std::process::id() && !own().contains_key(name);
-            !is_lost && process_start(self.process) == self.process_start
-        })
+        if !can_look {
+            return None;
+        }
+        let is_lost = self.process == std::process::id() && !own().contains_key(name);
+        if is_lost || process_start(self.process) != self.process_start {
+            return Some(false);
+        }
+        match (self.directory, directory) {
+            // The file of one that works at the original came with a copy.
+            (Some(its), Some(here)) if its.device == here.device => Some(its.inode == here.inode),
+            // Another device may be another mount of the same directory: its beats decide, and taking a living worker
+            // for dead is worse than waiting.
+            (Some(_), Some(_)) => None,
+            _ => Some(true),
+        }
     }
 }
 
@@ -107,6 +138,11 @@ pub fn host() -> String {
         .map(|name| name.trim().to_owned())
         .filter(|name| !name.is_empty());
     name.unwrap_or_else(|| "unknown".to_owned())
+}
+
+/// The name of a host as names of files hold it.
+pub fn plain(host: &str) -> String {
+    host.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-', "_")
 }
 
 /// The boot of the kernel and the name space of processes.
@@ -185,6 +221,7 @@ impl Layout<'_> {
     /// The workers that live, by their names. Compares beats with `now`, by the clock of the file system.
     pub fn living(&self, now: SystemTime) -> Result<BTreeMap<String, Living>, StorageError> {
         let mut living = BTreeMap::new();
+        let directory = Directory::of(self.root());
         for name in self.storage.list(&self.workers())? {
             let (name, path) = (
                 name.to_string_lossy().into_owned(),
@@ -210,7 +247,7 @@ impl Layout<'_> {
             let Ok(worker) = serde_json::from_slice::<Worker>(&text) else {
                 continue;
             };
-            let lives_here = worker.lives_here(&name);
+            let lives_here = worker.lives_here(&name, directory);
             let is_recent =
                 || now.duration_since(beat).is_ok_and(|age| age < SILENCE) || beat > now;
             if lives_here.unwrap_or_else(is_recent) {
@@ -230,14 +267,7 @@ impl Layout<'_> {
 
 impl<'a> Member<'a> {
     fn join(layout: &Layout<'a>, worker: Worker) -> Result<Self, ResultsError> {
-        let plain = |c: char| {
-            if c.is_ascii_alphanumeric() || c == '-' {
-                c
-            } else {
-                '_'
-            }
-        };
-        let host: String = worker.host.chars().map(plain).collect();
+        let host = plain(&worker.host);
         let number = own_number();
         let name = format!("{PREFIX}{host}-{}-{number:016x}", worker.process);
         own().insert(name.clone(), std::thread::current().id());
@@ -294,6 +324,7 @@ impl<'a> Member<'a> {
         let jobs_per_second =
             self.jobs.load(Ordering::Relaxed) as f64 / self.begin.elapsed().as_secs_f64();
         let worker = Worker {
+            directory: Directory::of(self.layout.root()),
             jobs_per_second,
             ..self.worker.clone()
         };
@@ -375,14 +406,10 @@ impl<'a> Member<'a> {
         commit.publish_new()
     }
 
-    /// Removes what workers left that live no more. Their claims go only once nobody else is there, as one who is may have
-    /// looked up what is done before they ended.
+    /// Removes what dead workers left, and marks the parts that they were at. Their claims go only once nobody else is there,
+    /// as another may have looked up what is done before they ended.
     pub fn tidy(&self) -> Result<(), StorageError> {
         let (layout, storage) = (&self.layout, self.layout.storage);
-        let gone_is_fine = |removed: Result<(), StorageError>| match removed {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            removed => removed,
-        };
         // In this order: whoever comes later is not in these lists, and whoever came before is among the living.
         let claims = storage.list(&layout.claims())?;
         let mut left = storage.list(&layout.workers())?;
@@ -398,6 +425,7 @@ impl<'a> Member<'a> {
             .filter(|name| is_dead(name))
         {
             layout.refuse_link(&layout.staging(&name))?;
+            layout.mark_deaths(&name)?;
             storage.remove_folder(&layout.staging(&name))?;
             let file = layout.workers().join(&*name);
             if storage.exists(&file)? {

@@ -7,7 +7,7 @@ use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
 use crate::run::take::{PartJob, Taken, Work};
 use crate::run::walltime::Walltime;
-use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, cpu};
+use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, cpu, memory};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
 use std::any::Any;
@@ -67,6 +67,32 @@ struct UnderWay {
 /// The jobs under way, by extension, part and position.
 type AllUnderWay = Mutex<BTreeMap<(usize, u64, usize), UnderWay>>;
 
+/// The jobs that were handed out and have not ended.
+#[derive(Default)]
+struct Out {
+    jobs: usize,
+    cost: f64,
+    memory: f64,
+}
+
+impl Out {
+    fn add(&mut self, job: &PartJob) {
+        self.jobs += 1;
+        self.cost += job.job().cost;
+        self.memory += job.memory;
+    }
+
+    fn remove(&mut self, job: &PartJob) {
+        self.jobs -= 1;
+        self.cost -= job.job().cost;
+        self.memory -= job.memory;
+        if self.jobs == 0 {
+            // Without roundings, and what infinity leaves.
+            *self = Self::default();
+        }
+    }
+}
+
 /// A part of which some jobs are still out.
 struct OpenPart {
     of: Arc<Taken>,
@@ -109,7 +135,18 @@ impl<'a, 'e> Collector<'a, 'e> {
     /// Runs pending jobs until none is left for this worker, the flag turns true, the
     /// time is over, or something fails that is not a job. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
-        let threads = self.joined.threads;
+        let work = Work::new(
+            self.pending,
+            self.joined.member,
+            self.walltime,
+            self.joined.threads,
+        )?;
+        // Each thread takes address space of its own.
+        let threads = if work.is_all_alone() {
+            1
+        } else {
+            self.joined.threads
+        };
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
@@ -122,7 +159,6 @@ impl<'a, 'e> Collector<'a, 'e> {
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = channel();
-        let work = Work::new(self.pending, self.joined.member, self.walltime)?;
         let all_run = pool.in_place_scope(|workers| {
             let hand_out = |job: PartJob| {
                 let sender = sender.clone();
@@ -131,7 +167,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                     let _ = sender.send(run_job(job, kernel, interrupt, under_way));
                 });
             };
-            let collected = self.collect(work, hand_out, &receiver, under_way, interrupt);
+            let collected = self.collect(work, threads, hand_out, &receiver, under_way, interrupt);
             interrupt.store(true, Ordering::Relaxed);
             collected
         })?;
@@ -163,14 +199,16 @@ impl<'a, 'e> Collector<'a, 'e> {
     fn collect(
         &mut self,
         mut work: Work<'_>,
+        threads: usize,
         hand_out: impl Fn(PartJob),
         ended: &Receiver<Ended>,
         under_way: &AllUnderWay,
         interrupt: &AtomicBool,
     ) -> Result<bool, ResultsError> {
-        let threads = self.joined.threads;
-        let (mut jobs_out, mut cost_out) = (0, 0.0);
+        let mut out = Out::default();
+        let mut free = self.joined.memory();
         let mut is_out_of_time = false;
+        let mut is_short_of_memory = false;
         let [mut last_tick, mut last_look] = [Instant::now(); 2];
         loop {
             if last_look.elapsed() >= LOOK_AT_OTHERS {
@@ -185,36 +223,53 @@ impl<'a, 'e> Collector<'a, 'e> {
             }
             if last_tick.elapsed() >= TICK {
                 last_tick = Instant::now();
+                free = self.joined.memory();
                 self.report_long_jobs(under_way)?;
                 self.events.send(&RunEvent::Tick)?;
             }
-            let must_end = self.joined.must_end();
-            if must_end && !interrupt.swap(true, Ordering::Relaxed) {
+            if self.joined.must_end() && !interrupt.swap(true, Ordering::Relaxed) {
                 self.events.send(&RunEvent::Stopping)?;
             }
             let is_interrupted = interrupt.load(Ordering::Relaxed);
-            let has_room = |jobs, cost| {
-                jobs < threads || (jobs < threads * MAX_AHEAD && cost < threads as f64 * AHEAD)
+            let has_room = |out: &Out| {
+                out.jobs < threads
+                    || (out.jobs < threads * MAX_AHEAD && out.cost < threads as f64 * AHEAD)
             };
             while !is_interrupted
-                && has_room(jobs_out, cost_out)
-                && let Some(job) = work.next(jobs_out > 0)?
+                && !self.joined.must_end()
+                && has_room(&out)
+                && let Some(job) = work.next(out.jobs > 0, out.jobs >= threads)?
             {
-                jobs_out += 1;
-                cost_out += job.cost();
+                if let Some(reason) = self.pending.refusal(job.job()) {
+                    self.take(&job, Err(reason), JobTime::default())?;
+                    continue;
+                }
+                if out.memory + memory::beside_threads(job.memory, threads) > free {
+                    let is_limit = out.jobs < threads && job.memory.is_finite();
+                    if is_limit && !std::mem::replace(&mut is_short_of_memory, true) {
+                        self.events.send(&RunEvent::ShortOfMemory {
+                            allowed: free - out.memory,
+                            needed: job.memory,
+                        })?;
+                    }
+                    if out.jobs > 0 {
+                        work.put_back(job);
+                        break;
+                    }
+                }
+                out.add(&job);
                 hand_out(job);
             }
             if !is_out_of_time && self.walltime.has_refused() {
                 is_out_of_time = true;
                 self.events.send(&RunEvent::OutOfTime)?;
             }
-            if jobs_out == 0 && (is_interrupted || work.has_ended) {
+            if out.jobs == 0 && (is_interrupted || work.has_ended) {
                 return Ok(!is_interrupted && !is_out_of_time);
             }
             // A sender is kept, so an error means that there is nothing yet.
             if let Ok(Ended { job, outcome, time }) = ended.recv_timeout(STOP_POLL) {
-                jobs_out -= 1;
-                cost_out -= job.cost();
+                out.remove(&job);
                 if let Some(outcome) = outcome {
                     self.take(&job, outcome, time)?;
                 }
@@ -224,23 +279,14 @@ impl<'a, 'e> Collector<'a, 'e> {
 
     /// Tells of jobs that take long.
     fn report_long_jobs(&mut self, under_way: &AllUnderWay) -> Result<(), ResultsError> {
-        for UnderWay {
-            job,
-            begin,
-            long_after,
-        } in locked(under_way).values_mut()
-        {
-            let elapsed = begin.elapsed();
-            if elapsed >= *long_after {
-                *long_after = 2 * elapsed;
-                let part = &job.of.part;
+        for long in locked(under_way).values_mut() {
+            let elapsed = long.begin.elapsed();
+            if elapsed >= long.long_after {
+                long.long_after = 2 * elapsed;
+                let job = long.job.job();
                 self.events.send(&RunEvent::JobTakesLong {
-                    command: self
-                        .pending
-                        .results
-                        .sweep()
-                        .command(&part.jobs[job.position]),
-                    predicted_cost: part.jobs[job.position].cost,
+                    command: self.pending.results.sweep().command(job),
+                    predicted_cost: job.cost,
                     wall: elapsed.as_secs_f64(),
                 })?;
             }
@@ -250,7 +296,7 @@ impl<'a, 'e> Collector<'a, 'e> {
 
     fn take(&mut self, of: &PartJob, outcome: Outcome, time: JobTime) -> Result<(), ResultsError> {
         let part = &of.of.part;
-        let job = &part.jobs[of.position];
+        let job = of.job();
         self.joined.member.count_job();
         let predicted_cost = job.cost;
         let event = match &outcome {
@@ -293,41 +339,34 @@ impl<'a, 'e> Collector<'a, 'e> {
         self.pending
             .results
             .commit(self.joined.member, part, &whole.outcomes, spilled)?;
+        let name = PartName::from(&**part);
+        self.joined.member.end_part(name)?;
         self.walltime
             .committed(whole.of.begin.elapsed(), begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);
         }
-        let (part, jobs) = (PartName::from(&**part).to_string(), whole.outcomes.len());
+        let jobs = whole.outcomes.len();
         let failed = whole
             .outcomes
             .values()
             .filter(|outcome| outcome.is_err())
             .count();
-        let OpenPart {
-            predicted_cost,
-            measured:
-                JobTime {
-                    cpu: measured_cost,
-                    wall,
-                },
-            ..
-        } = *whole;
         let report = &mut *self.report;
         report.parts_committed += 1;
         report.jobs_run += jobs as u64;
         report.jobs_left = report.jobs_left.saturating_sub(jobs as u64);
         report.jobs_failed =
             (report.jobs_failed + failed as u64).saturating_sub(whole.failed_before);
-        report.predicted_cost += predicted_cost;
-        report.measured_cost += measured_cost;
+        report.predicted_cost += whole.predicted_cost;
+        report.measured_cost += whole.measured.cpu;
         Ok(self.events.send(&RunEvent::PartCommitted {
-            part,
+            part: name.to_string(),
             jobs,
             failed,
-            predicted_cost,
-            measured_cost,
-            wall,
+            predicted_cost: whole.predicted_cost,
+            measured_cost: whole.measured.cpu,
+            wall: whole.measured.wall,
         })?)
     }
 }
@@ -350,7 +389,7 @@ fn run_job(
             time: JobTime::default(),
         };
     }
-    let (begin, task) = (Instant::now(), &job.of.part.jobs[job.position]);
+    let (begin, task) = (Instant::now(), job.job());
     let long_after = Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost)
         .unwrap_or(Duration::MAX)
         .max(LONG);

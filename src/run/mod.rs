@@ -15,6 +15,8 @@
 
 mod collect;
 pub mod cpu;
+mod memory;
+mod reasons;
 mod shard;
 mod status;
 mod take;
@@ -25,15 +27,16 @@ pub mod threads;
 mod walltime;
 
 pub use crate::results::events::{RunEvent, RunReport};
+pub use reasons::Reasons;
 pub use shard::Shard;
-pub use status::{Failure, Overview, Present, Status, status, status_with};
+pub use status::{Failure, MAX_FAILURES, Overview, Present, Status, status, status_with};
 pub use tally::Tally;
 
 use crate::observe::Measurements;
 use crate::results::claims::{Claims, Standing};
 use crate::results::events::Log;
 use crate::results::layout::Layout;
-use crate::results::pending::Pending;
+use crate::results::pending::{Pending, Retry};
 use crate::results::workers::{Member, host};
 use crate::results::{Results, ResultsError};
 use crate::rounds;
@@ -92,6 +95,8 @@ pub struct Joined<'a> {
     begin: Instant,
     walltime: Walltime,
     threads: usize,
+    /// Memory that hard limits allow, in bytes.
+    allowed_memory: f64,
     options: Options<'a>,
 }
 
@@ -103,10 +108,7 @@ pub fn join<T, E: From<ResultsError>>(
     body: impl FnOnce(&Joined<'_>) -> Result<T, E>,
 ) -> Result<T, E> {
     let begin = Instant::now();
-    let threads = options
-        .threads
-        .or_else(|| std::thread::available_parallelism().ok())
-        .map_or(1, NonZeroUsize::get);
+    let threads = threads::or_all_cores(options.threads);
     if sweep.rounds().is_some() && options.shard != Shard::default() {
         let problem = "a sweep with [precision] or [refine] has no shards: each round needs all results of the one before; \
                        run it on a common disk, started as often as you like";
@@ -126,9 +128,13 @@ pub fn join<T, E: From<ResultsError>>(
             begin,
             walltime: Walltime::new(begin, options.walltime),
             threads,
+            allowed_memory: memory::allowed(),
             options,
         })?;
-        member.tidy().map_err(ResultsError::from)?;
+        member
+            .tidy()
+            .and_then(|()| layout.tidy_deaths())
+            .map_err(ResultsError::from)?;
         Ok(ended)
     })
 }
@@ -175,9 +181,11 @@ impl Joined<'_> {
         }
         let (results, parts) = &round;
         report.rounds = results.rounds_so_far();
-        if report.jobs_left == 0 && self.member.others()?.is_empty() {
-            let overview = Pending::look_up(results, parts, false)?.overview(true, |_, _, _| ())?;
-            report.jobs_failed = overview.jobs_failed;
+        if report.jobs_left > 0 {
+            report.marked = Pending::look_up(results, parts, Retry::default())?.marked();
+        } else if self.member.others()?.is_empty() {
+            let pending = Pending::look_up(results, parts, Retry::default())?;
+            report.jobs_failed = pending.overview(true, |_, _, _| ())?.jobs_failed;
         }
         events.send(&RunEvent::Finished(report.clone()))?;
         Ok(report)
@@ -186,6 +194,11 @@ impl Joined<'_> {
     /// Whether a signal came, or the time is over.
     fn must_end(&self) -> bool {
         self.options.stop.load(Ordering::Relaxed) || self.walltime.is_over()
+    }
+
+    /// Memory that all jobs together may take now, in bytes.
+    fn memory(&self) -> f64 {
+        self.allowed_memory.min(memory::available())
     }
 
     /// Runs the parts that are there now: all, or those of the rounds so far.
@@ -198,20 +211,21 @@ impl Joined<'_> {
         events: &mut Events<'_>,
         report: &mut RunReport,
     ) -> Result<(), ResultsError> {
-        let Self {
-            member,
-            begin,
-            threads,
-            options,
-            ..
-        } = *self;
-        let pending = Pending::look_up(results, parts, retry_failed)?;
-        let overview = pending.overview(false, |_, _, _| ())?;
-        let (jobs_again, cost_again) = if retry_failed {
-            (overview.jobs_failed, overview.predicted_cost_failed)
-        } else {
-            (0, 0.0)
+        let member = self.member;
+        let retry = Retry {
+            all: retry_failed,
+            memory: self.allowed_memory,
         };
+        let pending = Pending::look_up(results, parts, retry)?;
+        let mut jobs_again = 0;
+        let mut cost_again = 0.0;
+        let overview = pending.overview(false, |part, position, why| {
+            let job = &part.jobs[position];
+            if pending.runs_again(job, why) {
+                jobs_again += 1;
+                cost_again += job.cost;
+            }
+        })?;
         report.jobs_failed += jobs_again;
         report.jobs_left = overview.jobs_missing + jobs_again;
         if jobs_again > 0 {
@@ -220,10 +234,8 @@ impl Joined<'_> {
             while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
         }
         if report.jobs_left > 0 {
-            let (jobs, predicted_cost) = (
-                report.jobs_left,
-                overview.predicted_cost_missing + cost_again,
-            );
+            let jobs = report.jobs_left;
+            let predicted_cost = overview.predicted_cost_missing + cost_again;
             if let (Some(_), Some(rounds)) = (&events.log, results.rounds_so_far()) {
                 events.send(&RunEvent::RoundBegun {
                     jobs,
@@ -236,9 +248,9 @@ impl Joined<'_> {
                     host: host(),
                     process: std::process::id(),
                     program: PROGRAM.to_owned(),
-                    shard: options.shard.to_string(),
+                    shard: self.options.shard.to_string(),
                     others: member.others()?.len(),
-                    threads,
+                    threads: self.threads,
                     jobs,
                     jobs_there: overview.jobs_done + overview.jobs_failed - jobs_again,
                     predicted_cost,
@@ -273,7 +285,7 @@ impl Joined<'_> {
                     left => break left.map(Some),
                 }
             };
-            report.wall = begin.elapsed().as_secs_f64();
+            report.wall = self.begin.elapsed().as_secs_f64();
             let left = ended.inspect_err(|error| {
                 // The disk may be what failed: the first error counts.
                 let _ = events.send(&RunEvent::Error {
@@ -282,7 +294,8 @@ impl Joined<'_> {
             })?;
             report.stopped = left.is_none() && report.jobs_left > 0;
             if let Some(left) = left {
-                (report.jobs_left, report.hosts) = (left.jobs, left.hosts.into_iter().collect());
+                report.jobs_left = left.jobs;
+                report.hosts = left.hosts.into_iter().collect();
             }
         }
         results.tidy_spill(parts)

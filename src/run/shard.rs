@@ -90,6 +90,7 @@ mod tests {
                 points: point..=point,
                 job_count: 1,
                 cost,
+                memory: 0.0,
             }
         };
         costs

@@ -1,16 +1,18 @@
 //! The status of a directory: what is done, what is missing, and how long that will take.
 
+use crate::results::deaths::Marked;
 use crate::results::events::RunEvent;
-use crate::results::pending::{Again, PartState, Pending};
+use crate::results::pending::{Again, PartState, Pending, Retry};
 use crate::results::rounds::RoundsSoFar;
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
+use crate::run::reasons::Reasons;
 use crate::sweep::{Outline, Part};
 use serde::Serialize;
 use std::time::SystemTime;
 
 /// Failed jobs that [`status`] lists one by one, at most.
-const MAX_FAILURES: usize = 10;
+pub const MAX_FAILURES: u64 = 10;
 
 /// How far the parts of a share are. Costs are predicted CPU times, in s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -43,7 +45,11 @@ pub struct Status {
     /// Predicted wall time for the missing jobs, in s, at this pace and with the threads that are there now or ran last; null
     /// before the first part.
     pub time_left: Option<f64>,
+    /// The first failed jobs, and all by reason.
     pub failures: Vec<Failure>,
+    pub failure_reasons: Reasons,
+    /// Parts that are not done and at which workers died.
+    pub marked: Vec<Marked>,
     /// How far the rounds are, of a sweep that decides for itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rounds: Option<RoundsSoFar>,
@@ -68,20 +74,19 @@ pub struct Failure {
 
 impl Pending<'_> {
     /// How far the parts are, by their names alone unless jobs of them may run again. With `looks`, looks into every part;
-    /// visits jobs that failed, each with its part, its position and the reason.
+    /// visits jobs that failed, each with its part, its position and why.
     pub fn overview(
         &self,
         looks: bool,
-        mut visit: impl FnMut(&Part, usize, &str),
+        mut visit: impl FnMut(&Part, usize, &Again),
     ) -> Result<Overview, ResultsError> {
-        let looks = looks || self.may_run_again();
         let mut overview = Overview::default();
         for outline in self.parts {
             if self.done.has(outline) {
                 overview.parts_done += 1;
                 overview.jobs_done += outline.job_count as u64;
                 overview.predicted_cost_done += outline.cost;
-                if !looks {
+                if !looks && !self.may_run_again(outline) {
                     continue;
                 }
             }
@@ -106,11 +111,11 @@ impl Pending<'_> {
                     for (position, why) in again {
                         let cost = part.jobs[position].cost;
                         overview.jobs_done -= 1;
-                        match why {
-                            Again::Failed(reason) => {
+                        match &why {
+                            Again::Failed(_) => {
                                 overview.jobs_failed += 1;
                                 overview.predicted_cost_failed += cost;
-                                visit(&part, position, &reason);
+                                visit(&part, position, &why);
                             }
                             Again::CutOff => {
                                 overview.jobs_missing += 1;
@@ -143,21 +148,27 @@ pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
 }
 
 /// The same, with another number of failed jobs.
-pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status, ResultsError> {
+pub fn status_with(results: &Results<'_>, max_failures: u64) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
+    let mut failure_reasons = Reasons::default();
     let parts: Vec<Outline> = results.plan().outlines().collect();
-    let pending = Pending::look_up(results, &parts, false)?;
-    let mut overview = pending.overview(true, |part, position, reason| {
-        if failures.len() < max_failures {
+    let pending = Pending::look_up(results, &parts, Retry::default())?;
+    pending.look_at_all_deaths()?;
+    let mut overview = pending.overview(true, |part, position, why| {
+        if let Again::Failed(reason) = why
+            && failure_reasons.add(reason) <= max_failures
+        {
             failures.push(Failure {
                 job_id: results.job_id(part, position),
-                reason: reason.to_owned(),
+                reason: reason.clone(),
                 command: results.sweep().command(&part.jobs[position]),
             });
         }
     })?;
     overview.jobs_kept = jobs_kept(&pending);
-    let (mut last_threads, mut predicted, mut measured) = (None, 0.0, 0.0);
+    let mut last_threads = None;
+    let mut predicted = 0.0;
+    let mut measured = 0.0;
     results.events(|event| match event {
         RunEvent::Started { threads, .. } => last_threads = Some(threads),
         RunEvent::PartCommitted {
@@ -175,22 +186,10 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
         let last_beat = now.duration_since(beat).unwrap_or_default().as_secs_f64();
         Present { worker, last_beat }
     };
-    let workers: Vec<Present> = results
-        .layout()
-        .living(now)?
-        .into_values()
-        .map(present)
-        .collect();
-    let threads = if workers.is_empty() {
-        last_threads
-    } else {
-        Some(
-            workers
-                .iter()
-                .map(|present| present.worker.threads)
-                .fold(0, usize::saturating_add),
-        )
-    };
+    let living = results.layout().living(now)?;
+    let workers: Vec<Present> = living.into_values().map(present).collect();
+    let threads = workers.iter().map(|present| present.worker.threads);
+    let threads = threads.reduce(usize::saturating_add).or(last_threads);
     let pace = (predicted > 0.0).then(|| measured / predicted);
     Ok(Status {
         name: results.sweep().name().to_owned(),
@@ -201,6 +200,8 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
             .zip(threads)
             .map(|(pace, threads)| overview.predicted_cost_missing * pace / threads.max(1) as f64),
         failures,
+        failure_reasons,
+        marked: pending.marked(),
         rounds: results.rounds_so_far(),
     })
 }

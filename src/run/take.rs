@@ -2,15 +2,17 @@
 //!
 //! Workers take parts by claims, in two passes. The first goes through the plan, from a place of its own if others are at
 //! work, and takes what nobody has. The second takes what those had who live no more, until nothing is left but parts that
-//! others are at.
+//! others are at. Parts that may not fit in memory come later, and those at which workers died last, after some deaths
+//! alone: a job that ends its process must not take others with it.
 
 use crate::results::claims::{Claims, Standing};
 use crate::results::layout::PartName;
 use crate::results::pending::{Again, PartState, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
+use crate::run::memory;
 use crate::run::walltime::Walltime;
-use crate::sweep::{Outline, Part};
+use crate::sweep::{Job, Outline, Part, predicted_memory};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
@@ -25,6 +27,9 @@ pub(super) const LOOK: Duration = if cfg!(test) {
     Duration::from_millis(500)
 };
 const LOOK_BUSY: Duration = Duration::from_secs(5);
+
+/// Deaths of workers after which a part runs alone, one job after the other.
+const DEATHS: usize = 3;
 
 /// A part that this worker has taken.
 #[derive(Debug)]
@@ -45,11 +50,13 @@ pub(super) struct PartJob {
     pub of: Arc<Taken>,
     pub position: usize,
     pub failed_before: bool,
+    /// Memory that it is predicted to take, in bytes; all that there is if it is to run alone.
+    pub memory: f64,
 }
 
 impl PartJob {
-    pub fn cost(&self) -> f64 {
-        self.of.part.jobs[self.position].cost
+    pub fn job(&self) -> &Job {
+        &self.of.part.jobs[self.position]
     }
 }
 
@@ -122,17 +129,23 @@ impl<'a> Work<'a> {
         pending: &'a Pending<'a>,
         member: &'a Member<'a>,
         walltime: &'a Walltime,
+        threads: usize,
     ) -> Result<Self, ResultsError> {
         let (others, claims) = (member.others()?, Claims::list(member)?);
         let parts = pending
             .parts
             .iter()
-            .filter(|part| !pending.done.has(part) || pending.may_run_again());
+            .filter(|part| !pending.done.has(part) || pending.may_run_again(part));
         let mut pass: Vec<&Outline> = parts.collect();
         if !others.is_empty() && !pass.is_empty() {
             let place = member.number() % pass.len() as u64;
             pass.rotate_left(usize::try_from(place).unwrap_or_default());
         }
+        pass.sort_by_key(|part| {
+            let needed = memory::beside_threads(part.memory, threads);
+            let may_not_fit = needed > pending.retry.memory;
+            (pending.deaths(part), may_not_fit, pending.done.has(part))
+        });
         Ok(Self {
             pending,
             member,
@@ -148,19 +161,45 @@ impl<'a> Work<'a> {
         })
     }
 
+    /// Whether all that is left runs alone.
+    pub fn is_all_alone(&self) -> bool {
+        let mut left = self.pass.as_slice().iter();
+        left.all(|part| self.pending.deaths(part) >= DEATHS)
+    }
+
+    /// Gives back a job for which there is no room yet.
+    pub fn put_back(&mut self, job: PartJob) {
+        self.jobs.push_front(job);
+    }
+
     /// The next job; `None` if there is none now for this worker, which may be busy with others.
-    pub fn next(&mut self, is_busy: bool) -> Result<Option<PartJob>, ResultsError> {
+    /// With `is_ahead`, it would wait for a thread.
+    pub fn next(&mut self, is_busy: bool, is_ahead: bool) -> Result<Option<PartJob>, ResultsError> {
         if self.jobs.is_empty() && !self.has_ended {
-            self.take_next(is_busy)?;
+            self.take_next(is_busy, is_ahead)?;
         }
         Ok(self.jobs.pop_front())
     }
 
+    /// Whether the next part is not to be taken yet: one at which workers died must not have others with it that only wait.
+    fn must_wait(&self, is_busy: bool, is_ahead: bool) -> bool {
+        let next = self.pass.as_slice().first();
+        match next.map_or(1, |part| self.pending.deaths(part)) {
+            0 => false,
+            1..DEATHS => is_ahead,
+            _ => is_busy,
+        }
+    }
+
     /// Takes the next part with jobs to run, if there is one.
-    fn take_next(&mut self, is_busy: bool) -> Result<(), ResultsError> {
-        while !self.walltime.has_refused()
-            && let Some(part) = self.pass.next()
-        {
+    fn take_next(&mut self, is_busy: bool, is_ahead: bool) -> Result<(), ResultsError> {
+        while !self.walltime.has_refused() {
+            if self.must_wait(is_busy, is_ahead) {
+                return Ok(());
+            }
+            let Some(part) = self.pass.next() else {
+                break;
+            };
             if self.take_unclaimed(part)? {
                 return Ok(());
             }
@@ -208,6 +247,7 @@ impl<'a> Work<'a> {
         self.pending.look_at_spill()?;
         let done = self.pending.results.done_parts()?;
         let mut is_certain = true;
+        let mut free = Vec::new();
         for part in self.pending.parts.iter().filter(|part| !done.has(part)) {
             match self
                 .claims
@@ -223,18 +263,23 @@ impl<'a> Work<'a> {
                     let has_beaten = self.beats.entry(owner.to_owned()).or_insert(*beat) != beat;
                     is_certain &= *is_known || has_beaten;
                 }
-                Standing::Free(generation) => {
-                    // If it goes to another, the next look decides.
-                    is_certain = false;
-                    // Its owner may be suspended, and must not commit it later.
-                    self.member.tidy()?;
-                    if self.take_part(part, generation)? || self.walltime.has_refused() {
-                        break;
-                    }
-                }
+                Standing::Free(generation) => free.push((part, generation)),
             }
         }
-        Ok(is_certain)
+        if free.is_empty() {
+            return Ok(is_certain);
+        }
+        // Their owners may be suspended, and must not commit them later.
+        self.member.tidy()?;
+        self.pending.look_at_deaths()?;
+        free.sort_by_key(|(part, _)| self.pending.deaths(part));
+        for (part, generation) in free {
+            if self.take_part(part, generation)? || self.walltime.has_refused() {
+                break;
+            }
+        }
+        // If they go to others, the next look decides.
+        Ok(false)
     }
 
     /// Takes what is to be run of a part.
@@ -245,20 +290,15 @@ impl<'a> Work<'a> {
                 let jobs = left.map(|position| (position, false)).collect();
                 self.take(self.pending.part(outline), spilled, jobs, generation)
             }
-            PartState::Done { again } => {
-                let again = again
-                    .into_iter()
-                    .map(|(position, why)| (position, why != Again::CutOff));
+            PartState::Done { again } if again.is_empty() => Ok(false),
+            PartState::Done { mut again } => {
+                let part = self.pending.part(outline);
+                again.retain(|&position, why| self.pending.runs_again(&part.jobs[position], why));
+                let again = again.into_iter();
                 let jobs: Vec<_> = again
-                    .filter(|&(_, failed)| self.pending.retry_failed || !failed)
+                    .map(|(position, why)| (position, why != Again::CutOff))
                     .collect();
-                Ok(!jobs.is_empty()
-                    && self.take(
-                        self.pending.part(outline),
-                        BTreeSet::new(),
-                        jobs,
-                        generation,
-                    )?)
+                Ok(!jobs.is_empty() && self.take(part, BTreeSet::new(), jobs, generation)?)
             }
         }
     }
@@ -274,10 +314,8 @@ impl<'a> Work<'a> {
         if !self.walltime.admits_part() {
             return Ok(false);
         }
-        if !self
-            .claims
-            .take(&PartName::from(&*part).to_string(), generation)?
-        {
+        let name = PartName::from(&*part);
+        if !self.claims.take(&name.to_string(), generation)? {
             self.losses += 1;
             if self.losses == LOSSES {
                 self.losses = 0;
@@ -285,6 +323,8 @@ impl<'a> Work<'a> {
             }
             return Ok(false);
         }
+        self.member.begin_part(name)?;
+        let is_alone = self.pending.deaths(&part) >= DEATHS;
         let again = self.pending.done.has(&part);
         let taken = Arc::new(Taken {
             part,
@@ -293,10 +333,16 @@ impl<'a> Work<'a> {
             together: jobs.len(),
             begin: Instant::now(),
         });
-        let job = |(position, failed_before)| PartJob {
+        let recording = self.pending.results.sweep().recording();
+        let job = |(position, failed_before): (usize, bool)| PartJob {
             of: Arc::clone(&taken),
             position,
             failed_before,
+            memory: if is_alone {
+                f64::INFINITY
+            } else {
+                predicted_memory(&taken.part.jobs[position].parameters, recording)
+            },
         };
         self.jobs.extend(jobs.into_iter().map(job));
         Ok(true)

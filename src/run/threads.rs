@@ -78,6 +78,13 @@ impl Threads {
     }
 }
 
+/// So many threads, or one for each core.
+pub fn or_all_cores(count: Option<NonZeroUsize>) -> usize {
+    count
+        .or_else(|| std::thread::available_parallelism().ok())
+        .map_or(1, NonZeroUsize::get)
+}
+
 /// A number of threads, as a flag has it.
 pub fn parse(text: &str) -> Result<NonZeroUsize, String> {
     let count = text

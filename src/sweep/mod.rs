@@ -4,7 +4,7 @@
 //! sweep file ->  axes, conditions -> points -> jobs -> parts
 //! source.rs      read_axes.rs        grid.rs   job.rs   plan.rs
 //! read.rs        axes.rs                       cost.rs
-//! checks.rs      expression.rs
+//! checks.rs      expression.rs                 memory.rs
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
 //! set.rs: what is known of a set; labels.rs: how it is called before people
@@ -25,6 +25,7 @@ mod expression;
 mod grid;
 mod job;
 mod labels;
+mod memory;
 mod plan;
 mod quantity;
 mod read;
@@ -44,6 +45,7 @@ pub use expression::{Expression, ExpressionError};
 pub use grid::Sweep;
 pub use job::{Identity, Job};
 pub use labels::{Digits, Label, capitalised, label, power_of_ten, symbol_of};
+pub use memory::{LARGE, certain_memory, predicted_memory};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{
     Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,

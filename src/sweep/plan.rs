@@ -8,9 +8,8 @@
 
 use super::grid::Sweep;
 use super::job::Job;
+use super::memory::{OF_A_SLIP, most_slips, predicted_memory};
 use super::rounds::{Round, contains};
-use crate::model::theory::typical_interval;
-use crate::observe::Recording;
 use std::ops::{Deref, Range, RangeInclusive};
 
 /// Predicted CPU time of a part, in s, where neither few nor many parts ask for another: little is lost with one.
@@ -61,6 +60,8 @@ pub struct Outline {
     pub job_count: usize,
     /// Sum of their predicted CPU times, in s.
     pub cost: f64,
+    /// Most memory that one of them is predicted to take, in bytes.
+    pub memory: f64,
 }
 
 /// Consecutive jobs of an extension.
@@ -87,10 +88,9 @@ pub struct Totals {
     pub parts: u64,
     /// Predicted CPU time, in s.
     pub cost: f64,
-    /// Most contacts of a job.
-    pub contacts: usize,
-    /// Most slips that the jobs of one part may record together, as far as their longest time allows.
-    pub slips_of_part: f64,
+    /// Most memory that a job is predicted to take, in bytes, and the slips of the jobs of a part.
+    pub memory: f64,
+    pub memory_of_slips: f64,
 }
 
 impl Extension {
@@ -184,6 +184,9 @@ impl<'a> Plan<'a> {
                 jobs.push(job);
             }
             let points = jobs.first()?.point..=jobs.last()?.point;
+            let memory = jobs
+                .iter()
+                .map(|job| predicted_memory(&job.parameters, own.sweep.recording()));
             Some(Part {
                 outline: Outline {
                     extension,
@@ -191,6 +194,7 @@ impl<'a> Plan<'a> {
                     points,
                     job_count: jobs.len(),
                     cost,
+                    memory: memory.fold(0.0, f64::max),
                 },
                 jobs,
             })
@@ -244,22 +248,18 @@ impl<'a> Plan<'a> {
     /// Walks through the plan and adds up.
     pub fn totals(self) -> Totals {
         self.parts().fold(Totals::default(), |totals, part| {
-            let Recording {
-                slips, max_time, ..
-            } = *self.extensions[part.extension].sweep.recording();
-            let jobs = part.jobs.iter().map(|job| &job.parameters);
-            let in_time = |job| max_time.map_or(f64::INFINITY, |time| time / typical_interval(job));
+            let recording = self.extensions[part.extension].sweep.recording();
+            let slips = part
+                .jobs
+                .iter()
+                .map(|job| most_slips(&job.parameters, recording));
+            let memory_of_slips = OF_A_SLIP * slips.sum::<f64>();
             Totals {
                 jobs: totals.jobs + part.job_count as u64,
                 parts: totals.parts + 1,
                 cost: totals.cost + part.cost,
-                contacts: jobs
-                    .clone()
-                    .map(|job| job.blocks * job.contacts_per_block)
-                    .fold(totals.contacts, usize::max),
-                slips_of_part: totals
-                    .slips_of_part
-                    .max(jobs.map(|job| in_time(job).min(slips as f64)).sum()),
+                memory: totals.memory.max(part.memory),
+                memory_of_slips: totals.memory_of_slips.max(memory_of_slips),
             }
         })
     }

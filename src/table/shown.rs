@@ -47,6 +47,15 @@ pub fn is_plain(c: char) -> bool {
     !c.is_control() && !turns && !has_no_width && (c == ' ' || !c.is_whitespace())
 }
 
+/// Bytes of memory in the unit that suits them, rounded up.
+pub fn shown_bytes(bytes: f64) -> String {
+    if bytes < 1e9 {
+        format!("{:.0} MB", (1e-6 * bytes).ceil())
+    } else {
+        format!("{:.1} GB", 1e-9 * bytes)
+    }
+}
+
 /// A path in JSON, which holds texts alone: exact if it is UTF-8, else with `\xff` for each byte that is not.
 pub fn serialize_path<S: serde::Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     match path.to_str() {

@@ -185,6 +185,14 @@ pub trait Storage: Sync {
     }
 }
 
+/// That what is to be removed or moved is gone is no error: another process was first.
+pub fn gone_is_fine(ended: Result<(), StorageError>) -> Result<(), StorageError> {
+    match ended {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        ended => ended,
+    }
+}
+
 /// What trying for a lock says.
 pub enum Lock {
     /// It is ours, until this is dropped or the process ends.

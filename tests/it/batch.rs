@@ -443,7 +443,20 @@ fn a_limit_on_the_size_of_files_is_an_error_of_the_disk() {
     let ended = run(&folder, &["sh", "-c", &limited], &[]);
     assert_eq!(ended.code, Some(3), "{}", ended.stderr);
     assert!(ended.stderr.contains("File too large"), "{}", ended.stderr);
-    folder.ends(0, "run many.toml --no-reduce --out r");
+    folder.ends(0, "run many.toml --out r");
+    for command in [
+        "reduce r",
+        "report r -o page.html",
+        "export r -o exported",
+        "plot r --x V0 --y tau_mean -o a.png",
+        "simulate --slips 40 --trace a.parquet",
+        "simulate --slips 4 --plot a.svg",
+    ] {
+        let limited = format!("ulimit -f 2; exec {PROGRAM} {command}");
+        let ended = run(&folder, &["sh", "-c", &limited], &[]);
+        assert_eq!(ended.code, Some(3), "{command}: {}", ended.stderr);
+        assert!(ended.stderr.contains("File too large"), "{}", ended.stderr);
+    }
 }
 
 #[test]

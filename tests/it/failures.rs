@@ -145,6 +145,30 @@ fn a_poison_job_is_reported_as_a_command_that_fails_in_the_same_way() {
 }
 
 #[test]
+fn of_many_failures_the_first_are_listed_and_all_counted_by_reason() {
+    let folder = Folder::new();
+    let text = "name = \"flood\"\n[model]\nN = 2\nNs = 4\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 30 }\n\
+                seed = { count = 20 }\n[record]\nslips = 5\nmax_events = 10\n";
+    folder.write("flood.toml", text);
+    let ended = folder.ends(1, "run flood.toml --out r --no-reduce");
+    let reported = ended.stderr.lines().count();
+    assert!(reported < 40, "{reported} lines: {}", ended.stderr);
+    assert_eq!(ended.stderr.matches(" failed: at t = ").count(), 10);
+    let status = folder.ends(1, "status r").stdout;
+    let by_reason = "failed  600 jobs in all: at t = … s: … contact events, the most allowed;";
+    for text in [&ended.stderr, &status] {
+        assert_eq!(text.matches(by_reason).count(), 1, "{text}");
+    }
+    assert!(status.lines().count() < 40, "{status}");
+    let reasons = json(&folder.ends(1, "status r --json").stdout)["failure_reasons"].clone();
+    let counts: Vec<_> = reasons.as_object().unwrap().values().collect();
+    assert_eq!(counts, [600]);
+    // A run that finds them there counts none of its own.
+    let again = folder.ends(1, "run flood.toml --out r --no-reduce").stderr;
+    assert!(again.lines().count() < 5, "{again}");
+}
+
+#[test]
 fn the_command_of_a_job_is_that_job() {
     let folder = Folder::new();
     let sweeps = [

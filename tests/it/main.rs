@@ -10,6 +10,7 @@ mod bad_input;
 mod batch;
 mod controls;
 mod damage;
+mod deaths;
 mod deterministic_rows;
 mod differential;
 mod drops;

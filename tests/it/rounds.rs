@@ -35,7 +35,7 @@ fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
     folder.ends(0, "verify whole");
 
     let shared: Vec<_> = (0..4)
-        .map(|_| folder.start("run map.toml --out shared --threads 1"))
+        .map(|_| folder.start("run map.toml --out shared --threads 1 --worker"))
         .collect();
     let ended: Vec<_> = shared.into_iter().map(wait).collect();
     assert!(ended.iter().all(|(code, ..)| *code == Some(0)), "{ended:?}");

@@ -39,7 +39,11 @@ fn processes_side_by_side_run_each_part_once_and_make_the_same_tables_reduced_da
             .map(|_| folder.start(&format!("run many.toml --out {out} --threads 1")))
             .collect();
         let ended: Vec<_> = workers.into_iter().map(wait).collect();
-        assert!(ended.iter().all(|(code, ..)| *code == Some(0)), "{ended:?}");
+        for (code, _, stderr) in &ended {
+            let left = stderr.contains("others run the last");
+            assert_eq!(*code, Some(if left { 3 } else { 0 }), "{stderr}");
+        }
+        assert!(ended.iter().any(|(code, ..)| *code == Some(0)), "{ended:?}");
         for results in ["tables", "reduced", "figures"] {
             assert!(
                 folder.contents(&format!("{out}/{results}"))
@@ -94,6 +98,30 @@ fn the_parts_of_a_killed_process_are_taken_over_and_the_status_shows_who_is_ther
     assert_eq!(code, Some(0), "{stderr}");
     assert!(folder.tables("r") == folder.tables("whole"));
     folder.ends(0, "status r --check");
+}
+
+#[test]
+fn a_run_that_leaves_the_rest_to_others_ends_with_3_and_a_worker_of_many_with_0() {
+    let folder = Folder::new();
+    // The first part takes seconds.
+    let text = "name = \"long\"\n[[axes.zip]]\nN = [150, 3]\nNs = [100, 2]\n[axes]\nseed = [0]\n[record]\nslips = 4\n";
+    folder.write("long.toml", text);
+    let mut first = folder.start("run long.toml --out r --threads 1 --no-reduce");
+    let claims = folder.path("r/run/claims/part-000-000000.0");
+    while !claims.exists() {
+        assert!(first.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    for (flag, code) in [("", 3), ("--worker", 0)] {
+        let ended = folder.ends(code, &format!("run long.toml --out r --no-reduce {flag}"));
+        let left = "others run the last ";
+        assert!(ended.stderr.contains(left), "{}", ended.stderr);
+    }
+    folder.ends(3, "status r --check");
+    let (code, _, stderr) = wait(first);
+    assert_eq!(code, Some(0), "{stderr}");
+    folder.ends(0, "status r --check");
+    folder.ends(0, "run long.toml --out r --no-reduce");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Whole runs with a fake kernel: quick, and a function of the parameters alone, as the real one.
 
+mod deaths;
 mod fault;
 mod faults;
 mod faulty_disk;
@@ -938,7 +939,7 @@ fn what_was_done_since_it_was_looked_up_is_counted_whoever_did_it() {
     let (layout, stop) = (Layout::new(&Disk, root.path()), AtomicBool::new(false));
     let results = open(&layout, &sweep(SEEDS, "")).unwrap();
     let parts: Vec<Outline> = results.plan().outlines().collect();
-    let pending = Pending::look_up(&results, &parts, false).unwrap();
+    let pending = Pending::look_up(&results, &parts, Retry::default()).unwrap();
     assert_eq!(pending.done_since().unwrap(), (0, 0.0));
     let report = run(
         &layout,

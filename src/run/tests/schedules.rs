@@ -362,7 +362,12 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
             assert_eq!(runs, trial.missing, "{case}");
         }
     }
-    assert!(runs.values().all(|&times| times <= 2), "{case}: {runs:?}");
+    // Where one is suspended, and another killed that has taken over its part, a third runs it.
+    let most = 2 + usize::from(is_any_killed && is_freezing);
+    assert!(
+        runs.values().all(|&times| times <= most),
+        "{case}: {runs:?}"
+    );
     schedule.log()
 }
 

@@ -1,0 +1,156 @@
+//! Deaths: the parts that workers were at when they died.
+//!
+//! A worker keeps a note of each part that it has taken, in its staging folder. The worker that removes the folder of a dead
+//! one moves its notes to `run/deaths/<part>.<worker>`; one that ends in order leaves none. So a job that ends its process
+//! can be named, and does not stop the others. No job fails for it: kills, power cuts and queues leave the same marks.
+//! A run that ends in order removes the marks of parts that are done.
+
+use crate::results::layout::{Layout, PartName};
+use crate::results::pending::Pending;
+use crate::results::tables;
+use crate::results::workers::Member;
+use crate::sweep::Outline;
+use crate::table::shown::shown_bytes;
+use crate::table::storage::{StorageError, gone_is_fine};
+use serde::{Deserialize, Serialize};
+use std::cmp::Reverse;
+use std::collections::HashMap;
+use std::ffi::OsString;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// The deaths at each part, each with a name.
+pub(super) type Deaths = HashMap<PartName, Vec<OsString>>;
+
+/// Parts that [`Pending::marked`] lists, at most.
+const MAX_MARKED: usize = 10;
+
+/// A part at which workers died, and that is to be run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Marked {
+    pub part: String,
+    pub deaths: usize,
+    pub jobs: usize,
+    /// Most memory that one of its jobs is predicted to take, in bytes.
+    pub memory: f64,
+    /// Commands that do the same as its first job and its last.
+    pub commands: Vec<String>,
+}
+
+impl fmt::Display for Marked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: deaths of workers: {}; jobs: {}; predicted memory of a job: {}\n  {}",
+            self.part,
+            self.deaths,
+            self.jobs,
+            shown_bytes(self.memory),
+            self.commands.join("\n  to ")
+        )
+    }
+}
+
+impl Member<'_> {
+    pub fn begin_part(&self, part: PartName) -> Result<(), StorageError> {
+        self.layout().storage.create(&self.note(part)).map(drop)
+    }
+
+    pub fn end_part(&self, part: PartName) -> Result<(), StorageError> {
+        gone_is_fine(self.layout().storage.remove(&self.note(part)))
+    }
+
+    fn note(&self, part: PartName) -> PathBuf {
+        self.staging().join(part.to_string())
+    }
+}
+
+impl Layout<'_> {
+    /// Makes marks of the notes in the staging folder of a dead worker.
+    pub(super) fn mark_deaths(&self, worker: &str) -> Result<(), StorageError> {
+        for note in self.notes(worker)? {
+            self.ensure_folder(&self.deaths())?;
+            let mark = self.deaths().join(format!("{note}.{worker}"));
+            let note = self.staging(worker).join(note.to_string());
+            gone_is_fine(self.storage.rename(&note, &mark))?;
+        }
+        Ok(())
+    }
+
+    /// The parts that a worker is at.
+    fn notes(&self, worker: &str) -> Result<Vec<PartName>, StorageError> {
+        let names = self.storage.list(&self.staging(worker))?;
+        let names = names.iter().filter_map(|name| name.to_str());
+        Ok(names.filter_map(PartName::parse).collect())
+    }
+
+    /// The marks of each part.
+    pub(super) fn marks(&self) -> Result<Deaths, StorageError> {
+        let mut marks = Deaths::new();
+        for name in self.storage.list(&self.deaths())? {
+            let part = Path::new(&name).file_stem().and_then(|part| part.to_str());
+            if let Some(part) = part.and_then(PartName::parse) {
+                marks.entry(part).or_default().push(name);
+            }
+        }
+        Ok(marks)
+    }
+
+    /// The same, with the notes of workers that are dead and of which no other has made marks yet.
+    pub(super) fn marks_and_notes(&self) -> Result<Deaths, StorageError> {
+        // In this order: a worker that begins in between is not in the list.
+        let workers = self.storage.list(&self.staging(""))?;
+        let living = self.living(SystemTime::now())?;
+        let mut marks = self.marks()?;
+        let workers = workers.iter().filter_map(|worker| worker.to_str());
+        for worker in workers.filter(|worker| !living.contains_key(*worker)) {
+            for part in self.notes(worker)? {
+                marks.entry(part).or_default().push(worker.into());
+            }
+        }
+        Ok(marks)
+    }
+
+    /// Removes the marks of parts that are done.
+    pub fn tidy_deaths(&self) -> Result<(), StorageError> {
+        let marks = self.marks()?;
+        if marks.is_empty() {
+            return Ok(());
+        }
+        let done = self.parts_in(&self.table(tables::JOBS))?;
+        let of_done = marks.into_iter().filter(|(part, _)| done.contains(part));
+        for mark in of_done.flat_map(|(_, marks)| marks) {
+            let mark = self.deaths().join(mark);
+            self.refuse_link(&mark)?;
+            gone_is_fine(self.storage.remove(&mark))?;
+        }
+        Ok(())
+    }
+}
+
+impl Pending<'_> {
+    /// The parts that are to be run and at which most workers died.
+    pub fn marked(&self) -> Vec<Marked> {
+        let may_run = |part: &Outline| !self.done.has(part) || self.may_run_again(part);
+        let is_marked = |part: &&Outline| self.deaths(part) > 0 && may_run(part);
+        let mut parts: Vec<&Outline> = self.parts.iter().filter(is_marked).collect();
+        parts.sort_by_key(|part| Reverse(self.deaths(part)));
+        parts.truncate(MAX_MARKED);
+        let marked = parts.into_iter().map(|outline| {
+            let jobs = self.part(outline).jobs;
+            let ends =
+                [0, jobs.len() - 1].map(|position| self.results.sweep().command(&jobs[position]));
+            let mut commands = Vec::from(ends);
+            commands.dedup();
+            Marked {
+                part: PartName::from(outline).to_string(),
+                deaths: self.deaths(outline),
+                jobs: jobs.len(),
+                memory: outline.memory,
+                commands,
+            }
+        });
+        marked.collect()
+    }
+}
