@@ -6,7 +6,7 @@
 
 use crate::results::claims::{Claims, Standing};
 use crate::results::layout::PartName;
-use crate::results::pending::{Again, PartState, Pending};
+use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
 use crate::run::walltime::Walltime;
@@ -239,28 +239,22 @@ impl<'a> Work<'a> {
 
     /// Takes what is to be run of a part.
     fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
-        match self.pending.state(outline)? {
-            PartState::Missing { spilled } => {
-                let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
-                let jobs = left.map(|position| (position, false)).collect();
-                self.take(self.pending.part(outline), spilled, jobs, generation)
-            }
-            PartState::Done { again } => {
-                let again = again
-                    .into_iter()
-                    .map(|(position, why)| (position, why != Again::CutOff));
-                let jobs: Vec<_> = again
-                    .filter(|&(_, failed)| self.pending.retry_failed || !failed)
-                    .collect();
-                Ok(!jobs.is_empty()
-                    && self.take(
-                        self.pending.part(outline),
-                        BTreeSet::new(),
-                        jobs,
-                        generation,
-                    )?)
-            }
+        if !self.pending.done.has(outline) {
+            let spilled = self.pending.spilled(outline)?;
+            let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
+            let jobs = left.map(|position| (position, false)).collect();
+            return self.take(self.pending.part(outline), spilled, jobs, generation);
         }
+        let again = self.pending.results.again(outline)?.into_iter();
+        let jobs: Vec<_> = again
+            .map(|(position, why)| (position, why != Again::CutOff))
+            .filter(|&(_, failed)| self.pending.retry_failed || !failed)
+            .collect();
+        if jobs.is_empty() {
+            return Ok(false);
+        }
+        let part = self.pending.part(outline);
+        self.take(part, BTreeSet::new(), jobs, generation)
     }
 
     /// Claims a part, if there is time for it. `jobs` are those to be run, each with whether it has failed before.
