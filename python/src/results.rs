@@ -16,7 +16,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, renew};
 use stickslip::results::layout::Layout;
-use stickslip::results::parts::committed_files;
 use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, SLIPS, recorded_schema};
 use stickslip::results::{Results, ResultsError};
 use stickslip::table::arrow::schema;
@@ -183,13 +182,13 @@ impl Wanted {
         let layout = results.layout();
         let renewed;
         let files = match self.table {
-            JOBS => layout.dataset(JOBS)?,
+            JOBS => results.dataset(JOBS)?,
             SLIPS | PRECURSORS => {
                 if !results.tables().any(|table| table == self.table) {
                     let problem = "has no precursors; set precursors = true under [record]";
                     return Err(ResultsError::refused(layout.root(), problem).into());
                 }
-                committed_files(layout, self.table, &layout.dataset(JOBS)?)?
+                results.committed_files(self.table, &results.dataset(JOBS)?)?
             }
             EdgeRow::NAME if results.sweep().refinement().is_none() => {
                 let problem = "has no edges: its sweep file has no [refine]";
@@ -207,7 +206,7 @@ impl Wanted {
         let jobs = if self.of_jobs.is_empty() {
             None
         } else {
-            Some(Jobs::read(layout, &self.of_jobs, stop)?)
+            Some(Jobs::read(results, &self.of_jobs, stop)?)
         };
         let mut batches = Vec::new();
         for batch in files.columns(&own) {
@@ -255,11 +254,11 @@ struct Jobs {
 }
 
 impl Jobs {
-    fn read(layout: &Layout<'_>, columns: &[String], stop: &AtomicBool) -> Result<Self, Error> {
+    fn read(results: &Results<'_>, columns: &[String], stop: &AtomicBool) -> Result<Self, Error> {
         let mut names = columns.to_vec();
         names.push(JOB_ID.to_owned());
         let mut batches = Vec::new();
-        for batch in layout.dataset(JOBS)?.columns(&names) {
+        for batch in results.dataset(JOBS)?.columns(&names) {
             interruptible(stop)?;
             batches.push(batch?.rows);
         }

@@ -39,7 +39,7 @@ pub struct Arguments {
 }
 
 /// Version of the JSON.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
@@ -66,11 +66,8 @@ pub fn export(arguments: &Arguments) -> Result<Exit> {
             shown(&arguments.out.join(&file.name))
         ))?;
     }
-    if exported.jobs_missing > 0 {
-        let jobs = output::count(exported.jobs_missing, "job");
-        output::report(&format!(
-            "exported what is there: {jobs} are missing; stickslip run continues with them"
-        ));
+    if let Some(unfinished) = output::unfinished(&results)? {
+        output::report(&format!("exported what is there: {unfinished}"));
     }
     Ok(Exit::Done)
 }

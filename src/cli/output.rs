@@ -1,5 +1,6 @@
 //! Text for people and JSON for programs.
 
+use crate::results::Results;
 use crate::results::rounds::RoundsSoFar;
 use crate::run::Reasons;
 use crate::sweep::Standing;
@@ -115,6 +116,24 @@ pub fn duration(seconds: f64) -> String {
 }
 
 /// A count with its noun, in the plural where that fits.
+/// Jobs that are missing, and those that are kept for later.
+pub fn missing(jobs_missing: u64, jobs_spilled: u64) -> String {
+    let missing = format!("{} missing", count(jobs_missing, "job"));
+    match jobs_spilled {
+        0 => missing,
+        spilled => format!("{missing}, {spilled} kept for later"),
+    }
+}
+
+/// What is missing of a directory, and the command that continues; `None` if nothing is.
+pub fn unfinished(results: &Results<'_>) -> Result<Option<String>> {
+    let overview = results.overview()?;
+    let missing = missing(overview.jobs_missing, overview.jobs_spilled);
+    let root = quoted_path(results.layout().root());
+    let unfinished = format!("{missing}; stickslip run {root} continues with them");
+    Ok((overview.jobs_missing > 0).then_some(unfinished))
+}
+
 pub fn count(number: u64, noun: &str) -> String {
     if number == 1 {
         format!("1 {noun}")

@@ -42,7 +42,7 @@ pub struct Arguments {
 }
 
 /// Version of the JSON.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction. As measured, rounded up.
 const MEMORY: f64 = 80e6;
@@ -83,6 +83,7 @@ impl Directory {
     fn in_words(&self) -> String {
         let Some(Overview {
             jobs_done,
+            jobs_spilled,
             jobs_failed,
             jobs_kept,
             jobs_missing,
@@ -97,7 +98,9 @@ impl Directory {
         let round = self.rounds.as_ref().map_or_else(String::new, |rounds| {
             format!("; round {}", output::rounds(rounds))
         });
-        format!("{path}: {own} done, {jobs_failed} failed, {jobs_missing} to run{kept}{round}")
+        format!(
+            "{path}: {own} done, {jobs_spilled} kept for later, {jobs_failed} failed, {jobs_missing} to run{kept}{round}"
+        )
     }
 }
 

@@ -44,15 +44,8 @@ pub fn reduce(arguments: &Arguments) -> Result<Exit> {
 
 /// Says which jobs were not there to be reduced.
 pub fn report_missing(results: &Results<'_>) -> Result<()> {
-    let overview = crate::run::status(results)?.overview;
-    if overview.jobs_missing > 0 {
-        let (jobs, parts) = (
-            output::count(overview.jobs_missing, "job"),
-            output::count(overview.parts_missing, "part"),
-        );
-        output::report(&format!(
-            "reduced what is there: {jobs} in {parts} are missing; stickslip run continues with them"
-        ));
+    if let Some(unfinished) = output::unfinished(results)? {
+        output::report(&format!("reduced what is there: {unfinished}"));
     }
     Ok(())
 }

@@ -143,14 +143,8 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     };
     let edges = edges(&results)?;
     if is_text {
-        if let Some((_, missing @ 1..)) = results.missing()? {
-            let (jobs, root) = (
-                output::count(missing, "job"),
-                output::quoted_path(&arguments.directory),
-            );
-            output::print(&format!(
-                "so far: {jobs} missing; stickslip run {root} goes on with them\n\n"
-            ))?;
+        if let Some(unfinished) = output::unfinished(&results)? {
+            output::print(&format!("so far: {unfinished}\n\n"))?;
         }
         output::print(&table_of_edges(&edges))?;
     }

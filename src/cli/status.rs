@@ -30,7 +30,7 @@ pub struct Arguments {
 }
 
 /// Version of [`Status`](crate::run::Status) as JSON.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read_plan(&Layout::new(&Disk, &arguments.directory))?;
@@ -61,6 +61,7 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
         let mut pairs = vec![
             ("sweep", status.name.clone()),
             ("jobs done", format!("{}{kept}", overview.jobs_done)),
+            ("kept for later", overview.jobs_spilled.to_string()),
             ("jobs failed", overview.jobs_failed.to_string()),
             ("jobs missing", overview.jobs_missing.to_string()),
             (

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::results::verify::{Problem, Remedy, Verification};
+use crate::results::verify::{Problem, Verification};
 use crate::table::shown::{shown, shown_text};
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -24,7 +24,7 @@ pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Move what is damaged to run/quarantine, and restore what can be restored
+    /// Move what is damaged to run/quarantine
     #[arg(long)]
     repair: bool,
     /// Print JSON
@@ -36,7 +36,7 @@ pub struct Arguments {
 const SHOWN: usize = 3;
 
 /// Version of [`Report`] as JSON.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -50,17 +50,13 @@ struct Report<'a> {
 
 pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let layout = &Layout::new(&Disk, &arguments.directory);
-    if arguments.directory.is_file() {
-        // Says what it is instead.
-        Results::read_plan(layout)?;
-    }
     let verification = if arguments.repair {
         Results::repair(layout)?
     } else {
         Results::verify(layout)?
     };
-    let repaired = arguments.repair && verification.wants_repair();
-    let commands = commands(layout, &verification, !arguments.repair);
+    let repaired = arguments.repair && !verification.whole;
+    let commands = commands(layout, &verification, repaired);
     if arguments.json {
         output::json(
             FORMAT,
@@ -85,15 +81,14 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     )
 }
 
-fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool) -> Vec<String> {
-    let (root, mut commands) = (output::quoted_path(layout.root()), Vec::new());
-    if with_repair && verification.wants_repair() {
+fn commands(layout: &Layout<'_>, verification: &Verification, repaired: bool) -> Vec<String> {
+    let root = output::quoted_path(layout.root());
+    let mut commands = Vec::new();
+    if !verification.whole && !repaired {
         commands.push(format!("stickslip verify {root} --repair"));
     }
-    if verification.wants_run() {
+    if !verification.whole || !verification.missing.is_empty() {
         commands.push(format!("stickslip run {root}"));
-    } else if verification.wants(&[Remedy::Reduce]) {
-        commands.push(format!("stickslip reduce {root}"));
     }
     commands
 }
@@ -111,17 +106,20 @@ fn print_summary(verification: &Verification, commands: &[String], repaired: boo
     let missing = match verification.missing.len() as u64 {
         0 => "nothing".to_owned(),
         parts => {
-            let (jobs, names) = (
-                output::count(verification.jobs_missing, "job"),
-                first_of(&verification.missing),
-            );
+            let jobs = output::missing(verification.jobs_missing, verification.jobs_spilled);
+            let names = first_of(&verification.missing);
             format!("{}, {jobs}: {names}", output::count(parts, "part"))
         }
     };
     let damaged = match verification.problems.len() as u64 {
         0 => "nothing".to_owned(),
         problems => {
-            output::count(problems, "problem") + if repaired { ", taken care of" } else { "" }
+            output::count(problems, "problem")
+                + if repaired {
+                    ", moved to run/quarantine"
+                } else {
+                    ""
+                }
         }
     };
     output::pairs(&[
@@ -137,9 +135,12 @@ fn print_summary(verification: &Verification, commands: &[String], repaired: boo
             "files",
             format!("{}, {megabytes:.1} MB", verification.files),
         ),
-        ("not there", missing),
+        ("not done", missing),
         ("damaged", damaged),
     ])?;
+    for path in &verification.passed_over {
+        output::print(&format!("passed over: {path}\n"))?;
+    }
     if !commands.is_empty() {
         output::print("to go on:\n")?;
         commands

@@ -8,7 +8,6 @@ use super::set::SetRow;
 use super::values::{FREQUENCY, Values};
 use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol};
-use crate::results::parts::committed_files;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
 use crate::table::columns::{Column, Kind, columns};
@@ -45,9 +44,9 @@ fn statistics(jobs: impl Iterator<Item = Sums>) -> [Option<f64>; 3] {
 }
 
 fn sets_of(results: &Results<'_>) -> Result<Vec<Set>, ResultsError> {
-    let (layout, sweep) = (results.layout(), results.sweep());
-    let jobs = layout.dataset(JOBS)?;
-    let slips = committed_files(layout, SLIPS, &jobs)?;
+    let sweep = results.sweep();
+    let jobs = results.dataset(JOBS)?;
+    let slips = results.committed_files(SLIPS, &jobs)?;
     let mut sets: BTreeMap<String, Set> = BTreeMap::new();
     each_job(
         &jobs,

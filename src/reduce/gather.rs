@@ -14,7 +14,6 @@ use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
 use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
-use crate::results::parts::committed_files;
 use crate::results::tables::{All, JOBS, JobOfSlip, JobOutcome, SLIPS};
 use crate::results::{Results, ResultsError};
 use crate::sweep::Sweep;
@@ -97,10 +96,10 @@ impl<'a> Gathering<'a> {
         results: &'a Results<'a>,
         is_wanted: Wanted<'a>,
     ) -> Result<Self, ResultsError> {
-        let (layout, sweep) = (results.layout(), results.sweep());
+        let sweep = results.sweep();
         // Listed once: what other runs commit meanwhile is left out as a whole.
-        let jobs = layout.dataset(JOBS)?;
-        let slips = committed_files(layout, SLIPS, &jobs)?;
+        let jobs = results.dataset(JOBS)?;
+        let slips = results.committed_files(SLIPS, &jobs)?;
         let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
         each_job(&jobs, is_wanted, |job, parameters| {
             let seed = parameters.seed;

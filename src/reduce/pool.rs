@@ -7,7 +7,6 @@ use super::set::{FinishedSet, SetJobs, SetRow};
 use crate::model::Parameters;
 use crate::observe::Slip;
 use crate::results::layout::Layout;
-use crate::results::parts::committed_files;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
 use std::collections::BTreeMap;
@@ -32,8 +31,8 @@ impl Pool {
     pub(crate) fn of(layout: &Layout<'_>) -> Result<Self, ResultsError> {
         let results = Results::read(layout)?;
         let sweep = results.sweep();
-        let jobs = layout.dataset(JOBS)?;
-        let slips = committed_files(layout, SLIPS, &jobs)?;
+        let jobs = results.dataset(JOBS)?;
+        let slips = results.committed_files(SLIPS, &jobs)?;
         let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
         each_job(
             &jobs,

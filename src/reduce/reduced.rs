@@ -7,7 +7,7 @@ use crate::results::tables::JOBS;
 use crate::results::{ErrorKind, Results, ResultsError};
 use crate::table::checksum::hexadecimal;
 use crate::table::columns::{FromRow, Table};
-use crate::table::file::{Dataset, footer};
+use crate::table::file::{DataFile, Dataset, Footer};
 use crate::table::storage::StorageError;
 use anyhow::Result;
 use sha2::{Digest, Sha256};
@@ -19,12 +19,11 @@ use tempfile::TempDir;
 pub(super) const SOURCE: &str = "reduced_from";
 
 /// A checksum of the sweep that was asked for last, and of names and sizes of the committed files of jobs.
-pub(super) fn source(results: &Results<'_>) -> Result<String, StorageError> {
-    let (storage, folder) = (results.layout().storage, results.layout().table(JOBS));
+pub(super) fn source(results: &Results<'_>) -> Result<String, ResultsError> {
     let mut digest = Sha256::new_with_prefix(results.sweep().text());
-    for name in storage.list(&folder)? {
-        digest.update(name.as_encoded_bytes());
-        digest.update(storage.length(&folder.join(&name))?.to_le_bytes());
+    for path in results.dataset(JOBS)?.files() {
+        digest.update(path.file_name().unwrap_or_default().as_encoded_bytes());
+        digest.update(results.layout().storage.length(path)?.to_le_bytes());
     }
     Ok(hexadecimal(&digest.finalize()))
 }
@@ -54,10 +53,10 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
     if is_there && !layout.storage.exists(&layout.table(JOBS))? {
         return Ok(renewed);
     }
-    let source = source(results)?;
+    let source = Footer::empty().with(SOURCE, &source(results)?);
     let is_of_it = |table: &&str| {
-        let footer = footer(layout.storage, &layout.reduced_file(table)).ok();
-        footer.is_some_and(|footer| footer.get(SOURCE) == Some(&source))
+        let file = DataFile::with_footer(layout.reduced_file(table), source.clone());
+        file.check(layout.storage).is_ok()
     };
     if [
         SetRow::NAME,

@@ -93,10 +93,12 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     layout.ensure_folder(&layout.reduced())?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
-    let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, footer)?;
-    let mut histogram_writer = TableWriter::new(stage(HistogramBin::NAME)?, footer)?;
-    let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, footer)?;
-    let mut point_writer = TableWriter::new(stage(Point::NAME)?, footer)?;
+    let at = |name: &str| footer.clone().at(&layout.reduced_file(name));
+    let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, &at(SetRow::NAME))?;
+    let mut histogram_writer =
+        TableWriter::new(stage(HistogramBin::NAME)?, &at(HistogramBin::NAME))?;
+    let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, &at(BackboneBin::NAME))?;
+    let mut point_writer = TableWriter::new(stage(Point::NAME)?, &at(Point::NAME))?;
 
     let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
     gathering.each_set(max_slips, spacing(total), |set, explained| {
@@ -134,7 +136,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
         backbone_writer.push(bin)?;
     }
     if let Some(refinement) = results.sweep().refinement() {
-        let mut edge_writer = TableWriter::new(stage(EdgeRow::NAME)?, footer)?;
+        let mut edge_writer = TableWriter::new(stage(EdgeRow::NAME)?, &at(EdgeRow::NAME))?;
         edge_rows(results, refinement)?
             .iter()
             .try_for_each(|edge| edge_writer.push(edge))?;

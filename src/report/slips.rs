@@ -2,7 +2,6 @@
 
 use super::tables::Columns;
 use crate::observe::Slip;
-use crate::results::parts::committed_files;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Label, capitalised};
@@ -50,7 +49,6 @@ impl Slips {
         places: &HashMap<String, usize>,
         total: u64,
     ) -> Result<Self, ResultsError> {
-        let layout = results.layout();
         let symbol = |name: &str| {
             COLUMNS
                 .iter()
@@ -65,9 +63,8 @@ impl Slips {
         };
         let mut number = 0_u64;
         let mut last: Option<JobOfSlip> = None;
-        for batch in
-            committed_files(layout, SLIPS, &layout.dataset(JOBS)?)?.rows::<(JobOfSlip, Slip)>()
-        {
+        let files = results.committed_files(SLIPS, &results.dataset(JOBS)?)?;
+        for batch in files.rows::<(JobOfSlip, Slip)>() {
             for (job, slip) in batch? {
                 let Some(&place) = places.get(&job.set_id) else {
                     continue;

@@ -4,10 +4,12 @@
 //! the winner dead makes the next generation. A claim stays while anybody is at work, as one who has looked before may not
 //! know yet what became of it. Who has lost some claims lists them all, and does not ask for one after the other.
 
+use crate::results::layout::is_hidden;
 use crate::results::workers::{Living, Member};
 use crate::table::error::ResultsError;
 use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ffi::OsStr;
 
 /// The claims as they were when they were listed.
 #[derive(Debug)]
@@ -16,6 +18,13 @@ pub struct Claims<'a> {
     /// The last generation of each.
     generations: HashMap<String, u64>,
     own: HashSet<String>,
+}
+
+/// What is claimed by a file of this name, and the generation; `None` if it is not a claim.
+pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
+    let (what, generation) = name.to_str()?.rsplit_once('.')?;
+    let generation = generation.parse().ok()?;
+    (!is_hidden(name)).then_some((what, generation))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,15 +49,9 @@ impl<'a> Claims<'a> {
     }
 
     pub fn refresh(&mut self) -> Result<(), StorageError> {
-        let names = self
-            .member
-            .layout()
-            .storage
-            .list(&self.member.layout().claims())?;
-        for name in &names {
-            if let Some((what, generation)) = name.to_str().and_then(|name| name.rsplit_once('.'))
-                && let Ok(generation) = generation.parse::<u64>()
-            {
+        let layout = self.member.layout();
+        for name in layout.storage.list(&layout.claims())? {
+            if let Some((what, generation)) = claim(&name) {
                 let last = self.generations.entry(what.to_owned()).or_default();
                 *last = generation.max(*last);
             }

@@ -6,7 +6,7 @@
 
 use crate::results::layout::Layout;
 use crate::table::storage::{Lock, Storage, StorageError, StoredFile};
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -74,16 +74,16 @@ impl<'a> Commit<'a> {
         Ok(())
     }
 
-    /// Gives the staged files their names, if nothing has them; false, and nothing more is done, where something has.
-    pub(super) fn publish_new(self) -> Result<bool, StorageError> {
-        for (staged, target) in &self.staged {
-            if !self.storage.link_new(staged, target)? {
-                return Ok(false);
-            }
+    /// Creates a file with these bytes; false if there is one of this name.
+    pub(super) fn create_new(mut self, target: &Path, bytes: &[u8]) -> Result<bool, StorageError> {
+        self.stage_bytes(target, bytes)?;
+        let (staged, _) = &self.staged[self.staged.len() - 1];
+        let is_new = self.storage.link_new(staged, target)?;
+        if is_new {
             self.storage
                 .sync_folder(target.parent().unwrap_or(Path::new(".")))?;
         }
-        Ok(true)
+        Ok(is_new)
     }
 }
 
@@ -103,6 +103,12 @@ pub(super) fn own_number() -> u64 {
     RandomState::new().hash_one(std::process::id())
 }
 
+/// Whether a name is one that a commit gives: others may leave theirs in the folder.
+fn is_staged(name: &OsStr) -> bool {
+    let token = name.as_encoded_bytes().split(|byte| *byte == b'-').next();
+    token.is_some_and(|token| token.len() == 16 && token.iter().all(u8::is_ascii_hexdigit))
+}
+
 /// Waits until no other process does what this writer does, and removes what a killed one left in its staging folder. A
 /// file system without locks lets in all, and nothing is removed: their files are then whole, but may be of one and of the
 /// other.
@@ -119,8 +125,13 @@ pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, Storage
     }
     if matches!(lock, Lock::Ours(_)) {
         let staging = layout.staging(writer);
-        for name in layout.storage.list(&staging)? {
-            layout.refuse_link(&staging.join(&name))?;
+        for name in layout
+            .storage
+            .list(&staging)?
+            .iter()
+            .filter(|name| is_staged(name))
+        {
+            layout.refuse_link(&staging.join(name))?;
             layout.storage.remove(&staging.join(name))?;
         }
     }

@@ -3,17 +3,18 @@
 use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
-use crate::results::layout::{DoneParts, Layout, PartName, RUN, RUN_FOLDERS};
+use crate::results::layout::{DoneParts, Layout, PartName, RUN, RUN_FOLDERS, is_hidden};
 use crate::results::tables::{TABLES, tables_of};
 use crate::results::workers::{self, Member};
-use crate::sweep::{Extension, Outline, Part, Plan, Round, Sweep};
+use crate::sweep::{Extension, Part, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
-use crate::table::file::Footer;
+use crate::table::file::{DataFile, Dataset, Footer};
 use crate::table::storage::StorageError;
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 use std::io;
 use std::ops::RangeInclusive;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
 /// for, since other processes may be at work on it.
@@ -23,10 +24,13 @@ pub struct Results<'a> {
     records: Vec<Record>,
     /// At least one; the last is that of the sweep that was asked for last.
     extensions: Vec<Extension>,
+    /// What the footers of the parts of each extension hold beside program and place.
+    footers: Vec<Arc<Footer>>,
 }
 
-/// What is wrong with a name in the folder of a table that no part has.
-const STRANGER: &str = "is no part of this directory's sweeps, and readers of the folder would take it for one; move it elsewhere";
+/// What is wrong with the name of a table file.
+pub(super) const STRANGER: &str =
+    "no part of this directory has this name, and readers of the folder would take it for one";
 
 impl<'a> Results<'a> {
     /// Opens the directory of a sweep for a worker: begins it, resumes it, or extends it.
@@ -36,6 +40,7 @@ impl<'a> Results<'a> {
         loop {
             let found = Self::look(layout, sweep)?;
             if found.is_of(sweep) {
+                found.write_copies(|| Ok(member.commit()))?;
                 return Ok(found);
             }
             // In this order: a worker that was taken for dead and lives can commit nothing any more, and what it has left of
@@ -95,7 +100,7 @@ impl<'a> Results<'a> {
 
     /// Reads a directory as it is, of whatever versions: what it holds is there, and can be read.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
-        let results = Self::new(layout, extension_file::read(layout)?)?;
+        let results = Self::new(layout, extension_file::read(layout)?.records)?;
         if results.records.is_empty() {
             Err(layout.no_results())
         } else {
@@ -115,10 +120,16 @@ impl<'a> Results<'a> {
 
     pub(super) fn new(layout: &Layout<'a>, records: Vec<Record>) -> Result<Self, ResultsError> {
         let extensions = extension_file::extensions(layout, &records)?;
+        let footers = records
+            .iter()
+            .zip(&extensions)
+            .map(|(record, extension)| Arc::new(record.footer(extension.sweep.name())))
+            .collect();
         Ok(Self {
             layout: layout.clone(),
             records,
             extensions,
+            footers,
         })
     }
 
@@ -126,7 +137,7 @@ impl<'a> Results<'a> {
     fn look(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         // In this order: another run may begin in between.
         let is_fresh = is_fresh(layout)?;
-        let found = Self::new(layout, extension_file::read(layout)?)?;
+        let found = Self::new(layout, extension_file::read(layout)?.records)?;
         if found.records.is_empty() {
             if layout.root().is_symlink() && !layout.root().exists() {
                 let problem =
@@ -210,49 +221,100 @@ impl<'a> Results<'a> {
             last.kept.clone_from(&kept);
         }
         let extension = Extension::in_round(sweep, &all.extensions, round);
-        all.records
-            .push(Record::new(&extension, &self.records, kept));
+        let record = Record::new(&extension, &self.records, kept);
+        all.footers.push(Arc::new(record.footer(sweep.name())));
+        all.records.push(record);
         all.extensions.push(extension);
         all
     }
 
-    /// Writes the file of the last extension; `None` if another worker was first.
+    /// Writes the files of the last extension; `None` if another worker was first.
     pub(super) fn write_last(self, member: &Member<'_>) -> Result<Option<Self>, ResultsError> {
         let number = self.records.len() - 1;
+        let file = self.layout.extension(number);
         let text = self.records[number].text();
-        let is_first = member.publish_new(&self.layout.extension(number), text.as_bytes())?;
-        Ok(is_first.then_some(self))
+        if !member.commit().create_new(&file, text.as_bytes())? {
+            return Ok(None);
+        }
+        self.write_copies(|| Ok(member.commit()))?;
+        Ok(Some(self))
+    }
+
+    /// Writes the files of extensions that are lost, or that a killed worker did not come to. Another may do so at once.
+    pub(super) fn write_copies(
+        &self,
+        begin: impl Fn() -> Result<Commit<'a>, StorageError>,
+    ) -> Result<(), ResultsError> {
+        let listed = self.layout.listed_extensions()?;
+        for (number, record) in self.records.iter().enumerate() {
+            for file in self.layout.files_of_extension(number) {
+                if !listed
+                    .get(&number)
+                    .is_some_and(|there| there.contains(&file))
+                {
+                    self.layout.ensure_folder(&self.layout.copies())?;
+                    begin()?.create_new(&file, record.text().as_bytes())?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Makes sure that the directory is still the one that was opened. Another that has taken its place belongs to other
     /// sweeps, so rows of these must not get into it.
     pub fn check_place(&self) -> Result<(), ResultsError> {
         let last = self.records.len() - 1;
-        let found = match self.layout.storage.read(&self.layout.extension(last)) {
-            Err(error) if error.is_missing() || error.is_no_file() => None,
-            bytes => Some(bytes?),
-        };
-        if found.is_some_and(|bytes| bytes == self.records[last].text().as_bytes()) {
-            return Ok(());
+        for file in self.layout.files_of_extension(last) {
+            let found = match self.layout.storage.read(&file) {
+                Err(error) if error.is_missing() || error.is_no_file() => None,
+                bytes => Some(bytes?),
+            };
+            if found.is_some_and(|bytes| bytes == self.records[last].text().as_bytes()) {
+                return Ok(());
+            }
         }
         let problem = "the results directory was moved, removed or replaced since it was opened; \
                        move it back or name its new place, and the same command resumes";
         Err(ResultsError::refused(self.layout.root(), problem))
     }
 
-    /// The parts that have a file in a table. Names that no part of this directory can have are refused.
-    pub(super) fn parts_of(&self, table: &str) -> Result<HashSet<PartName>, ResultsError> {
+    /// The parts that have a file in a table. Names that no part of this directory can have are damage.
+    pub(super) fn parts_of(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
         let folder = self.layout.table(table);
-        let mut parts = HashSet::new();
-        for name in self.layout.storage.list(&folder)? {
+        let mut parts = BTreeSet::new();
+        for name in self.layout.table_files(&folder)? {
             match PartName::of_path(name.as_ref()) {
                 Some(part) if part.extension < self.extensions.len() => _ = parts.insert(part),
                 // A run may have added an extension since the directory was opened.
                 Some(_) if self.layout.listed_extensions()?.len() > self.extensions.len() => (),
-                _ => return Err(ResultsError::refused(&folder.join(name), STRANGER)),
+                _ => return Err(ResultsError::damaged(&folder.join(name), STRANGER)),
             }
         }
         Ok(parts)
+    }
+
+    /// All files of a table as they are now, each of them that of a part.
+    pub fn dataset(&self, table: &str) -> Result<Dataset<'a>, ResultsError> {
+        let files = self
+            .parts_of(table)?
+            .into_iter()
+            .map(|part| self.file_in(&self.layout.tables(), table, part));
+        Ok(Dataset::of(self.layout.storage, files.collect()))
+    }
+
+    /// The file of a part in a table, as a dataset.
+    pub(super) fn dataset_of(&self, table: &str, part: PartName) -> Dataset<'a> {
+        let file = self.file_in(&self.layout.tables(), table, part);
+        Dataset::of(self.layout.storage, vec![file])
+    }
+
+    /// The file of a part of a table, below the tables or what is spilled of them.
+    pub(super) fn file_in(&self, place: &Path, table: &str, part: PartName) -> DataFile {
+        DataFile {
+            path: place.join(table).join(part.file()),
+            rows: None,
+            footer: Arc::clone(&self.footers[part.extension]),
+        }
     }
 
     /// Looks up which parts are done.
@@ -276,35 +338,6 @@ impl<'a> Results<'a> {
         ))
     }
 
-    /// Parts and jobs that are asked for and not there; `None` in a directory of another version, which had other parts.
-    pub fn missing(&self) -> Result<Option<(u64, u64)>, ResultsError> {
-        let done = self.done_parts()?;
-        let outlines = self
-            .version_differences()
-            .is_empty()
-            .then(|| self.plan().outlines());
-        Ok(outlines.map(|parts| {
-            let missing = parts.filter(|part| !done.has(part));
-            missing.fold((0, 0), |(parts, jobs), part| {
-                (parts + 1, jobs + part.job_count as u64)
-            })
-        }))
-    }
-
-    /// Refuses files of parts that are none of these, which are all: their jobs would be there twice.
-    pub fn refuse_strangers(&self, parts: &[Outline]) -> Result<(), ResultsError> {
-        let planned: HashSet<PartName> = parts.iter().map(PartName::from).collect();
-        for table in self.tables() {
-            if let Some(stranger) = self.parts_of(table)?.difference(&planned).min() {
-                return Err(ResultsError::refused(
-                    &self.layout.table(table).join(stranger.file()),
-                    STRANGER,
-                ));
-            }
-        }
-        Ok(())
-    }
-
     /// Removes what earlier runs have left of parts that are not done: files of some of their tables, and spilled jobs.
     fn remove_unfinished(&self, done: &DoneParts) -> Result<(), StorageError> {
         let (layout, storage) = (&self.layout, self.layout.storage);
@@ -325,6 +358,28 @@ impl<'a> Results<'a> {
                 if !parts.is_empty() {
                     storage.sync_folder(&folder)?;
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses folders on another disk than that of the staging folder, as no file could be moved to them.
+    pub fn check_disks(&self) -> Result<(), ResultsError> {
+        let layout = &self.layout;
+        let above = [
+            layout.tables(),
+            layout.spill(),
+            layout.reduced(),
+            layout.figures(),
+        ];
+        for folder in above
+            .into_iter()
+            .chain(TABLES.map(|table| layout.table(table)))
+        {
+            if !layout.storage.is_one_disk(&layout.staging(""), &folder) {
+                let problem = "is on another disk or mount than run/staging, and no file can be moved to it as a whole; \
+                               make it a plain folder, or place the whole results directory on the other disk with --out";
+                return Err(ResultsError::refused(&folder, problem));
             }
         }
         Ok(())
@@ -364,13 +419,9 @@ impl<'a> Results<'a> {
         Plan::new(&self.extensions)
     }
 
-    pub(super) fn record(&self, extension: usize) -> &Record {
-        &self.records[extension]
-    }
-
-    /// What the footers of the parts of an extension hold.
-    pub fn footer(&self, extension: usize) -> Footer {
-        self.records[extension].footer(self.extensions[extension].sweep.name())
+    /// What the footer of this file of an extension's part holds.
+    pub(super) fn footer(&self, extension: usize, file: &Path) -> Footer {
+        Footer::default().and(&self.footers[extension]).at(file)
     }
 
     /// What the footers of files hold that are made from all tables: the sweep that was asked for last.
@@ -399,10 +450,13 @@ impl<'a> Results<'a> {
         }
         let layout = &self.layout;
         let tables = TABLES.map(|table| layout.table(table));
-        for folder in [layout.root().to_owned(), layout.run(), layout.tables()]
-            .into_iter()
-            .chain(tables)
-        {
+        let above = [
+            layout.root().to_owned(),
+            layout.run(),
+            layout.copies(),
+            layout.tables(),
+        ];
+        for folder in above.into_iter().chain(tables) {
             match self.layout.storage.sync_folder(&folder) {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 synced => synced?,
@@ -415,13 +469,15 @@ impl<'a> Results<'a> {
 /// Whether a directory holds nothing, or no more than what a run leaves that was killed before its first extension.
 pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
     let storage = layout.storage;
-    let ours = |name: &std::ffi::OsString| RUN_FOLDERS.iter().any(|folder| name == folder);
-    match storage.list(layout.root()) {
+    let holds_only = |folder: &Path, known: &[&str]| -> Result<bool, StorageError> {
+        let names = storage.list(folder)?;
+        Ok(names
+            .iter()
+            .all(|name| is_hidden(name) || known.iter().any(|known| name == known)))
+    };
+    match holds_only(layout.root(), &[RUN]) {
         // A file at this place is somebody else's.
         Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(false),
-        names => {
-            Ok(names?.iter().all(|name| name == RUN)
-                && storage.list(&layout.run())?.iter().all(ours))
-        }
+        is_fresh => Ok(is_fresh? && holds_only(&layout.run(), &RUN_FOLDERS)?),
     }
 }

@@ -6,6 +6,7 @@
 use crate::results::commit::own_number;
 use crate::results::deaths::Marked;
 use crate::results::directory::Results;
+use crate::results::layout::is_hidden;
 use crate::results::rounds::RoundsSoFar;
 use crate::results::workers::{host, plain};
 use crate::table::error::ResultsError;
@@ -181,7 +182,8 @@ impl Results<'_> {
     /// half-written is passed over, and so is what is no file.
     pub fn events(&self, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
         let (folder, storage) = (self.layout().logs(), self.layout().storage);
-        for name in storage.list(&folder)? {
+        let names = storage.list(&folder)?.into_iter();
+        for name in names.filter(|name| !is_hidden(name)) {
             let path = folder.join(name);
             let mut log = match storage.open(&path) {
                 Err(error) if error.is_no_file() => continue,

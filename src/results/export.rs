@@ -32,9 +32,10 @@ pub struct Exported {
     pub files: Vec<ExportedFile>,
     pub parts: u64,
     pub jobs: u64,
-    /// Parts that are not done, and their jobs; they are left out.
+    /// Parts that are not done, and their jobs, without and with a result so far; they are left out.
     pub parts_missing: u64,
     pub jobs_missing: u64,
+    pub jobs_spilled: u64,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -71,11 +72,12 @@ impl Results<'_> {
         let storage = self.layout().storage;
         let mut parts: Vec<PartName> = self.parts_of(tables::JOBS)?.into_iter().collect();
         parts.sort_unstable();
-        let (parts_missing, jobs_missing) = self.missing()?.unwrap_or_default();
+        let overview = self.overview()?;
         let mut exported = Exported {
             parts: parts.len() as u64,
-            parts_missing,
-            jobs_missing,
+            parts_missing: overview.parts_missing,
+            jobs_missing: overview.jobs_missing,
+            jobs_spilled: overview.jobs_spilled,
             ..Exported::default()
         };
         let names: Vec<&str> = self.tables().collect();
@@ -132,16 +134,17 @@ impl Results<'_> {
         schema: &SchemaRef,
         writer: &mut RowWriter,
     ) -> Result<u64, ResultsError> {
-        let storage = self.layout().storage;
-        let file = |table| self.layout().table(table).join(part.file());
-        let path = file(tables::JOBS);
-        let dataset = || Dataset::new(storage, vec![path.clone()]);
-        let jobs = Jobs::read(dataset(), &path)?;
+        let dataset = || self.dataset_of(tables::JOBS, part);
+        let jobs = Jobs::read(
+            dataset(),
+            &self.layout().table(tables::JOBS).join(part.file()),
+        )?;
         let rows = if table == tables::JOBS {
             dataset()
         } else {
-            let count = row_count(dataset(), table)?;
-            Dataset::of_known_rows(storage, vec![(file(table), Some(count))])
+            let mut file = self.file_in(&self.layout().tables(), table, part);
+            file.rows = Some(row_count(dataset(), table)?);
+            Dataset::of(self.layout().storage, vec![file])
         };
         let mut copied = 0;
         for batch in rows.batches() {

@@ -1,8 +1,9 @@
 //! The files that say what the tables of a directory belong to: one for each extension, written once.
 //!
 //! `run/extension-EEE.json` holds versions, columns, the text of the sweep and all that decides which part has which job.
-//! Each holds the checksum of the one before, so the last one stands for all. The footers of an extension's parts hold the
-//! same, so a file that is lost is made again from any of them.
+//! Each holds the checksum of the one before, so the last one stands for all. `run/copies/` holds a second copy of each: the
+//! first that is whole counts. Both are made exclusively, the first one decides which worker was first; a worker that opens
+//! the directory writes the copies that are missing.
 //!
 //! A sweep that differs from the last one in axes, conditions or bounds alone is a further extension; anything else, such
 //! as another model, solver, recording or version, is refused before anything is written.
@@ -12,7 +13,7 @@ pub(super) mod tests;
 
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
 use crate::results::layout::{Layout, settled};
-use crate::results::tables::{JOBS, recorded_schema, tables_of};
+use crate::results::tables::{recorded_schema, tables_of};
 use crate::sweep::{Extension, PLAN_VERSION, Round, Sweep};
 use crate::table::checksum;
 use crate::table::error::ResultsError;
@@ -21,16 +22,11 @@ use crate::table::shown::shown_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Version of a directory. 7: a file for each extension in place of a manifest that is written again.
 const FORMAT: u32 = 7;
-/// What programs before this format have in its place.
-const OLD_MANIFEST: &str = "manifest.json";
 const MISSING: &str = "it is missing";
-/// Keys of a footer.
-const SWEEP: &str = "sweep";
-const EXTENSION: &str = "extension";
 
 /// What the file of an extension says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,53 +109,33 @@ impl Record {
         checksum::to_json(self).unwrap_or_default()
     }
 
-    /// What the footers of the extension's parts hold: all but what follows from their columns.
+    /// What tells the parts of the extension from others, in their footers: all but what follows from their columns.
     pub fn footer(&self, name: &str) -> Footer {
         let rest = Self {
             tables: BTreeMap::new(),
             sweep: String::new(),
             ..self.clone()
         };
-        let footer = Footer::default().with_sweep(name, &self.sweep);
-        footer.with(EXTENSION, &serde_json::to_string(&rest).unwrap_or_default())
-    }
-
-    /// What a footer with these texts says; `None` if it is not one of this program's.
-    pub fn of_footer(texts: &BTreeMap<String, String>) -> Option<Self> {
-        let rest: Self = serde_json::from_str(texts.get(EXTENSION)?).ok()?;
-        let sweep = texts.get(SWEEP)?;
-        let parsed = Sweep::parse_stored(sweep, Path::new("the sweep of a footer")).ok()?;
-        (rest.format == FORMAT).then(|| Self {
-            tables: columns_of(&parsed),
-            sweep: sweep.clone(),
-            ..rest
-        })
+        let footer = Footer::empty().with_sweep(name, &self.sweep);
+        footer.with(
+            "extension",
+            &serde_json::to_string(&rest).unwrap_or_default(),
+        )
     }
 
     /// In what it differs from that of this program for the same sweep.
     pub fn difference(&self, sweep: &Sweep) -> Vec<String> {
-        let versions = [
-            (
-                "model version",
-                self.model_version.to_string(),
-                MODEL_VERSION.to_string(),
-            ),
-            (
-                "random numbers",
-                self.rng_scheme.clone(),
-                RNG_SCHEME.to_owned(),
-            ),
-            (
-                "plan version",
-                self.plan_version.to_string(),
-                PLAN_VERSION.to_string(),
-            ),
-        ];
-        let mut differences: Vec<String> = versions
-            .into_iter()
-            .filter(|(_, before, after)| before != after)
-            .map(|(key, before, after)| format!("{key}: {} -> {after}", shown_text(&before)))
-            .collect();
+        let mut differences = Vec::new();
+        let mut compare = |key: &str, before: &str, after: &str| {
+            if before != after {
+                differences.push(format!("{key}: {} -> {after}", shown_text(before)));
+            }
+        };
+        let [model, plan] =
+            [self.model_version, self.plan_version].map(|number| number.to_string());
+        compare("model version", &model, &MODEL_VERSION.to_string());
+        compare("random numbers", &self.rng_scheme, RNG_SCHEME);
+        compare("plan version", &plan, &PLAN_VERSION.to_string());
         // Versions enter it.
         if differences.is_empty() && self.identity != sweep.job_id(&Parameters::default()) {
             differences.push(format!(
@@ -171,14 +147,9 @@ impl Record {
             let Some(before) = self.tables.get(name) else {
                 continue;
             };
-            let missing = |of: &[String], from: &[String]| -> Vec<String> {
-                of.iter()
-                    .filter(|column| !from.contains(column))
-                    .cloned()
-                    .collect()
-            };
-            let (gone, new) = (missing(before, after), missing(after, before));
             if before != after {
+                let gone: Vec<_> = before.iter().filter(|name| !after.contains(name)).collect();
+                let new: Vec<_> = after.iter().filter(|name| !before.contains(name)).collect();
                 differences.push(format!(
                     "columns of {name}: without {gone:?}, with {new:?}, or in another order"
                 ));
@@ -187,26 +158,36 @@ impl Record {
         differences
     }
 
-    /// Reads the file of an extension, which the folder lists.
-    pub fn read(layout: &Layout<'_>, number: usize) -> Result<Self, ResultsError> {
-        let path = layout.extension(number);
-        let read = || match layout.storage.read(&path) {
+    /// Reads a file of an extension, which the folder lists.
+    fn read(layout: &Layout<'_>, path: &Path, number: usize) -> Result<Self, ResultsError> {
+        let read = || match layout.storage.read(path) {
             Err(error) if error.is_missing() => Ok(None),
             bytes => bytes.map(Some).map_err(ResultsError::of_reading),
         };
-        let damaged = |problem: String| ResultsError::damaged(&path, problem);
+        let damaged = |problem: String| ResultsError::damaged(path, problem);
         let bytes = settled(read)?.ok_or_else(|| damaged(MISSING.to_owned()))?;
         let text = String::from_utf8(bytes).map_err(|error| damaged(error.to_string()))?;
-        let Format { format } =
-            serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
+        // First: in a damaged text, the format may be what is damaged.
+        let text = checksum::checked(&text).map_err(|problem| damaged(problem.to_owned()))?;
+        let unreadable = |error: serde_json::Error| damaged(error.to_string());
+        let Format { format } = serde_json::from_str(&text).map_err(unreadable)?;
         if format != FORMAT {
-            return Err(other_format(&path, format));
+            let problem = format!(
+                "has format {format}, this program knows {FORMAT}; use the program that wrote it, or choose another \
+                 directory with --out"
+            );
+            return Err(ResultsError::refused(path, problem));
         }
-        let record: Self = checksum::from_json(&text).map_err(damaged)?;
+        let record: Self = serde_json::from_str(&text).map_err(unreadable)?;
         record
             .check(number)
             .map_err(|problem| damaged(problem.to_owned()))?;
         Ok(record)
+    }
+
+    /// Whether it is that of the extension after this one.
+    fn follows(&self, before: &Self) -> bool {
+        self.before == Some(checksum::of_text(&before.text()))
     }
 
     /// Looks whether a program can have written this as the file of the extension with this number.
@@ -230,65 +211,71 @@ impl Record {
             () => Ok(()),
         }
     }
-
-    /// Whether it is that of the extension after these.
-    pub fn follows(&self, before: &[Self]) -> bool {
-        self.before == before.last().map(|last| checksum::of_text(&last.text()))
-    }
 }
 
-fn other_format(path: &Path, format: u32) -> ResultsError {
-    let problem = format!(
-        "has format {format}, this program knows {FORMAT}; use the program that wrote it, or choose another directory \
-         with --out"
-    );
-    ResultsError::refused(path, problem)
+/// What the files of the extensions of a directory say.
+#[derive(Default)]
+pub(super) struct Records {
+    /// In order; none if there is no file.
+    pub records: Vec<Record>,
+    /// Files that are damaged or lost and whose copies are whole, with what is wrong with them.
+    pub unsound: Vec<(PathBuf, String)>,
 }
 
-/// All records of a directory, in order; none if there is none.
-pub(super) fn read(layout: &Layout<'_>) -> Result<Vec<Record>, ResultsError> {
+/// Reads the files of all extensions, the last first: it says which of the copies before it count.
+pub(super) fn read(layout: &Layout<'_>) -> Result<Records, ResultsError> {
     let listed = layout.listed_extensions()?;
-    if listed.is_empty() {
-        refuse_old(layout)?;
-        // In this order: whoever has parts there has had its extension there before.
-        let has_parts = !layout.parts_in(&layout.table(JOBS))?.is_empty();
-        match (has_parts, layout.listed_extensions()?.is_empty()) {
-            (true, true) => return Err(ResultsError::damaged(&layout.extension(0), MISSING)),
-            (_, false) => return read(layout),
-            (false, true) => (),
-        }
+    let count = listed.last_key_value().map_or(0, |(last, _)| last + 1);
+    let mut found = Records::default();
+    for number in (0..count).rev() {
+        let files = listed.get(&number).map_or(&[][..], Vec::as_slice);
+        let next = found.records.last();
+        let record = first_whole(layout, number, files, next, &mut found.unsound)?;
+        found.records.push(record);
     }
-    let mut records: Vec<Record> = Vec::with_capacity(listed.len());
-    for number in 0..listed.last().map_or(0, |last| last + 1) {
-        if !listed.contains(&number) {
-            return Err(ResultsError::damaged(&layout.extension(number), MISSING));
-        }
-        let record = Record::read(layout, number)?;
-        if !record.follows(&records) {
-            let problem =
-                "it does not follow the file before it: one of the two is of another directory";
-            return Err(ResultsError::damaged(&layout.extension(number), problem));
-        }
-        records.push(record);
-    }
-    Ok(records)
+    found.records.reverse();
+    Ok(found)
 }
 
-/// Refuses a directory of a program before this format.
-pub(super) fn refuse_old(layout: &Layout<'_>) -> Result<(), ResultsError> {
-    let old = layout.run().join(OLD_MANIFEST);
-    if layout.storage.exists(&old)? {
-        let format = layout
-            .storage
-            .read(&old)
-            .ok()
-            .and_then(|text| serde_json::from_slice::<Format>(&text).ok());
-        return Err(other_format(
-            &old,
-            format.map_or(FORMAT - 1, |Format { format }| format),
-        ));
+/// The record of the extension before another, from the first of its files that is whole.
+fn first_whole(
+    layout: &Layout<'_>,
+    number: usize,
+    files: &[PathBuf],
+    next: Option<&Record>,
+    unsound: &mut Vec<(PathBuf, String)>,
+) -> Result<Record, ResultsError> {
+    let mut problems: Vec<(PathBuf, String)> = Vec::new();
+    let mut whole: Option<Record> = None;
+    let first = layout.extension(number);
+    if !files.contains(&first) {
+        problems.push((first, MISSING.to_owned()));
     }
-    Ok(())
+    for path in files {
+        match Record::read(layout, path, number) {
+            Ok(record) if next.is_some_and(|next| !next.follows(&record)) => {
+                let problem =
+                    "the file after it does not follow it: one of the two is of another directory";
+                problems.push((path.clone(), problem.to_owned()));
+            }
+            Ok(record) if whole.as_ref().is_some_and(|whole| *whole != record) => {
+                let problem = "it and its copy in the other folder are whole and not the same: one is of another directory; \
+                               remove that one";
+                return Err(ResultsError::damaged(path, problem));
+            }
+            Ok(record) => whole = Some(record),
+            Err(error) => problems.push(error.damage()?),
+        }
+    }
+    let Some(whole) = whole else {
+        let (path, problem) = problems.swap_remove(0);
+        let problem = format!(
+            "{problem}; its copy in run/copies is damaged or lost, too: restore one of the two from a backup"
+        );
+        return Err(ResultsError::damaged(&path, problem));
+    };
+    unsound.extend(problems);
+    Ok(whole)
 }
 
 /// The extensions that these records say.

@@ -4,6 +4,7 @@
 //! results/<name>/tables/{slips,precursors,jobs}/part-EEE-FFFFFF.parquet   committed files only, at every instant
 //!                reduced/  figures/  report.html                         made from the tables
 //!                run/extension-EEE.json                                  what the tables belong to; written once
+//!                run/copies/extension-EEE.json                           the same once more
 //!                run/{workers,claims,staging,lock,log}/                  of no use once nothing runs
 //!                run/deaths/                                             parts at which workers died
 //!                run/spill/{slips,precursors,jobs}/                      finished jobs of parts that are not done
@@ -16,10 +17,10 @@
 
 use crate::sweep::{Outline, Sweep};
 use crate::table::error::ResultsError;
-use crate::table::file::{Dataset, FILE_EXTENSION};
+use crate::table::file::FILE_EXTENSION;
 use crate::table::storage::{Storage, StorageError};
-use std::collections::{BTreeSet, HashSet};
-use std::ffi::OsString;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -101,25 +102,6 @@ impl<'a> Layout<'a> {
         self.tables().join(name)
     }
 
-    /// All files of a table as they are now, each of them that of a part.
-    pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, ResultsError> {
-        let folder = self.table(name);
-        let paths = self
-            .storage
-            .list(&folder)?
-            .into_iter()
-            .map(|name| folder.join(name));
-        let stray = "it is no table file, and a table folder may hold nothing else; move it away";
-        let of_part = |path: PathBuf| match PartName::of_path(&path) {
-            Some(_) => Ok(path),
-            None => Err(ResultsError::damaged(&path, stray)),
-        };
-        Ok(Dataset::new(
-            self.storage,
-            paths.map(of_part).collect::<Result<_, _>>()?,
-        ))
-    }
-
     /// The names in a folder; none where a file lies on the way, which is somebody else's.
     fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
         self.storage.list(folder).or_else(|error| {
@@ -131,8 +113,16 @@ impl<'a> Layout<'a> {
         })
     }
 
+    /// The names of table files in a folder. What file managers, network file systems and other programs leave there is
+    /// passed over: hidden names, and those with another ending.
+    pub fn table_files(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
+        let mut names = self.names_in(folder)?;
+        names.retain(|name| is_table_file(name));
+        Ok(names)
+    }
+
     /// The parts that have a file in a folder.
-    pub(super) fn parts_in(&self, folder: &Path) -> Result<HashSet<PartName>, StorageError> {
+    pub(super) fn parts_in(&self, folder: &Path) -> Result<BTreeSet<PartName>, StorageError> {
         Ok(self
             .names_in(folder)?
             .into_iter()
@@ -160,26 +150,29 @@ impl<'a> Layout<'a> {
 
     /// What is known of an extension.
     pub fn extension(&self, number: usize) -> PathBuf {
-        self.run().join(format!("{EXTENSION}{number:03}.json"))
+        self.run().join(extension_name(number))
     }
 
-    /// Numbers of the extensions that the folder lists: a network file system may not yet find them by their names.
-    pub(super) fn listed_extensions(&self) -> Result<BTreeSet<usize>, StorageError> {
-        let number = |name: &str| {
-            name.strip_prefix(EXTENSION)?
-                .strip_suffix(".json")?
-                .parse()
-                .ok()
-        };
-        let names = self.names_in(&self.run())?;
-        let numbers = names.iter().filter_map(|name| number(name.to_str()?));
-        Ok(numbers
-            .filter(|&number| {
-                names
-                    .iter()
-                    .any(|name| self.extension(number).ends_with(name))
-            })
-            .collect())
+    /// The same, and its copy.
+    pub(crate) fn files_of_extension(&self, number: usize) -> [PathBuf; 2] {
+        [self.run(), self.copies()].map(|folder| folder.join(extension_name(number)))
+    }
+
+    /// The files of extensions that the folders list, by their numbers, copies last: a network file system may not yet find
+    /// them by their names.
+    pub(super) fn listed_extensions(&self) -> Result<BTreeMap<usize, Vec<PathBuf>>, StorageError> {
+        // In this order: where a copy is listed, its first file was there before.
+        let copies = self.names_in(&self.copies())?;
+        let first = self.names_in(&self.run())?;
+        let mut listed: BTreeMap<usize, Vec<PathBuf>> = BTreeMap::new();
+        for (folder, names) in [(self.run(), first), (self.copies(), copies)] {
+            for name in names {
+                if let Some(number) = extension_number(&name) {
+                    listed.entry(number).or_default().push(folder.join(name));
+                }
+            }
+        }
+        Ok(listed)
     }
 
     /// Refuses to remove something through a link below the root: where it leads may be somebody else's.
@@ -199,6 +192,32 @@ impl<'a> Layout<'a> {
     pub fn staging(&self, writer: &str) -> PathBuf {
         self.reduced_root().join("run/staging").join(writer)
     }
+}
+
+/// Whether a name is one that no program means to be read, by what most take for such.
+pub(super) fn is_hidden(name: &OsStr) -> bool {
+    matches!(name.as_encoded_bytes().first(), Some(b'.' | b'_'))
+}
+
+pub(super) fn is_table_file(name: &OsStr) -> bool {
+    !is_hidden(name)
+        && Path::new(name)
+            .extension()
+            .is_some_and(|ending| ending == FILE_EXTENSION)
+}
+
+fn extension_name(number: usize) -> String {
+    format!("{EXTENSION}{number:03}.json")
+}
+
+fn extension_number(name: &OsStr) -> Option<usize> {
+    let name = name.to_str()?;
+    let number = name
+        .strip_prefix(EXTENSION)?
+        .strip_suffix(".json")?
+        .parse()
+        .ok()?;
+    (extension_name(number) == name).then_some(number)
 }
 
 /// Paths below the root, each a method of its name.
@@ -222,6 +241,8 @@ places! {
     claims = "run/claims";
     /// The parts that dead workers were at.
     deaths = "run/deaths";
+    /// Second copies of the files of extensions.
+    copies = "run/copies";
     logs = "run/log";
     /// What a repair took away, as it was damaged.
     quarantine = "run/quarantine";
@@ -277,7 +298,7 @@ impl fmt::Display for PartName {
 
 /// The parts that are done: those that have a file in every table.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct DoneParts(pub(super) HashSet<PartName>);
+pub struct DoneParts(pub(super) BTreeSet<PartName>);
 
 impl DoneParts {
     pub fn has(&self, part: &Outline) -> bool {

@@ -7,7 +7,7 @@
 use crate::observe::Measurements;
 use crate::results::commit::Commit;
 use crate::results::directory::Results;
-use crate::results::layout::{Layout, PartName};
+use crate::results::layout::PartName;
 use crate::results::tables::{
     self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow,
     label, relabel,
@@ -28,17 +28,31 @@ pub type Outcome = Result<Measurements, String>;
 /// What jobs of a part that were run ended with, by their positions.
 pub type Outcomes = BTreeMap<usize, Outcome>;
 
-impl Results<'_> {
+impl<'a> Results<'a> {
+    /// The files of a table that count beside these of `jobs`: those of the same parts, with as many rows as these say. A
+    /// run killed in between leaves the slips of a part without its jobs. A part without its slips is damaged.
+    pub fn committed_files(
+        &self,
+        table: &str,
+        jobs: &Dataset<'_>,
+    ) -> Result<Dataset<'a>, ResultsError> {
+        let there = self.layout().parts_in(&self.layout().table(table))?;
+        let mut files = Vec::new();
+        for part in jobs.files().filter_map(|path| PartName::of_path(path)) {
+            let mut file = self.file_in(&self.layout().tables(), table, part);
+            if !there.contains(&part) {
+                let problem = "it is missing, though the jobs of its part are there";
+                return Err(ResultsError::damaged(&file.path, problem));
+            }
+            file.rows = Some(row_count(self.dataset_of(tables::JOBS, part), table)?);
+            files.push(file);
+        }
+        Ok(Dataset::of(self.layout().storage, files))
+    }
+
     /// The file of a part in a table.
     pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
         self.layout().table(table).join(PartName::from(part).file())
-    }
-
-    pub(super) fn spilled_file(&self, table: &str, part: &Outline) -> PathBuf {
-        self.layout()
-            .spill()
-            .join(table)
-            .join(PartName::from(part).file())
     }
 
     /// Spills the outcomes of some jobs of a part, beside those at the positions that are spilled already.
@@ -108,9 +122,9 @@ impl Results<'_> {
     fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
         // Jobs first: what is spilled without them is nothing.
         for table in self.tables().rev() {
-            let file = self.spilled_file(table, part);
-            self.layout().refuse_link(&file)?;
-            gone_is_fine(self.layout().storage.remove(&file))?;
+            let file = self.file_in(&self.layout().spill(), table, part.into());
+            self.layout().refuse_link(&file.path)?;
+            gone_is_fine(self.layout().storage.remove(&file.path))?;
         }
         Ok(())
     }
@@ -173,7 +187,8 @@ impl Results<'_> {
         ) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
-        let file = |place: &PathBuf| place.join(R::NAME).join(PartName::from(&**part).file());
+        let file = |place: &PathBuf| self.file_in(place, R::NAME, PartName::from(&**part));
+        let target = file(to).path;
         // The tables are there from the beginning of a run on.
         let top = if *to == self.layout().spill() {
             &self.layout().run()
@@ -181,15 +196,15 @@ impl Results<'_> {
             to
         };
         storage.ensure_folder_below(top, &to.join(R::NAME))?;
-        let kept = KeptRows::read(Dataset::new(storage, from.map(file).into_iter().collect()))?;
+        let kept = KeptRows::read(Dataset::of(storage, from.map(file).into_iter().collect()))?;
         let left_out = self.extensions()[part.extension]
             .sweep
             .recording()
             .left_out();
         let mut writer = TableWriter::without(
             &left_out,
-            commit.stage(&file(to))?,
-            &self.footer(part.extension),
+            commit.stage(&target)?,
+            &self.footer(part.extension, &target),
         )?;
         for (job, outcome) in jobs {
             match outcome {
@@ -244,32 +259,6 @@ pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, Resu
         }
     }
     Ok(all)
-}
-
-/// The files of a table that count beside these of `jobs`: those of the same parts, with as many rows as these say. A run
-/// killed in between leaves the slips of a part without its jobs. A part without its slips is damaged.
-pub fn committed_files<'a>(
-    layout: &Layout<'a>,
-    table: &str,
-    jobs: &Dataset<'_>,
-) -> Result<Dataset<'a>, ResultsError> {
-    let there: HashSet<PathBuf> = layout.dataset(table)?.files().cloned().collect();
-    let mut files = Vec::new();
-    for jobs in jobs.files() {
-        let Some(part) = PartName::of_path(jobs) else {
-            continue;
-        };
-        let path = layout.table(table).join(part.file());
-        if !there.contains(&path) {
-            return Err(ResultsError::damaged(
-                &path,
-                "it is missing, though the jobs of its part are there",
-            ));
-        }
-        let count = row_count(Dataset::new(layout.storage, vec![jobs.clone()]), table)?;
-        files.push((path, Some(count)));
-    }
-    Ok(Dataset::of_known_rows(layout.storage, files))
 }
 
 /// The rows of a file by job.

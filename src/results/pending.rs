@@ -6,7 +6,7 @@
 //! | extensions | which extension has a job: the first that keeps it, else the last | `sweep/plan.rs` | `what_is_taken_out_of_the_sweep_is_kept_if_done_and_else_not_run` |
 //! | parts | a part is done if all its files are there | [`Results::done_parts`] | `a_part_without_its_slips_is_run_again` |
 //! | retries | of a part that is done, jobs that failed, that needed more memory than was allowed, or that a shorter `max_time` cut off | [`Pending::runs_again`] | `failing_and_panicking_jobs_become_rows_others_go_on_and_a_retry_mends_them`, `a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others` |
-//! | spill | of one that is not, all jobs but those that a stopped run has finished | [`Pending::state`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
+//! | spill | of one that is not, all jobs but those that a stopped run has finished | [`Pending::spilled`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
 //!
 //! Who runs it is another question: see `claims.rs`, and `run/take.rs`.
 
@@ -19,6 +19,7 @@ use crate::table::columns::columns;
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::Dataset;
 use crate::table::shown::shown_bytes;
+use serde::Serialize;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::io;
@@ -26,13 +27,25 @@ use std::io;
 /// Times within this share of each other are the same bound.
 const SAME_TIME: f64 = 1e-9;
 
-/// What is not finished of a part.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum PartState {
-    /// All its jobs are missing but those at these positions, which are spilled.
-    Missing { spilled: BTreeSet<usize> },
-    /// It is done; jobs at these positions may run again.
-    Done { again: BTreeMap<usize, Again> },
+/// How far the parts of a share are. Costs are predicted CPU times, in s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Overview {
+    /// Jobs of parts that are done, without the failed ones.
+    pub jobs_done: u64,
+    /// Finished jobs that are kept for later, until the rest of their part is done.
+    pub jobs_spilled: u64,
+    /// Jobs that failed and are asked for.
+    pub jobs_failed: u64,
+    /// Of those done, jobs that the sweep which was asked for last does not have, failed or not; their data are kept.
+    pub jobs_kept: u64,
+    /// Jobs that are missing, or are asked for and were ended by a shorter `max_time`.
+    pub jobs_missing: u64,
+    pub parts_done: u64,
+    pub parts_missing: u64,
+    /// Cost of all jobs that are done, spilled or failed.
+    pub predicted_cost_done: f64,
+    pub predicted_cost_failed: f64,
+    pub predicted_cost_missing: f64,
 }
 
 /// Why a job of a part that is done may run again.
@@ -66,7 +79,7 @@ pub struct Pending<'a> {
     /// Looked up again, since workers die.
     deaths: RefCell<Deaths>,
     /// Looked up again, since workers that end spill.
-    spilled: RefCell<HashSet<PartName>>,
+    spilled: RefCell<BTreeSet<PartName>>,
 }
 
 impl<'a> Pending<'a> {
@@ -76,6 +89,16 @@ impl<'a> Pending<'a> {
         retry: Retry,
     ) -> Result<Self, ResultsError> {
         let done = results.done_parts()?;
+        Self::with(results, parts, retry, done)
+    }
+
+    /// The same where it is known which parts are done.
+    pub(super) fn with(
+        results: &'a Results<'a>,
+        parts: &'a [Outline],
+        retry: Retry,
+        done: DoneParts,
+    ) -> Result<Self, ResultsError> {
         let pending = Self {
             results,
             parts,
@@ -153,22 +176,69 @@ impl<'a> Pending<'a> {
         })
     }
 
-    /// What is not finished of a part: by position missing, spilled, failed or cut off. Of one that is done, this reads its
-    /// jobs.
-    pub fn state(&self, part: &Outline) -> Result<PartState, ResultsError> {
-        if self.done.has(part) {
-            Ok(PartState::Done {
-                again: self.results.again(part)?,
-            })
+    /// Positions of the jobs of a part that is not done which are finished.
+    pub fn spilled(&self, part: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
+        if self.spilled.borrow().contains(&part.into()) {
+            self.results.spilled(part)
         } else {
-            let is_spilled = self.spilled.borrow().contains(&part.into());
-            let spilled = if is_spilled {
-                self.results.spilled(part)?
-            } else {
-                BTreeSet::new()
-            };
-            Ok(PartState::Missing { spilled })
+            Ok(BTreeSet::new())
         }
+    }
+
+    /// How far the parts are, by their names alone unless jobs of them may run again. With `looks`, looks into every part;
+    /// visits jobs that failed, each with its part, its position and why.
+    pub fn overview(
+        &self,
+        looks: bool,
+        mut visit: impl FnMut(&Part, usize, &Again),
+    ) -> Result<Overview, ResultsError> {
+        let mut overview = Overview::default();
+        for outline in self.parts {
+            if !self.done.has(outline) {
+                let spilled = self.spilled(outline)?;
+                let jobs = if spilled.is_empty() {
+                    Vec::new()
+                } else {
+                    self.part(outline).jobs
+                };
+                let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
+                overview.parts_missing += 1;
+                overview.jobs_missing += (outline.job_count - spilled.len()) as u64;
+                overview.predicted_cost_missing += outline.cost - spilled_cost;
+                overview.jobs_spilled += spilled.len() as u64;
+                overview.predicted_cost_done += spilled_cost;
+                continue;
+            }
+            overview.parts_done += 1;
+            overview.jobs_done += outline.job_count as u64;
+            overview.predicted_cost_done += outline.cost;
+            let again = if looks || self.may_run_again(outline) {
+                self.results.again(outline)?
+            } else {
+                BTreeMap::new()
+            };
+            if again.is_empty() {
+                continue;
+            }
+            let part = self.part(outline);
+            for (position, why) in again {
+                let cost = part.jobs[position].cost;
+                overview.jobs_done -= 1;
+                match &why {
+                    Again::Failed(_) => {
+                        overview.jobs_failed += 1;
+                        overview.predicted_cost_failed += cost;
+                        visit(&part, position, &why);
+                    }
+                    Again::CutOff => {
+                        overview.jobs_missing += 1;
+                        overview.predicted_cost_missing += cost;
+                        overview.predicted_cost_done -= cost;
+                    }
+                }
+            }
+        }
+        Ok(overview)
     }
 }
 
@@ -182,13 +252,24 @@ columns! {
 }
 
 impl Results<'_> {
+    /// How far all parts are. In a directory of another version, which had other parts, nothing is known to be missing.
+    pub fn overview(&self) -> Result<Overview, ResultsError> {
+        if !self.version_differences().is_empty() {
+            return Ok(Overview::default());
+        }
+        let parts: Vec<Outline> = self.plan().outlines().collect();
+        Pending::look_up(self, &parts, Retry::default())?.overview(false, |_, _, _| ())
+    }
+
     /// The jobs of a part that is done which failed or were cut off. Those of values that the sweep no longer has stay as they are.
-    fn again(&self, part: &Outline) -> Result<BTreeMap<usize, Again>, ResultsError> {
+    pub fn again(&self, part: &Outline) -> Result<BTreeMap<usize, Again>, ResultsError> {
         let max_time = self.sweep().recording().max_time.unwrap_or(f64::INFINITY);
         let is_cut_off = |time: f64| time < max_time * (1.0 - SAME_TIME);
         let (mut again, mut rows) = (BTreeMap::new(), 0);
-        let path = self.part_file(tables::JOBS, part);
-        for batch in Dataset::new(self.layout().storage, vec![path.clone()]).rows::<OutcomeRow>() {
+        for batch in self
+            .dataset_of(tables::JOBS, part.into())
+            .rows::<OutcomeRow>()
+        {
             for row in batch? {
                 let why = match row.outcome {
                     JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
@@ -202,9 +283,10 @@ impl Results<'_> {
             }
         }
         if rows != part.job_count {
+            let problem = format!("{rows} jobs where the plan has {}", part.job_count);
             return Err(ResultsError::damaged(
-                &path,
-                format!("{rows} jobs where the plan has {}", part.job_count),
+                &self.part_file(tables::JOBS, part),
+                problem,
             ));
         }
         if !again.is_empty() && part.extension + 1 < self.extensions().len() {
@@ -215,7 +297,7 @@ impl Results<'_> {
     }
 
     /// The parts of which something is spilled in this table.
-    pub(super) fn spilled_parts(&self, table: &str) -> Result<HashSet<PartName>, ResultsError> {
+    pub(super) fn spilled_parts(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
         Ok(self.layout().parts_in(&self.layout().spill().join(table))?)
     }
 
@@ -225,11 +307,9 @@ impl Results<'_> {
         for table in self.tables() {
             // Nothing yet if this host does not see a file that the folder lists, and no ids in one that is damaged.
             let read = || {
-                let file = Dataset::new(
-                    self.layout().storage,
-                    vec![self.spilled_file(table, outline)],
-                );
-                match file.rows::<RowOfJob>().collect::<Result<Vec<_>, _>>() {
+                let file = self.file_in(&self.layout().spill(), table, outline.into());
+                let rows = Dataset::of(self.layout().storage, vec![file]).rows::<RowOfJob>();
+                match rows.collect::<Result<Vec<_>, _>>() {
                     Ok(rows) => Ok(Some(Some(
                         rows.into_iter().flatten().map(|row| row.job_id).collect(),
                     ))),

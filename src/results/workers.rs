@@ -9,6 +9,7 @@
 //! why. All workers that live are at the same sweep: of two that join for different sweeps at once, one at least sees the
 //! other, and leaves.
 
+use crate::results::claims;
 use crate::results::commit::{Commit, own_number};
 use crate::results::layout::Layout;
 use crate::sweep::Sweep;
@@ -227,7 +228,7 @@ impl Layout<'_> {
                 name.to_string_lossy().into_owned(),
                 self.workers().join(&name),
             );
-            if name.ends_with(NEW) {
+            if !name.starts_with(PREFIX) || name.ends_with(NEW) {
                 continue;
             }
             let read = || {
@@ -399,13 +400,6 @@ impl<'a> Member<'a> {
         Commit::within(self.layout.storage, &self.staging())
     }
 
-    /// Creates a file with these bytes; false if there is one of this name.
-    pub(super) fn publish_new(&self, target: &Path, bytes: &[u8]) -> Result<bool, StorageError> {
-        let mut commit = self.commit();
-        commit.stage_bytes(target, bytes)?;
-        commit.publish_new()
-    }
-
     /// Removes what dead workers left, and marks the parts that they were at. Their claims go only once nobody else is there,
     /// as another may have looked up what is done before they ended.
     pub fn tidy(&self) -> Result<(), StorageError> {
@@ -437,6 +431,7 @@ impl<'a> Member<'a> {
             layout.refuse_link(&layout.claims().join("any"))?;
             claims
                 .iter()
+                .filter(|name| claims::claim(name).is_some())
                 .try_for_each(|claim| gone_is_fine(storage.remove(&layout.claims().join(claim))))?;
         }
         Ok(())

@@ -27,9 +27,10 @@ pub mod threads;
 mod walltime;
 
 pub use crate::results::events::{RunEvent, RunReport};
+pub use crate::results::pending::Overview;
 pub use reasons::Reasons;
 pub use shard::Shard;
-pub use status::{Failure, MAX_FAILURES, Overview, Present, Status, status, status_with};
+pub use status::{Failure, MAX_FAILURES, Present, Status, status, status_with};
 pub use tally::Tally;
 
 use crate::observe::Measurements;
@@ -115,12 +116,11 @@ pub fn join<T, E: From<ResultsError>>(
         return Err(ResultsError::refused(layout.root(), problem).into());
     }
     Results::join(layout, sweep, threads, |member, results| {
-        let all: Vec<Outline> = results.plan().outlines().collect();
-        results.refuse_strangers(&all)?;
-        let parts: Vec<Outline> = options.shard.parts(all.into_iter()).collect();
+        let parts: Vec<Outline> = options.shard.parts(results.plan().outlines()).collect();
         layout
             .ensure_folder(&layout.tables())
             .map_err(ResultsError::from)?;
+        results.check_disks()?;
         let ended = body(&Joined {
             results,
             parts: &parts,
@@ -252,7 +252,8 @@ impl Joined<'_> {
                     others: member.others()?.len(),
                     threads: self.threads,
                     jobs,
-                    jobs_there: overview.jobs_done + overview.jobs_failed - jobs_again,
+                    jobs_there: overview.jobs_done + overview.jobs_spilled + overview.jobs_failed
+                        - jobs_again,
                     predicted_cost,
                 })?;
             }

@@ -2,36 +2,17 @@
 
 use crate::results::deaths::Marked;
 use crate::results::events::RunEvent;
-use crate::results::pending::{Again, PartState, Pending, Retry};
+use crate::results::pending::{Again, Overview, Pending, Retry};
 use crate::results::rounds::RoundsSoFar;
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
 use crate::run::reasons::Reasons;
-use crate::sweep::{Outline, Part};
+use crate::sweep::Outline;
 use serde::Serialize;
 use std::time::SystemTime;
 
 /// Failed jobs that [`status`] lists one by one, at most.
 pub const MAX_FAILURES: u64 = 10;
-
-/// How far the parts of a share are. Costs are predicted CPU times, in s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Overview {
-    /// Jobs that are done, without the failed ones.
-    pub jobs_done: u64,
-    /// Jobs that failed and are asked for.
-    pub jobs_failed: u64,
-    /// Of those done, jobs that the sweep which was asked for last does not have, failed or not; their data are kept.
-    pub jobs_kept: u64,
-    /// Jobs that are missing, or are asked for and were ended by a shorter `max_time`.
-    pub jobs_missing: u64,
-    pub parts_done: u64,
-    pub parts_missing: u64,
-    /// Cost of all jobs that are done or failed.
-    pub predicted_cost_done: f64,
-    pub predicted_cost_failed: f64,
-    pub predicted_cost_missing: f64,
-}
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Status {
@@ -70,65 +51,6 @@ pub struct Failure {
     pub reason: String,
     /// The command that does the same, to look at it alone.
     pub command: String,
-}
-
-impl Pending<'_> {
-    /// How far the parts are, by their names alone unless jobs of them may run again. With `looks`, looks into every part;
-    /// visits jobs that failed, each with its part, its position and why.
-    pub fn overview(
-        &self,
-        looks: bool,
-        mut visit: impl FnMut(&Part, usize, &Again),
-    ) -> Result<Overview, ResultsError> {
-        let mut overview = Overview::default();
-        for outline in self.parts {
-            if self.done.has(outline) {
-                overview.parts_done += 1;
-                overview.jobs_done += outline.job_count as u64;
-                overview.predicted_cost_done += outline.cost;
-                if !looks && !self.may_run_again(outline) {
-                    continue;
-                }
-            }
-            match self.state(outline)? {
-                PartState::Missing { spilled } => {
-                    let jobs = if spilled.is_empty() {
-                        Vec::new()
-                    } else {
-                        self.part(outline).jobs
-                    };
-                    let spilled_cost: f64 =
-                        spilled.iter().map(|&position| jobs[position].cost).sum();
-                    overview.parts_missing += 1;
-                    overview.jobs_missing += (outline.job_count - spilled.len()) as u64;
-                    overview.predicted_cost_missing += outline.cost - spilled_cost;
-                    overview.jobs_done += spilled.len() as u64;
-                    overview.predicted_cost_done += spilled_cost;
-                }
-                PartState::Done { again } if again.is_empty() => {}
-                PartState::Done { again } => {
-                    let part = self.part(outline);
-                    for (position, why) in again {
-                        let cost = part.jobs[position].cost;
-                        overview.jobs_done -= 1;
-                        match &why {
-                            Again::Failed(_) => {
-                                overview.jobs_failed += 1;
-                                overview.predicted_cost_failed += cost;
-                                visit(&part, position, &why);
-                            }
-                            Again::CutOff => {
-                                overview.jobs_missing += 1;
-                                overview.predicted_cost_missing += cost;
-                                overview.predicted_cost_done -= cost;
-                            }
-                        }
-                    }
-                }
-            }
-        }
-        Ok(overview)
-    }
 }
 
 /// Of the jobs of parts that are done, those that the sweep which was asked for last does not have.

@@ -7,7 +7,7 @@
 
 use crate::results::claims::{Claims, Standing};
 use crate::results::layout::PartName;
-use crate::results::pending::{Again, PartState, Pending};
+use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
 use crate::run::memory;
@@ -284,23 +284,23 @@ impl<'a> Work<'a> {
 
     /// Takes what is to be run of a part.
     fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
-        match self.pending.state(outline)? {
-            PartState::Missing { spilled } => {
-                let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
-                let jobs = left.map(|position| (position, false)).collect();
-                self.take(self.pending.part(outline), spilled, jobs, generation)
-            }
-            PartState::Done { again } if again.is_empty() => Ok(false),
-            PartState::Done { mut again } => {
-                let part = self.pending.part(outline);
-                again.retain(|&position, why| self.pending.runs_again(&part.jobs[position], why));
-                let again = again.into_iter();
-                let jobs: Vec<_> = again
-                    .map(|(position, why)| (position, why != Again::CutOff))
-                    .collect();
-                Ok(!jobs.is_empty() && self.take(part, BTreeSet::new(), jobs, generation)?)
-            }
+        if !self.pending.done.has(outline) {
+            let spilled = self.pending.spilled(outline)?;
+            let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
+            let jobs = left.map(|position| (position, false)).collect();
+            return self.take(self.pending.part(outline), spilled, jobs, generation);
         }
+        let mut again = self.pending.results.again(outline)?;
+        if again.is_empty() {
+            return Ok(false);
+        }
+        let part = self.pending.part(outline);
+        again.retain(|&position, why| self.pending.runs_again(&part.jobs[position], why));
+        let again = again.into_iter();
+        let jobs: Vec<_> = again
+            .map(|(position, why)| (position, why != Again::CutOff))
+            .collect();
+        Ok(!jobs.is_empty() && self.take(part, BTreeSet::new(), jobs, generation)?)
     }
 
     /// Claims a part, if there is time for it. `jobs` are those to be run, each with whether it has failed before.

@@ -17,7 +17,7 @@ use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchR
 use parquet::arrow::{ArrowWriter, ProjectionMask};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 use sha2::{Digest, Sha256};
@@ -61,7 +61,22 @@ impl Default for Footer {
     }
 }
 
+/// The footer's key of the place of a file.
+const PLACE: &str = "file";
+
+/// Folder and name of a file.
+fn place(path: &Path) -> String {
+    let names = [path.parent().and_then(Path::file_name), path.file_name()];
+    names
+        .map(|name| name.unwrap_or_default().to_string_lossy())
+        .join("/")
+}
+
 impl Footer {
+    pub const fn empty() -> Self {
+        Self(BTreeMap::new())
+    }
+
     /// The same, with the name and the text of a sweep.
     pub fn with_sweep(self, name: &str, text: &str) -> Self {
         self.with("sweep_name", name).with("sweep", text)
@@ -72,13 +87,20 @@ impl Footer {
         self
     }
 
-    pub fn get(&self, key: &str) -> Option<&str> {
-        self.0.get(key).map(String::as_str)
+    /// The same with the texts of another.
+    pub fn and(mut self, other: &Self) -> Self {
+        self.0.extend(other.0.clone());
+        self
+    }
+
+    /// The same, of a file at this place.
+    pub fn at(self, path: &Path) -> Self {
+        self.with(PLACE, &place(path))
     }
 
     pub(super) fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
         let [units, meaning] = [UNIT, DESCRIPTION].map(|key| by_name(schema, key));
-        let footer = self.clone().with(UNITS, &units).with("meaning", &meaning);
+        let footer = self.clone().with("units", &units).with("meaning", &meaning);
         let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
         let texts = footer
             .0
@@ -100,19 +122,9 @@ impl Footer {
     }
 }
 
-/// The footer's key of the units.
-const UNITS: &str = "units";
-
 /// What the metadata of all fields hold under a key, as JSON.
 fn by_name(schema: &Schema, key: &str) -> String {
     arrow::by_name(schema.fields().iter().map(AsRef::as_ref), key).to_string()
-}
-
-/// Whether a footer is that of a file with these columns.
-pub fn has_columns(footer: &BTreeMap<String, String>, schema: &Schema) -> bool {
-    footer
-        .get(UNITS)
-        .is_some_and(|units| *units == by_name(schema, UNIT))
 }
 
 /// Writes one file of a table. A file that was not finished is unreadable.
@@ -233,23 +245,24 @@ fn load(storage: &dyn Storage, path: &Path) -> Result<Bytes, ResultsError> {
     Ok(bytes.into())
 }
 
-/// The texts under keys in the footer of a file.
-pub fn footer(
-    storage: &dyn Storage,
-    path: &Path,
-) -> Result<BTreeMap<String, String>, ResultsError> {
-    let bytes = load(storage, path)?;
-    let metadata = ParquetMetaDataReader::new()
-        .parse_and_finish(&bytes)
-        .map_err(ResultsError::damage_at(path))?;
-    let entries = metadata
-        .file_metadata()
-        .key_value_metadata()
-        .into_iter()
-        .flatten();
-    Ok(entries
-        .map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default()))
-        .collect())
+/// Compares a footer with where the file lies, and with the texts that it must have. Earlier programs wrote fewer.
+fn check_footer(path: &Path, metadata: &ParquetMetaData, expected: &Footer) -> Result<(), String> {
+    let entries = metadata.file_metadata().key_value_metadata();
+    let text = |key: &str| {
+        let entry = entries.into_iter().flatten().find(|entry| entry.key == key);
+        entry.and_then(|entry| entry.value.as_deref())
+    };
+    if let Some(written) = text(PLACE).filter(|written| *written != place(path)) {
+        return Err(format!("it was written as {written}, and is not that file"));
+    }
+    for (key, expected) in &expected.0 {
+        if text(key).is_some_and(|found| found != expected) {
+            return Err(format!(
+                "its {key} is another: it is not of this directory as it is now"
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// How many rows a file must have.
@@ -274,31 +287,51 @@ impl RowCount {
     }
 }
 
+/// A file of a table, and what is known of it: one that is otherwise is damaged.
+#[derive(Clone)]
+pub struct DataFile {
+    pub path: PathBuf,
+    pub rows: Option<RowCount>,
+    /// Texts of its footer.
+    pub footer: Arc<Footer>,
+}
+
+impl DataFile {
+    /// One of which nothing is known but these texts of its footer.
+    pub fn with_footer(path: PathBuf, footer: Footer) -> Self {
+        Self {
+            path,
+            rows: None,
+            footer: Arc::new(footer),
+        }
+    }
+
+    /// Whether it is whole, and what is known of it holds.
+    pub fn check(&self, storage: &dyn Storage) -> Result<(), ResultsError> {
+        open(storage, self, &[]).map(drop)
+    }
+}
+
 /// Files of a table, in this order.
 #[derive(Clone)]
 pub struct Dataset<'a> {
     storage: &'a dyn Storage,
-    files: Vec<(PathBuf, Option<RowCount>)>,
+    files: Vec<DataFile>,
 }
 
 impl<'a> Dataset<'a> {
+    /// Files of which nothing is known.
     pub fn new(storage: &'a dyn Storage, files: Vec<PathBuf>) -> Self {
-        Self {
-            storage,
-            files: files.into_iter().map(|path| (path, None)).collect(),
-        }
+        let file = |path| DataFile::with_footer(path, Footer::empty());
+        Self::of(storage, files.into_iter().map(file).collect())
     }
 
-    /// Files of which it is known how many rows they must have; one with others is damaged.
-    pub const fn of_known_rows(
-        storage: &'a dyn Storage,
-        files: Vec<(PathBuf, Option<RowCount>)>,
-    ) -> Self {
+    pub const fn of(storage: &'a dyn Storage, files: Vec<DataFile>) -> Self {
         Self { storage, files }
     }
 
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.files.iter().map(|(path, _)| path)
+        self.files.iter().map(|file| &file.path)
     }
 
     /// Reads all rows, one batch after the other, holding one file; an error ends it.
@@ -328,13 +361,13 @@ impl<'a> Dataset<'a> {
         columns: Vec<Cow<'static, str>>,
     ) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
         let Self { storage, files } = self;
-        let batches = files.into_iter().flat_map(move |(path, expected)| {
-            let opened = open(storage, &path, expected, &columns);
+        let batches = files.into_iter().flat_map(move |file| {
+            let opened = open(storage, &file, &columns);
             let (reader, error) = opened.map_or_else(
                 |error| (None, Some(Err(error))),
                 |reader| (Some(reader), None),
             );
-            let path: Arc<Path> = path.into();
+            let path: Arc<Path> = file.path.into();
             let batch = move |rows: Result<RecordBatch, ArrowError>| {
                 Ok(Batch {
                     path: Arc::clone(&path),
@@ -350,15 +383,16 @@ impl<'a> Dataset<'a> {
 
 fn open(
     storage: &dyn Storage,
-    path: &Path,
-    expected: Option<RowCount>,
+    file: &DataFile,
     columns: &[Cow<'static, str>],
 ) -> Result<ParquetRecordBatchReader, ResultsError> {
+    let path = &file.path;
     let bytes = load(storage, path)?;
     let reader = || {
         let mut builder =
             ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
-        if let Some(expected) = expected {
+        check_footer(path, builder.metadata(), &file.footer).map_err(ParquetError::General)?;
+        if let Some(expected) = file.rows {
             let rows = builder
                 .metadata()
                 .file_metadata()
@@ -548,7 +582,6 @@ mod tests {
         let path = Path::new("a.parquet");
         let is_of_disk =
             |error: ResultsError| matches!(error.kind, ErrorKind::Disk(_)) && error.path == path;
-        assert!(is_of_disk(footer(&Unreadable, path).unwrap_err()));
         assert!(is_of_disk(
             Dataset::new(&Unreadable, vec![path.to_owned()])
                 .batches()
@@ -564,12 +597,12 @@ mod tests {
         let path = folder.path().join("a.parquet");
         write(&path, 0..5);
         let read = |least, may_exceed| {
-            let expected = Some(RowCount { least, may_exceed });
-            Dataset::of_known_rows(&Disk, vec![(path.clone(), expected)])
-                .batches()
-                .next()
-                .unwrap()
-                .map(|_| ())
+            let file = DataFile {
+                path: path.clone(),
+                rows: Some(RowCount { least, may_exceed }),
+                footer: Arc::new(Footer::empty()),
+            };
+            file.check(&Disk)
         };
         assert!(read(5, false).is_ok() && read(5, true).is_ok() && read(4, true).is_ok());
         for error in [read(4, false), read(6, false), read(6, true)].map(Result::unwrap_err) {
@@ -579,6 +612,52 @@ mod tests {
                     .contains("it has 5 rows, where the jobs of its part have"),
                 "{error}"
             );
+        }
+    }
+
+    #[test]
+    fn a_file_under_another_name_or_with_another_text_than_expected_is_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("numbers/a.parquet");
+        let others = ["numbers/b.parquet", "others/a.parquet"].map(|name| folder.path().join(name));
+        for file in others.iter().chain([&path]) {
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+        }
+        let expected = Footer::empty().with("sweep", "one");
+        let written = Footer::default().and(&expected).at(&path);
+        let mut writer = TableWriter::new(Disk.create(&path).unwrap(), &written).unwrap();
+        writer.push(&Number::of(1)).unwrap();
+        writer.finish().unwrap();
+        let check = |path: &Path, footer: &Footer| {
+            DataFile::with_footer(path.to_owned(), footer.clone()).check(&Disk)
+        };
+        check(&path, &expected).unwrap();
+        // Earlier programs wrote fewer keys.
+        check(&path, &expected.clone().with("unknown", "key")).unwrap();
+        let error = check(&path, &Footer::empty().with("sweep", "another")).unwrap_err();
+        assert!(
+            error.to_string().contains("its sweep is another"),
+            "{error}"
+        );
+        for other in &others {
+            fs::copy(&path, other).unwrap();
+            let errors = [
+                check(other, &expected).unwrap_err(),
+                Dataset::new(&Disk, vec![other.clone()])
+                    .batches()
+                    .next()
+                    .unwrap()
+                    .unwrap_err(),
+            ];
+            for error in errors {
+                assert!(
+                    error.kind == ErrorKind::Damaged
+                        && error
+                            .to_string()
+                            .contains("it was written as numbers/a.parquet"),
+                    "{error}"
+                );
+            }
         }
     }
 }

@@ -118,6 +118,11 @@ pub trait Storage: Sync {
             .map_err(StorageError::at("look up", path))
     }
 
+    /// Whether files can be moved from one folder to another, as far as that is known.
+    fn is_one_disk(&self, one: &Path, other: &Path) -> bool {
+        disk(one).is_none_or(|one| disk(other).is_none_or(|other| one == other))
+    }
+
     /// The number of bytes of a file.
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
         let metadata = self.open(file)?.metadata();
@@ -258,23 +263,11 @@ impl From<NoFile> for io::Error {
 }
 
 /// Opens a regular file. A FIFO would make the program wait, and opening a device may have effects.
-fn open_regular(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
-    let check = |metadata: Metadata| {
-        if metadata.is_file() {
-            Ok(())
-        } else {
-            Err(io::Error::from(NoFile::Irregular))
-        }
-    };
+fn open_regular(options: &OpenOptions, path: &Path) -> io::Result<File> {
     match fs::metadata(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => (),
-        metadata => check(metadata?)?,
+        Ok(metadata) if !metadata.is_file() => Err(NoFile::Irregular.into()),
+        _ => options.open(path),
     }
-    // Something else may have taken its place.
-    options.custom_flags(libc::O_NONBLOCK);
-    let file = options.open(path)?;
-    check(file.metadata()?)?;
-    Ok(file)
 }
 
 /// Opens a folder: an empty path is that of the present one.
@@ -284,6 +277,19 @@ fn open_folder(path: &Path) -> io::Result<File> {
     options.read(true);
     options.custom_flags(libc::O_DIRECTORY);
     options.open(path)
+}
+
+/// The device of a folder that is there, and the mount: nothing is moved from one to another.
+#[cfg(target_os = "linux")]
+fn disk(folder: &Path) -> Option<(u32, u32, u64)> {
+    use rustix::fs::{AtFlags, CWD, StatxFlags, statx};
+    let found = statx(CWD, folder, AtFlags::empty(), StatxFlags::MNT_ID).ok()?;
+    Some((found.stx_dev_major, found.stx_dev_minor, found.stx_mnt_id))
+}
+
+#[cfg(not(target_os = "linux"))]
+const fn disk(_: &Path) -> Option<()> {
+    None
 }
 
 /// The file system of the operating system.

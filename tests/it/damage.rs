@@ -80,6 +80,11 @@ fn other(root: &Path) -> PathBuf {
     root.with_file_name("other")
 }
 
+/// A directory of the same sweep that had more jobs before it.
+fn longer(root: &Path) -> PathBuf {
+    root.with_file_name("longer")
+}
+
 const PARTS: &[Damage] = &[
     damage(
         "a jobs file cut in half",
@@ -302,13 +307,41 @@ const PARTS: &[Damage] = &[
             });
         },
     ),
-    damage("a stray file", "tables/jobs/notes.txt", 0, |root| {
-        fs::write(path(root, "jobs", "notes.txt"), "to do").unwrap();
-    }),
-    damage("a folder among the files", "tables/slips/old", 0, |root| {
-        fs::create_dir(path(root, "slips", "old")).unwrap();
-        fs::copy(path(root, "slips", SECOND), path(root, "slips/old", SECOND)).unwrap();
-    }),
+    damage(
+        "a part of a directory with the same sweep and another history",
+        "tables/jobs/part-001-000000.parquet",
+        1,
+        |root| {
+            in_all_tables(|table| {
+                fs::copy(
+                    path(&longer(root), table, EXTENSION),
+                    path(root, table, EXTENSION),
+                )
+                .unwrap();
+            });
+        },
+    ),
+    damage(
+        "a stray table file",
+        "tables/jobs/notes.parquet",
+        0,
+        |root| {
+            fs::write(path(root, "jobs", "notes.parquet"), "to do").unwrap();
+        },
+    ),
+    damage(
+        "a folder with the name of a table file",
+        "tables/slips/old.parquet",
+        0,
+        |root| {
+            fs::create_dir(path(root, "slips", "old.parquet")).unwrap();
+            fs::copy(
+                path(root, "slips", SECOND),
+                path(root, "slips/old.parquet", SECOND),
+            )
+            .unwrap();
+        },
+    ),
     damage(
         "a folder in a file's place",
         "tables/jobs/part-000-000001.parquet",
@@ -318,10 +351,6 @@ const PARTS: &[Damage] = &[
             fs::create_dir(path(root, "jobs", SECOND)).unwrap();
         },
     ),
-    damage("a table that is none", "tables/backup", 0, |root| {
-        fs::create_dir(root.join("tables/backup")).unwrap();
-        fs::copy(path(root, "jobs", SECOND), path(root, "backup", SECOND)).unwrap();
-    }),
     damage(
         "an extension cut in half",
         "run/extension-000.json",
@@ -340,6 +369,35 @@ const PARTS: &[Damage] = &[
             let path = root.join("run/extension-000.json");
             let text = fs::read_to_string(&path).unwrap();
             fs::write(path, text.replace("count = 2", "count = 4")).unwrap();
+        },
+    ),
+    damage(
+        "a changed digit of the format",
+        "run/extension-001.json",
+        0,
+        |root| {
+            let path = root.join("run/extension-001.json");
+            let text = fs::read_to_string(&path).unwrap();
+            fs::write(path, text.replace("\"format\": 7", "\"format\": 5")).unwrap();
+        },
+    ),
+    damage(
+        "a copy of an extension cut in half",
+        "run/copies/extension-001.json",
+        0,
+        |root| {
+            change(&root.join("run/copies/extension-001.json"), |bytes| {
+                bytes.truncate(bytes.len() / 2);
+            });
+        },
+    ),
+    damage(
+        "one file of each extension",
+        "run/extension-001.json",
+        0,
+        |root| {
+            fs::write(root.join("run/copies/extension-000.json"), "").unwrap();
+            fs::write(root.join("run/extension-001.json"), "").unwrap();
         },
     ),
     damage(
@@ -469,7 +527,10 @@ fn folder() -> Folder {
     folder.ends(0, "run a.toml --out parts --no-reduce");
     folder.ends(0, "run b.toml --out parts");
     folder.ends(0, "run c.toml --out other --no-reduce");
-    for directory in ["parts", "other"] {
+    folder.write("d.toml", &sweep("damaged", 1));
+    folder.ends(0, "run d.toml --out longer --no-reduce");
+    folder.ends(0, "run b.toml --out longer --no-reduce");
+    for directory in ["parts", "other", "longer"] {
         let report = json(&folder.ends(0, &format!("verify {directory} --json")).stdout);
         assert_eq!(report["whole"], true, "{report}");
     }
@@ -546,6 +607,148 @@ fn every_kind_of_damage_is_found_named_and_repaired_by_what_is_printed() {
     }
 }
 
+/// Puts files of one part into the place of those of another, so that rows would be read twice, and others not at all.
+#[test]
+fn a_part_under_the_name_of_another_ends_every_command_that_reads_it_with_code_4_and_its_name() {
+    let folder = folder();
+    let whole = tables(&folder, "parts");
+    let root = folder.path("parts");
+    for tables_of in [&["jobs"][..], &["slips"], &["slips", "precursors", "jobs"]] {
+        for table in tables_of {
+            fs::copy(path(&root, table, FIRST), path(&root, table, EXTENSION)).unwrap();
+        }
+        fs::remove_dir_all(root.join("reduced")).unwrap();
+        for command in [
+            "reduce parts",
+            "show parts",
+            "plot parts",
+            "report parts -o x.html",
+            "export parts -o exported",
+            "run parts",
+            "run b.toml --out parts",
+            "status parts",
+        ] {
+            if command.starts_with("status") && !tables_of.contains(&"jobs") {
+                continue;
+            }
+            let ended = folder.ends(4, command);
+            assert!(
+                ended
+                    .stderr
+                    .contains(&format!("/{EXTENSION}: damaged: it was written as ")),
+                "{command}: {}",
+                ended.stderr
+            );
+        }
+        folder.ends(4, "verify parts");
+        folder.ends(0, "verify parts --repair");
+        assert_eq!(
+            json(&folder.ends(0, "run parts --json").stdout)["jobs_run"],
+            1
+        );
+        assert!(tables(&folder, "parts") == whole);
+    }
+}
+
+#[test]
+fn what_others_leave_in_the_folders_is_passed_over_by_every_command_and_listed_by_verify() {
+    let folder = folder();
+    let whole = tables(&folder, "parts");
+    let exported = |to: &str| {
+        folder.ends(0, &format!("export parts -o {to}"));
+        folder.contents(to)
+    };
+    let before = exported("before");
+    let root = folder.path("parts");
+    let (mut seen, mut left) = (Vec::new(), Vec::new());
+    for place in [
+        ".",
+        "tables",
+        "tables/slips",
+        "tables/precursors",
+        "tables/jobs",
+        "reduced",
+        "run",
+        "run/claims",
+        "run/copies",
+        "run/log",
+        "run/spill",
+        "run/spill/slips",
+        "run/spill/jobs",
+        "run/staging",
+        "run/staging/reduce",
+        "run/workers",
+    ] {
+        for name in [
+            ".DS_Store",
+            ".gitkeep",
+            ".nfs000000000123",
+            "._part-000-000000.parquet",
+            "_SUCCESS",
+            "_metadata.parquet",
+            "part-000-000001.parquet~",
+            "notes.txt",
+            ".reduce.1",
+        ] {
+            fs::create_dir_all(root.join(place)).unwrap();
+            fs::write(root.join(place).join(name), "mine").unwrap();
+            left.push(root.join(place).join(name));
+            if place.starts_with("tables") || place == "reduced" {
+                seen.push(format!("parts/{place}/{name}"));
+            }
+        }
+        for name in [".git", "_old", "folder"] {
+            fs::create_dir_all(root.join(place).join(name)).unwrap();
+            fs::write(root.join(place).join(name).join(SECOND), "mine").unwrap();
+            left.push(root.join(place).join(name).join(SECOND));
+        }
+    }
+    for command in [
+        "status parts",
+        "show parts",
+        "reduce parts",
+        "plot parts",
+        "report parts",
+        "plan b.toml --out parts",
+        "run parts",
+        "run b.toml --out parts",
+        "verify parts",
+        "verify parts --repair",
+    ] {
+        folder.ends(0, command);
+    }
+    assert_eq!(exported("after"), before);
+    let report = json(&folder.ends(0, "verify parts --json").stdout);
+    assert_eq!(report["whole"], true);
+    let passed_over: Vec<&str> = report["passed_over"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|path| path.as_str().unwrap())
+        .collect();
+    for path in &seen {
+        assert!(
+            passed_over.contains(&path.as_str()),
+            "{path}: {passed_over:?}"
+        );
+    }
+    let text = folder.ends(0, "verify parts").stdout;
+    assert!(
+        text.contains("passed over: parts/tables/jobs/.DS_Store\n"),
+        "{text}"
+    );
+    // New parts are run beside them, in a directory begun beside them, too.
+    folder.write("e.toml", &sweep("damaged", 4));
+    folder.ends(0, "run e.toml --out parts");
+    fs::create_dir_all(folder.path("new/run/.git")).unwrap();
+    fs::write(folder.path("new/.DS_Store"), "mine").unwrap();
+    folder.ends(0, "run a.toml --out new");
+    assert!(left.iter().all(|path| fs::read(path).unwrap() == b"mine"));
+    let mut after = tables(&folder, "parts");
+    after.retain(|path, _| whole.contains_key(path));
+    assert!(after == whole);
+}
+
 #[test]
 fn a_part_that_is_gone_is_named_and_run_again() {
     let folder = folder();
@@ -556,7 +759,7 @@ fn a_part_that_is_gone_is_named_and_run_again() {
         }
         let text = folder.ends(3, "verify parts").stdout;
         assert!(
-            text.contains("1 part, 1 job: part-001-000000")
+            text.contains("1 part, 1 job missing: part-001-000000")
                 && text.contains("  stickslip run parts\n"),
             "{text}"
         );
@@ -619,7 +822,7 @@ fn what_is_not_yet_done_is_no_damage() {
     .unwrap();
     let text = folder.ends(3, "verify r").stdout;
     assert!(
-        text.contains("not there  1 part, 1 job: part-000-000000\ndamaged    nothing\n"),
+        text.contains("not done  1 part, 1 job missing: part-000-000000\ndamaged   nothing\n"),
         "{text}"
     );
     let report = json(&folder.ends(3, "verify r --json").stdout);

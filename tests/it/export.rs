@@ -188,7 +188,7 @@ fn what_is_missing_is_said_and_what_a_killed_export_left_is_no_export() {
     fs::create_dir(folder.path(left)).unwrap();
     folder.write(&format!("{left}/slips.parquet"), "half");
     let ended = folder.ends(0, "export r -o out");
-    let words = "jobs are missing; stickslip run continues with them";
+    let words = "jobs missing; stickslip run r continues with them";
     assert!(ended.stderr.contains(words), "{}", ended.stderr);
     assert_eq!(folder.contents("out").len(), 2);
     assert_eq!(folder.contents(left).len(), 1);

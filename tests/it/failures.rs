@@ -201,3 +201,43 @@ fn the_command_of_a_job_is_that_job() {
         assert!(compared >= 4, "{text}");
     }
 }
+
+/// Where another disk is to be had: memory.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_folder_of_results_on_another_disk_is_refused_before_anything_is_computed() {
+    use std::fs;
+    use std::os::linux::fs::MetadataExt;
+    let folder = Folder::new();
+    let Ok(elsewhere) = tempfile::tempdir_in("/dev/shm") else {
+        return;
+    };
+    let disk = |path: &Path| path.metadata().unwrap().st_dev();
+    if disk(elsewhere.path()) == disk(&folder.path("")) {
+        return;
+    }
+    folder.write(
+        "tiny.toml",
+        "name = \"tiny\"\n[model]\nN = 2\nNs = 1\n[record]\nslips = 2\n",
+    );
+    for place in [
+        "tables",
+        "tables/slips",
+        "tables/jobs",
+        "reduced",
+        "figures",
+        "run/spill",
+    ] {
+        folder.ends(0, "run tiny.toml --out r");
+        let path = folder.path("r").join(place);
+        let _ = fs::remove_dir_all(&path);
+        std::os::unix::fs::symlink(elsewhere.path(), &path).unwrap();
+        let error = folder.ends(2, "run tiny.toml --out r").stderr;
+        assert!(
+            error.contains(&format!("r/{place}: is on another disk")),
+            "{place}: {error}"
+        );
+        fs::remove_dir_all(folder.path("r")).unwrap();
+    }
+    assert!(elsewhere.path().read_dir().unwrap().next().is_none());
+}

@@ -7,6 +7,7 @@ use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow_schema::DataType;
+use parquet::file::reader::{FileReader, SerializedFileReader};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use sha2::{Digest, Sha256};
@@ -312,12 +313,18 @@ fn resealed_json(text: &str, which: Index, number: &str) -> String {
 
 /// Writes a file of a table again, with a value that makes no sense in a column.
 fn write_nonsense<R: Row>(path: &Path, column: Index, row: Index, value: Index) {
-    let footer = stickslip::table::file::footer(&Disk, path).unwrap();
-    let kept = |key: &&str| !["seal", "units", "meaning", "ARROW:schema"].contains(key);
-    let keys: Vec<&str> = footer.keys().map(String::as_str).filter(kept).collect();
-    let footer = keys
-        .into_iter()
-        .fold(Footer::default(), |new, key| new.with(key, &footer[key]));
+    let metadata = SerializedFileReader::new(fs::File::open(path).unwrap()).unwrap();
+    let texts = metadata
+        .metadata()
+        .file_metadata()
+        .key_value_metadata()
+        .unwrap();
+    let kept = texts
+        .iter()
+        .filter(|text| !["seal", "units", "meaning", "ARROW:schema"].contains(&text.key.as_str()));
+    let footer = kept.fold(Footer::default(), |new, text| {
+        new.with(&text.key, text.value.as_deref().unwrap_or_default())
+    });
     let batches: Vec<Batch> = Dataset::new(&Disk, vec![path.to_owned()])
         .batches()
         .collect::<Result<_, _>>()
@@ -497,12 +504,20 @@ proptest! {
         run_files.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
         let file = &run_files[which.index(run_files.len())];
         let (copy, is_changed) = copy(&root, file, &changes);
-        let read = Results::read(&Layout::new(&Disk, copy.path()));
-        prop_assert_eq!(read.is_err(), is_changed);
-        match Results::verify(&Layout::new(&Disk, copy.path())) {
-            Ok(verification) => prop_assert_eq!(verification.whole, !is_changed),
-            Err(error) => prop_assert!(is_changed, "{}", error),
+        let layout = Layout::new(&Disk, copy.path());
+        // Its copy is whole.
+        let texts = |results: &Results<'_>| -> Vec<String> {
+            results.extensions().iter().map(|extension| extension.sweep.text().to_owned()).collect()
+        };
+        let read = Results::read(&layout).unwrap();
+        prop_assert_eq!(texts(&read), texts(&Results::read(&Layout::new(&Disk, &root)).unwrap()));
+        prop_assert_eq!(Results::verify(&layout).unwrap().whole, !is_changed);
+        let name = file.file_name().unwrap();
+        for both in [layout.run(), layout.run().join("copies")] {
+            fs::write(both.join(name), changed(&fs::read(file).unwrap(), &changes)).unwrap();
         }
+        prop_assert_eq!(Results::read(&layout).is_err(), is_changed);
+        prop_assert_eq!(Results::verify(&layout).is_err(), is_changed);
         prop_assert!(begin.elapsed() < LONGEST);
     }
 
@@ -560,7 +575,10 @@ proptest! {
     ) {
         let (copy, _) = table_file(example, which);
         let file = copy.path().join("run/extension-000.json");
-        fs::write(&file, resealed_json(&fs::read_to_string(&file).unwrap(), which, number)).unwrap();
+        let text = resealed_json(&fs::read_to_string(&file).unwrap(), which, number);
+        for file in [&file, &copy.path().join("run/copies/extension-000.json")] {
+            fs::write(file, &text).unwrap();
+        }
         read_all(copy.path(), &file);
     }
 }

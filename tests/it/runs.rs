@@ -50,7 +50,7 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     let plan = json(&folder.ends(0, "plan tiny.toml --json").stdout);
     assert_eq!(
         (plan["jobs"].as_u64(), plan["format"].as_u64()),
-        (Some(TINY_JOBS), Some(1))
+        (Some(TINY_JOBS), Some(2))
     );
     // Of a job's contacts, blocks and slips, and of the slips of a part, which here is a job.
     assert_eq!(
@@ -218,7 +218,9 @@ fn values_that_a_sweep_no_longer_has_keep_their_data_and_the_status_says_so() {
     );
     let text = folder.ends(0, "status r").stdout;
     assert!(
-        text.contains("jobs done     12, 6 of them kept of values that the sweep no longer has\n"),
+        text.contains(
+            "jobs done       12, 6 of them kept of values that the sweep no longer has\n"
+        ),
         "{text}"
     );
 }
@@ -260,6 +262,49 @@ fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables()
             Some(folder.parts(signal, "jobs").len() as u64)
         );
         assert!(status["jobs_missing"].as_u64() > Some(0));
+        // Every command counts the same jobs as kept for later and as missing.
+        let reports = [
+            json(
+                &folder
+                    .ends(0, &format!("export {signal} -o {signal}-exported --json"))
+                    .stdout,
+            ),
+            json(&folder.ends(3, &format!("verify {signal} --json")).stdout),
+            json(
+                &folder
+                    .ends(0, &format!("plan many.toml --out {signal} --json"))
+                    .stdout,
+            )["directory"]
+                .clone(),
+        ];
+        for key in ["jobs_spilled", "jobs_missing", "parts_missing"] {
+            for report in reports.iter().filter(|report| !report[key].is_null()) {
+                assert_eq!(report[key], status[key], "{key}: {report}");
+            }
+        }
+        let sum: u64 = ["jobs_done", "jobs_spilled", "jobs_failed", "jobs_missing"]
+            .iter()
+            .map(|key| status[key].as_u64().unwrap())
+            .sum();
+        assert_eq!(sum, 28_000, "{status}");
+        let kept = match status["jobs_spilled"].as_u64().unwrap() {
+            0 => String::new(),
+            spilled => format!(", {spilled} kept for later"),
+        };
+        let words = format!(
+            "{} jobs missing{kept}; stickslip run",
+            status["jobs_missing"]
+        );
+        let said = folder.ends(0, &format!("show {signal}")).stdout;
+        assert!(
+            said.contains(&format!("so far: {words}")),
+            "{words}: {said}"
+        );
+        let said = folder.ends(0, &format!("reduce {signal}")).stderr;
+        assert!(
+            said.contains(&format!("reduced what is there: {words}")),
+            "{words}: {said}"
+        );
 
         folder.ends(0, &command);
         assert!(folder.tables(signal) == whole, "{signal}");
@@ -283,7 +328,7 @@ fn the_status_counts_what_is_there_for_people_and_for_programs() {
     let count = |key: &str| status[key].as_u64().unwrap();
     assert_eq!(
         (status["name"].as_str(), count("format")),
-        (Some("many"), 2)
+        (Some("many"), 3)
     );
     assert_eq!(
         (
@@ -307,13 +352,14 @@ fn the_status_counts_what_is_there_for_people_and_for_programs() {
         [
             "sweep",
             "jobs done",
+            "kept for later",
             "jobs failed",
             "jobs missing",
             "parts",
             "time left"
         ]
     );
-    assert!(text.contains("jobs missing  437\n"), "{text}");
+    assert!(text.contains("jobs missing    437\n"), "{text}");
 }
 
 #[test]
@@ -449,7 +495,10 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
         ("run/extension-000.json", ""),
     ] {
         let kept = fs::read(folder.path("r").join(file)).unwrap();
-        folder.write(&format!("r/{file}"), text);
+        let both = [file, "run/copies/extension-000.json"];
+        for file in both {
+            folder.write(&format!("r/{file}"), text);
+        }
         for command in ["run many.toml --out r", "status r", "reduce r", "plot r"] {
             let ended = folder.ends(4, command);
             assert!(
@@ -458,7 +507,9 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
                 ended.stderr
             );
         }
-        fs::write(folder.path("r").join(file), kept).unwrap();
+        for file in both {
+            fs::write(folder.path("r").join(file), &kept).unwrap();
+        }
     }
     assert!(folder.tables("r") == whole);
 }
@@ -484,9 +535,10 @@ fn a_pipe_gets_the_report_and_nothing_else() {
         "simulate --set N=3 --slips 1 --json",
     ] {
         let format = match command.split(' ').next() {
-            Some("verify") => 4,
-            Some("status" | "reduce") => 2,
-            _ => 1,
+            Some("verify") => 5,
+            Some("status") => 3,
+            Some("simulate") => 1,
+            _ => 2,
         };
         assert_eq!(
             json(&folder.ends(0, command).stdout)["format"].as_u64(),
@@ -629,7 +681,7 @@ fn a_plan_says_what_of_the_sweep_is_in_its_directory() {
     assert_eq!(directory(&folder)["jobs_kept"].as_u64(), Some(2));
     let said = folder.ends(0, "plan p.toml").stdout;
     assert!(
-        said.contains(": 1 done, 0 failed, 0 to run; 2 more done that the sweep no longer has"),
+        said.contains(": 1 done, 0 kept for later, 0 failed, 0 to run; 2 more done that the sweep no longer has"),
         "{said}"
     );
     folder.write("p.toml", &text(3, "Ns = 10"));

@@ -108,7 +108,8 @@ fn what_cannot_be_read_is_neither_damaged_nor_moved() {
         let file = format!("r/tables/{table}/part-000-000001.parquet");
         assert_unread(&folder, &file);
     }
-    for file in ["r/run/extension-000.json", reduced] {
+    let copy = "r/run/copies/extension-000.json";
+    for file in ["r/run/extension-000.json", copy, reduced] {
         assert_unread(&folder, file);
     }
 }
@@ -183,6 +184,7 @@ fn a_fifo_makes_no_command_wait() {
         ("r/tables/jobs/part-000-000001.parquet", 4),
         ("r/tables/slips/stray.parquet", 4),
         ("r/run/extension-000.json", 4),
+        ("r/run/copies/extension-000.json", 4),
         // Reduced again by `plot`.
         ("r/reduced/sets.parquet", 0),
         ("r/run/log/0.jsonl", 0),
@@ -215,7 +217,14 @@ fn a_fifo_makes_no_command_wait() {
 #[test]
 fn names_and_keys_pass_for_no_other_line_of_a_message() {
     let folder = folder();
-    let names: [&[u8]; 3] = [b"a\nto go on:\n  rm -r x", b"\x1b[31mred", b"\xff\xfe"];
+    let names: [&[u8]; 6] = [
+        b"a\nto go on:\n  rm -r x.parquet",
+        b"\x1b[31mred.parquet",
+        b"\xff\xfe.parquet",
+        b"a\nto go on:\n  rm -r y",
+        b"\x1b[31mblue",
+        b"\xff\xff",
+    ];
     for name in names {
         fs::write(
             folder.path("r/tables/jobs").join(OsStr::from_bytes(name)),
@@ -225,9 +234,12 @@ fn names_and_keys_pass_for_no_other_line_of_a_message() {
     }
     let text = folder.ends(4, "verify r").stdout;
     for shown in [
-        r"jobs/a\nto go on:\n  rm -r x: no",
-        r"jobs/\u{1b}[31mred: no",
-        r"jobs/\xff\xfe: no",
+        r"jobs/a\nto go on:\n  rm -r x.parquet: no",
+        r"jobs/\u{1b}[31mred.parquet: no",
+        r"jobs/\xff\xfe.parquet: no",
+        r"passed over: r/tables/jobs/a\nto go on:\n  rm -r y",
+        r"passed over: r/tables/jobs/\u{1b}[31mblue",
+        r"passed over: r/tables/jobs/\xff\xff",
     ] {
         assert!(text.contains(shown), "{shown}: {text}");
     }
@@ -246,9 +258,9 @@ fn names_and_keys_pass_for_no_other_line_of_a_message() {
     assert_eq!(
         paths,
         [
-            "r/tables/jobs/\u{1b}[31mred",
-            "r/tables/jobs/a\nto go on:\n  rm -r x",
-            r"r/tables/jobs/\xff\xfe"
+            "r/tables/jobs/\u{1b}[31mred.parquet",
+            "r/tables/jobs/a\nto go on:\n  rm -r x.parquet",
+            r"r/tables/jobs/\xff\xfe.parquet"
         ]
     );
     folder.write(
@@ -267,7 +279,7 @@ fn a_directory_whose_name_is_no_text_is_shown_as_a_shell_reads_it() {
     let folder = folder();
     let root = folder.path("").join(OsStr::from_bytes(b"a\xff'\n"));
     fs::rename(folder.path("r"), &root).unwrap();
-    fs::write(root.join("tables/jobs/notes.txt"), "").unwrap();
+    fs::write(root.join("tables/jobs/notes.parquet"), "").unwrap();
     let verify = |json: &[&str]| {
         let output = Command::new(PROGRAM)
             .arg("verify")
@@ -288,7 +300,7 @@ fn a_directory_whose_name_is_no_text_is_shown_as_a_shell_reads_it() {
         .unwrap();
     assert!(repaired.success(), "{command}");
     assert!(
-        root.join("run/quarantine/jobs/notes.txt").exists(),
+        root.join("run/quarantine/jobs/notes.parquet").exists(),
         "{command}"
     );
 }

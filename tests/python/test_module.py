@@ -161,6 +161,7 @@ DAMAGES = {
     "missing": Path.unlink,
     "without its folder": lambda file: shutil.rmtree(file.parent),
     "cut": lambda file: file.write_bytes(file.read_bytes()[:-9]),
+    "in the place of another": lambda file: shutil.copy(max(file.parent.iterdir()), file),
 }
 
 

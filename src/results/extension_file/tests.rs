@@ -1,8 +1,10 @@
 //! Directories that are begun, changed, damaged, somebody else's, or begun by two runs at once.
 
 use super::*;
-use crate::results::Results;
+use crate::results::commit::Commit;
+use crate::results::tables::JOBS;
 use crate::results::workers::tests::open;
+use crate::results::{ErrorKind, Results};
 use crate::table::storage::Disk;
 use crate::table::storage::over_disk::{Access, OverDisk};
 use std::collections::BTreeSet;
@@ -51,9 +53,20 @@ fn contents(folder: &Path) -> BTreeSet<(PathBuf, Vec<u8>)> {
 const TWO_SEEDS: &str = "[axes]\nseed = [0, 1]\n";
 const THREE_SEEDS: &str = "[axes]\nseed = [0, 1, 2]\n";
 
+fn read_text(text: &str) -> Record {
+    serde_json::from_str(&checksum::checked(text).unwrap()).unwrap()
+}
+
+/// Writes both files of an extension.
+fn write_both(layout: &Layout<'_>, number: usize, text: &str) {
+    for file in layout.files_of_extension(number) {
+        fs::write(file, text).unwrap();
+    }
+}
+
 /// The text of the file of an extension of a program with other versions, and without a column of the jobs.
 pub(crate) fn of_other_versions(text: &str, column: &str) -> String {
-    let mut record: Record = checksum::from_json(text).unwrap();
+    let mut record: Record = read_text(text);
     (record.model_version, record.plan_version) = (0, 0);
     record
         .tables
@@ -128,9 +141,9 @@ fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing
         "[model]\nK = 2e8\n[record]\nslips = 4",
         &["model.K", "record.slips: 3 -> 4"],
     );
-    let path = root.path().join("run/extension-000.json");
-    let text = fs::read_to_string(&path).unwrap();
-    let mut other: Record = checksum::from_json(&text).unwrap();
+    let layout = Layout::new(&Disk, root.path());
+    let text = fs::read_to_string(layout.extension(0)).unwrap();
+    let mut other = read_text(&text);
     other.rng_scheme = "dice".to_owned();
     other
         .tables
@@ -141,63 +154,83 @@ fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing
         .for_each(|column| {
             *column = "start".to_owned();
         });
-    fs::write(&path, other.text()).unwrap();
+    write_both(&layout, 0, &other.text());
     refused(
         "[model]\nK = 1e8\n[record]\nslips = 3",
         &["random numbers: dice -> ", "without [\"start\"]"],
     );
-    let mut other: Record = checksum::from_json(&text).unwrap();
+    let mut other = read_text(&text);
     other.identity = "0".repeat(32);
-    fs::write(&path, other.text()).unwrap();
+    write_both(&layout, 0, &other.text());
     refused(
         "[model]\nK = 1e8\n[record]\nslips = 3",
         &["ids of jobs: those of stickslip"],
     );
-    fs::write(
-        &path,
-        text.replace("\"format\": 7", "\"format\": 8, \"new\": 0"),
-    )
-    .unwrap();
-    let error = Results::read(&Layout::new(&Disk, root.path()))
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("has format 8"), "{error}");
+}
+
+#[derive(Serialize)]
+struct Newer {
+    format: u32,
+    news: bool,
 }
 
 #[test]
-fn a_directory_of_an_older_program_is_refused_with_the_way_out_and_so_is_one_with_compacted_tables()
-{
+fn a_newer_format_is_refused_and_a_changed_digit_of_the_format_is_damage() {
     let root = tempfile::tempdir().unwrap();
-    let begin = || open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS));
-    fs::create_dir_all(root.path().join("run")).unwrap();
-    fs::write(
-        root.path().join("run/manifest.json"),
-        "{\"format\": 6, \"program\": \"stickslip 0.1.0\"}",
-    )
-    .unwrap();
-    let error = begin().unwrap_err().to_string();
+    let layout = Layout::new(&Disk, root.path());
+    open(&layout, &sweep(TWO_SEEDS)).unwrap();
+    let text = fs::read_to_string(layout.extension(0)).unwrap();
+    let error = || Results::read(&layout).unwrap_err();
+    for digit in ["0", "5", "8", "9", "77"] {
+        let changed = text.replace("\"format\": 7", &format!("\"format\": {digit}"));
+        write_both(&layout, 0, &changed);
+        let error = error();
+        assert!(error.kind == ErrorKind::Damaged, "{error}");
+    }
+    // With a key that this program does not know.
+    let newer = Newer {
+        format: 8,
+        news: true,
+    };
+    write_both(&layout, 0, &checksum::to_json(&newer).unwrap());
+    let error = error();
     assert!(
-        error.contains("has format 6, this program knows 7; use the program that wrote it"),
+        error.kind == ErrorKind::Refused && error.to_string().contains("has format 8"),
         "{error}"
     );
-    fs::remove_file(root.path().join("run/manifest.json")).unwrap();
+}
+
+#[test]
+fn a_table_file_with_a_name_that_no_part_has_is_damage_and_what_others_leave_is_passed_over() {
+    let root = tempfile::tempdir().unwrap();
+    let begin = || open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS));
     begin().unwrap();
     let jobs = root.path().join("tables/jobs");
     fs::create_dir_all(&jobs).unwrap();
     for name in [
         "compact-000-000000-000001-0123456789abcdef.parquet",
         "part-001-000000.parquet",
-        "notes.txt",
+        "part-000-000000 (copy).parquet",
     ] {
         fs::write(jobs.join(name), "").unwrap();
-        let error = open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS))
-            .unwrap_err()
-            .to_string();
+        let error = begin().unwrap_err();
+        let text = error.to_string();
         assert!(
-            error.contains(name) && error.contains("is no part of this directory's sweeps"),
-            "{error}"
+            error.kind == ErrorKind::Damaged
+                && text.contains(name)
+                && text.contains("no part of this directory has this name"),
+            "{text}"
         );
         fs::remove_file(jobs.join(name)).unwrap();
+    }
+    for name in [
+        "notes.txt",
+        ".DS_Store",
+        "._part-000-000000.parquet",
+        "_SUCCESS",
+        "_metadata.parquet",
+    ] {
+        fs::write(jobs.join(name), "").unwrap();
     }
     begin().unwrap();
 }
@@ -217,6 +250,9 @@ fn a_directory_of_something_else_is_refused_and_an_unfinished_beginning_is_not()
     );
     assert_eq!(contents(root.path()), before);
     fs::remove_file(root.path().join("thesis.tex")).unwrap();
+    for hidden in [".DS_Store", "run/.nfs0000", "run/_notes"] {
+        fs::write(root.path().join(hidden), "").unwrap();
+    }
     open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap();
 }
 
@@ -253,16 +289,15 @@ fn a_directory_that_another_has_replaced_is_not_ours_any_more_and_one_with_a_fur
         ..Round::default()
     };
     let second = first.followed_by(first.sweep(), Some(round), None);
-    fs::write(layout.extension(1), second.record(1).text()).unwrap();
+    second
+        .write_copies(|| Commit::begin(&layout, &layout.staging("test")))
+        .unwrap();
     assert_eq!(Results::read(&layout).unwrap().rounds().len(), 2);
     assert!(first.check_place().is_ok() && second.check_place().is_ok());
     open(&Layout::new(&Disk, other.path()), &sweep(TWO_SEEDS)).unwrap();
     for number in [0, 1] {
-        fs::copy(
-            other.path().join("run/extension-000.json"),
-            layout.extension(number),
-        )
-        .unwrap();
+        let text = fs::read_to_string(other.path().join("run/extension-000.json")).unwrap();
+        write_both(&layout, number, &text);
     }
     assert!(first.check_place().is_err() && second.check_place().is_err());
     let error = Results::read(&layout).unwrap_err().to_string();
@@ -270,54 +305,98 @@ fn a_directory_that_another_has_replaced_is_not_ours_any_more_and_one_with_a_fur
 }
 
 #[test]
-fn a_changed_or_cut_file_of_an_extension_is_named() {
+fn a_changed_cut_or_lost_file_of_an_extension_does_no_harm_and_with_its_copy_it_is_named() {
     let root = tempfile::tempdir().unwrap();
-    open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap();
-    let path = root.path().join("run/extension-000.json");
-    let text = fs::read_to_string(&path).unwrap();
-    for changed in [
-        &text[..text.len() / 2],
-        &text.replace("[0, 1]", "[0, 2]"),
-        "",
-    ] {
-        fs::write(&path, changed).unwrap();
-        let error = open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap_err();
-        assert!(
-            error
-                .to_string()
-                .contains("run/extension-000.json: damaged"),
-            "{error}"
-        );
-    }
-    fs::remove_file(&path).unwrap();
+    let layout = Layout::new(&Disk, root.path());
+    open(&layout, &sweep(TWO_SEEDS)).unwrap();
+    open(&layout, &sweep(THREE_SEEDS)).unwrap();
+    let texts = [0, 1].map(|number| fs::read_to_string(layout.extension(number)).unwrap());
     fs::create_dir_all(root.path().join("tables/jobs")).unwrap();
     fs::write(root.path().join("tables/jobs/part-000-000000.parquet"), "").unwrap();
-    for lost in [
-        open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)),
-        Results::read(&Layout::new(&Disk, root.path())),
-    ] {
-        let error = lost.unwrap_err().to_string();
-        assert!(
-            error.contains("run/extension-000.json: damaged: it is missing"),
-            "{error}"
-        );
+    for number in [0, 1] {
+        let text = &texts[number];
+        let files = layout.files_of_extension(number);
+        let cut = &text[..text.len() / 2];
+        let changed = text.replace("[0, 1", "[0, 2");
+        for damage in [
+            Some(cut),
+            Some(&*changed),
+            Some(""),
+            Some(&*texts[1 - number]),
+            None,
+        ] {
+            let to = |file: &Path| match damage {
+                Some(text) => fs::write(file, text).unwrap(),
+                None => fs::remove_file(file).unwrap(),
+            };
+            for file in &files {
+                to(file);
+                let read = Results::read(&layout).unwrap();
+                assert_eq!(read.extensions().len(), 2);
+                read.check_place().unwrap();
+                open(&layout, &sweep(THREE_SEEDS)).unwrap();
+                assert!(damage.is_some() || fs::read_to_string(file).unwrap() == *text);
+                fs::write(file, text).unwrap();
+            }
+            for file in &files {
+                to(file);
+            }
+            for lost in [open(&layout, &sweep(THREE_SEEDS)), Results::read(&layout)] {
+                // The last one is as if it had never been, if both are lost.
+                let is_last = number == 1 && damage.is_none();
+                let name = format!("run/extension-00{number}.json: damaged");
+                match lost {
+                    Ok(_) => assert!(is_last),
+                    Err(error) => assert!(error.to_string().contains(&name), "{error}"),
+                }
+            }
+            write_both(&layout, number, text);
+        }
     }
 }
 
 #[test]
-fn the_file_of_an_extension_is_made_again_from_the_footer_of_any_of_its_parts() {
+fn of_two_whole_files_that_differ_the_one_after_them_says_which_counts() {
+    let [root, other] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let layout = Layout::new(&Disk, root.path());
+    let foreign = Layout::new(&Disk, other.path());
+    open(&layout, &sweep(TWO_SEEDS)).unwrap();
+    open(&foreign, &sweep("")).unwrap();
+    let [file, copy] = layout.files_of_extension(0);
+    fs::copy(foreign.extension(0), &file).unwrap();
+    let error = Results::read(&layout).unwrap_err();
+    assert!(
+        error.kind == ErrorKind::Damaged
+            && error.to_string().contains("one is of another directory"),
+        "{error}"
+    );
+    fs::copy(copy, &file).unwrap();
+    open(&layout, &sweep(THREE_SEEDS)).unwrap();
+    fs::copy(foreign.extension(0), &file).unwrap();
+    let found = read(&layout).unwrap();
+    assert_eq!(found.records[0].sweep, sweep(TWO_SEEDS).text());
+    assert_eq!(found.unsound[0].0, file);
+}
+
+#[test]
+fn a_worker_that_opens_a_directory_writes_the_copies_that_another_did_not_come_to() {
     let root = tempfile::tempdir().unwrap();
     let layout = Layout::new(&Disk, root.path());
     open(&layout, &sweep(TWO_SEEDS)).unwrap();
-    let extended = open(&layout, &sweep(THREE_SEEDS)).unwrap();
-    for number in [0, 1] {
-        let footer = extended.footer(number);
-        let texts =
-            ["sweep", "extension"].map(|key| (key.to_owned(), footer.get(key).unwrap().to_owned()));
-        let again = Record::of_footer(&texts.into()).unwrap();
-        assert_eq!(
-            again.text(),
-            fs::read_to_string(layout.extension(number)).unwrap()
-        );
+    open(&layout, &sweep(THREE_SEEDS)).unwrap();
+    let before = contents(root.path());
+    for lost in [
+        "run/copies",
+        "run/copies/extension-001.json",
+        "run/extension-000.json",
+    ] {
+        let path = root.path().join(lost);
+        if path.is_dir() {
+            fs::remove_dir_all(path).unwrap();
+        } else {
+            fs::remove_file(path).unwrap();
+        }
+        open(&layout, &sweep(THREE_SEEDS)).unwrap();
+        assert_eq!(contents(root.path()), before, "{lost}");
     }
 }

@@ -183,7 +183,8 @@ fn run_all(root: &Path, seeds: u64) -> u64 {
 /// The ids of all jobs in the tables, as a reader finds them.
 fn ids(root: &Path) -> Vec<String> {
     let mut ids = Vec::new();
-    for batch in Layout::new(&Disk, root).dataset("jobs").unwrap().rows() {
+    let results = Results::read(&Layout::new(&Disk, root)).unwrap();
+    for batch in results.dataset("jobs").unwrap().rows() {
         ids.extend(batch.unwrap().into_iter().map(|names: Names| names.job_id));
     }
     ids.sort();

@@ -3,9 +3,10 @@
 use super::{fine, options, run_all, sweep};
 use crate::reduce::{SetRow, read_reduced, reduce};
 use crate::results::layout::Layout;
-use crate::results::tables::{JobRow, Names};
+use crate::results::tables::{JobRow, Names, PrecursorRow, SlipRow};
 use crate::results::{ErrorKind, Results, of_other_versions};
 use crate::run::run;
+use crate::table::columns::Row;
 use crate::table::file::{Dataset, Footer, TableWriter};
 use crate::table::formats::Format;
 use crate::table::storage::{Disk, Storage};
@@ -19,32 +20,42 @@ const MISSING: &str = "grid_steps";
 
 /// Makes a directory that of another version of the model and the plan, without a column.
 fn make_older(root: &Path) {
-    let path = root.join("run/extension-000.json");
-    fs::write(
-        &path,
-        of_other_versions(&fs::read_to_string(&path).unwrap(), MISSING),
-    )
-    .unwrap();
-    for file in Layout::new(&Disk, root)
-        .dataset("jobs")
-        .unwrap()
-        .files()
-        .cloned()
-        .collect::<Vec<_>>()
-    {
-        let batches: Vec<_> = Dataset::new(&Disk, vec![file.clone()])
-            .batches()
-            .map(Result::unwrap)
-            .collect();
-        fs::remove_file(&file).unwrap();
-        let created = Disk.create(&file).unwrap();
-        let mut writer =
-            TableWriter::<JobRow>::without(&[MISSING.into()], created, &Footer::default()).unwrap();
-        for batch in &batches {
-            writer.copy(batch, 0..batch.rows.num_rows()).unwrap();
-        }
-        writer.finish().unwrap();
+    let layout = Layout::new(&Disk, root);
+    let results = Results::read(&layout).unwrap();
+    let [slips, precursors, jobs] = ["slips", "precursors", "jobs"].map(|table| {
+        let files = results.dataset(table).unwrap();
+        files.files().cloned().collect::<Vec<_>>()
+    });
+    for file in &slips {
+        write_again::<SlipRow<'_>>(file, &results);
     }
+    for file in &precursors {
+        write_again::<PrecursorRow<'_>>(file, &results);
+    }
+    for file in &jobs {
+        write_again::<JobRow>(file, &results);
+    }
+    for path in layout.files_of_extension(0) {
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, of_other_versions(&text, MISSING)).unwrap();
+    }
+}
+
+/// Writes a file without the column, and as an earlier program that said less in the footer.
+fn write_again<R: Row>(file: &Path, results: &Results<'_>) {
+    let mut left_out = results.sweep().recording().left_out();
+    left_out.push(MISSING.into());
+    let batches: Vec<_> = Dataset::new(&Disk, vec![file.to_owned()])
+        .batches()
+        .map(Result::unwrap)
+        .collect();
+    fs::remove_file(file).unwrap();
+    let created = Disk.create(file).unwrap();
+    let mut writer = TableWriter::<R>::without(&left_out, created, &Footer::default()).unwrap();
+    for batch in &batches {
+        writer.copy(batch, 0..batch.rows.num_rows()).unwrap();
+    }
+    writer.finish().unwrap();
 }
 
 #[test]
@@ -111,7 +122,7 @@ fn a_directory_of_another_version_is_reduced_and_exported_as_it_is_and_not_run()
         );
     }
     // Ids of its jobs are those of its version.
-    let ids: Vec<String> = layout
+    let ids: Vec<String> = own
         .dataset("jobs")
         .unwrap()
         .rows::<Names>()
