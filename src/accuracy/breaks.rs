@@ -1,16 +1,15 @@
-//! Before chaos: break times against a reference, contact by contact, and for how long two trajectories stay together.
+//! Before chaos: break times against a reference, contact by contact.
 //!
-//! A break is identified by block, contact and generation, which mean the same contact in every solver. Two
-//! trajectories are apart from the first break of the reference on that the other misses, or makes earlier or later by
-//! more than a tenth of the wave crossing time.
+//! A break is identified by block, contact and generation, which mean the same contact in every solver. It is missing if
+//! it has not come a tenth of the wave crossing time after the last of the reference.
 
 use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::{Observer, Segment};
 use crate::table::columns::columns;
 use std::collections::HashMap;
 
-/// Trajectories are apart when a break differs by more than this part of the wave crossing time.
-const APART: f64 = 0.1;
+/// A break that comes later than the last of the reference by this part of the wave crossing time is missing.
+const LATE: f64 = 0.1;
 
 /// One attachment of a contact: block, contact, generation.
 type Key = (usize, usize, u32);
@@ -23,7 +22,8 @@ fn key(event: &ContactEvent) -> Key {
 #[derive(Clone, Debug)]
 pub struct Reference {
     wanted: usize,
-    apart: f64,
+    /// How long to wait for a break, in s.
+    late: f64,
     order: HashMap<Key, usize>,
     times: Vec<f64>,
 }
@@ -33,7 +33,7 @@ impl Reference {
     pub fn new(parameters: &Parameters, wanted: usize) -> Self {
         Self {
             wanted,
-            apart: APART * parameters.wave_crossing_time(),
+            late: LATE * parameters.wave_crossing_time(),
             order: HashMap::new(),
             times: Vec::new(),
         }
@@ -53,17 +53,12 @@ impl Observer for Reference {
     }
 }
 
-/// An observer that compares breaks with those of a reference: at least the first `counted`, and until the two are
-/// apart.
+/// An observer that compares breaks with those of a reference.
 #[derive(Clone, Debug)]
 pub struct Comparison<'a> {
     reference: &'a Reference,
-    counted: usize,
     /// Error of each break of the reference, in s; NaN until the break occurs.
     errors: Vec<f64>,
-    /// Breaks of the reference that must have occurred by now.
-    due: usize,
-    apart: Option<usize>,
     now: f64,
 }
 
@@ -76,66 +71,34 @@ columns! {
         missing as "missing_breaks": Option<u64> = "", "of these, breaks that were not made";
         median as "median_break_error": Option<f64> = "s", "median error of their times";
         largest as "largest_break_error": Option<f64> = "s", "largest error of their times";
-        together as "together_breaks": Option<u64> = "", "breaks before the trajectories are apart";
-        together_seconds: Option<f64> = "s", "model time before the trajectories are apart";
-        together_throughout: bool = "", "whether they are not, as far as the reference reaches";
     }
 }
 
 impl<'a> Comparison<'a> {
-    /// Compares the first `counted` breaks, at most those that the reference has.
-    pub fn new(reference: &'a Reference, counted: usize) -> Self {
-        let breaks = reference.times.len();
-        let counted = counted.min(breaks);
+    pub fn new(reference: &'a Reference) -> Self {
         Self {
             reference,
-            counted,
-            errors: vec![f64::NAN; breaks],
-            due: 0,
-            apart: None,
+            errors: vec![f64::NAN; reference.times.len()],
             now: 0.0,
         }
     }
 
     pub fn errors(&self) -> BreakErrors {
-        let mut made: Vec<f64> = self.errors[..self.counted]
-            .iter()
-            .copied()
-            .filter(|error| !error.is_nan())
-            .collect();
+        let errors = self.errors.iter().copied();
+        let mut made: Vec<f64> = errors.filter(|error| !error.is_nan()).collect();
         made.sort_by(f64::total_cmp);
-        let together = self.apart.unwrap_or(self.errors.len());
-        let times = &self.reference.times;
         BreakErrors {
-            breaks: Some(self.counted as u64),
-            missing: Some((self.counted - made.len()) as u64),
+            breaks: Some(self.errors.len() as u64),
+            missing: Some((self.errors.len() - made.len()) as u64),
             median: made.get(made.len() / 2).copied(),
             largest: made.last().copied(),
-            together: Some(together as u64),
-            together_seconds: times.get(together).or(times.last()).copied().or(Some(0.0)),
-            together_throughout: self.apart.is_none(),
-        }
-    }
-
-    /// Moves on past the breaks that must have occurred by now.
-    fn pass(&mut self, now: f64) {
-        self.now = now;
-        while let Some(time) = self.reference.times.get(self.due)
-            && time + self.reference.apart < now
-        {
-            let is_apart =
-                self.errors[self.due].is_nan() || self.errors[self.due] > self.reference.apart;
-            if is_apart && self.apart.is_none() {
-                self.apart = Some(self.due);
-            }
-            self.due += 1;
         }
     }
 }
 
 impl Observer for Comparison<'_> {
     fn advance(&mut self, segment: &Segment<'_>) {
-        self.pass(segment.end());
+        self.now = segment.end();
     }
 
     fn contact(&mut self, event: &ContactEvent) {
@@ -147,7 +110,8 @@ impl Observer for Comparison<'_> {
     }
 
     fn is_satisfied(&self) -> bool {
-        self.due >= self.counted && (self.apart.is_some() || self.due == self.errors.len())
+        let last = self.reference.times.last();
+        last.is_none_or(|last| self.now > last + self.reference.late)
     }
 }
 
@@ -178,7 +142,7 @@ mod tests {
             reference.contact(&break_at(0.1 * (contact + 1) as f64, contact));
         }
         assert!(reference.is_satisfied());
-        let mut comparison = Comparison::new(&reference, 3);
+        let mut comparison = Comparison::new(&reference);
         for &(time, contact) in times {
             comparison.contact(&break_at(time, contact));
         }
@@ -195,26 +159,15 @@ mod tests {
                 && (errors.largest.unwrap() - 3e-6).abs() < 1e-12,
             "{errors:?}"
         );
-        assert!(
-            errors.together_throughout && errors.missing == Some(0) && errors.together == Some(4)
-        );
+        assert_eq!(errors.missing, Some(0));
     }
 
     #[test]
-    fn a_late_or_missing_break_ends_the_time_together() {
+    fn a_late_break_has_an_error_and_one_that_never_comes_is_missing() {
         let late = compared(&[(0.1, 0), (0.21, 1), (0.3, 2), (0.4, 3)]);
-        assert_eq!(
-            (late.together, late.together_seconds, late.missing),
-            (Some(1), Some(0.2), Some(0))
-        );
+        assert_eq!(late.missing, Some(0));
+        assert!((late.largest.unwrap() - 0.01).abs() < 1e-12, "{late:?}");
         let missing = compared(&[(0.1, 0), (0.2, 1), (0.4, 3)]);
-        assert_eq!(
-            (
-                missing.together,
-                missing.missing,
-                missing.together_throughout
-            ),
-            (Some(2), Some(1), false)
-        );
+        assert_eq!((missing.breaks, missing.missing), (Some(4), Some(1)));
     }
 }

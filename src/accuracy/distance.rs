@@ -5,6 +5,7 @@
 //! of consecutive slips, since neighbours are correlated, and is keyed: the same samples give the same intervals.
 
 use crate::table::columns::columns;
+use crate::table::value::floored;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -153,12 +154,7 @@ fn wasserstein(left: &[f64], right: &[f64]) -> f64 {
 /// Nearest-rank quantile.
 fn quantile(values: &mut [f64], probability: f64) -> f64 {
     values.sort_by(f64::total_cmp);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "an index"
-    )]
-    let index = (probability * (values.len() - 1) as f64).round() as usize;
+    let index = floored((probability * (values.len() - 1) as f64).round());
     values[index]
 }
 

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 
 /// What a study found, as JSON.
 pub fn to_json(study: &Study, findings: &Findings) -> Value {
@@ -26,7 +26,6 @@ pub fn to_json(study: &Study, findings: &Findings) -> Value {
         "first_set_multiple": study.first_set_multiple,
         "slips": study.slips,
         "breaks": study.breaks,
-        "followed_breaks": study.followed_breaks,
         "verdict": verdict(study, findings),
         "methods": findings.methods.iter().map(arrow::json).collect::<Value>(),
         "distances": findings.distances.iter().map(arrow::json).collect::<Value>(),
@@ -223,9 +222,6 @@ mod tests {
             missing: Some(0),
             median: Some(1e-7),
             largest: Some(1e-6),
-            together: Some(140),
-            together_seconds: Some(0.06),
-            together_throughout: false,
         };
         let cost = cost::Cost {
             per_simulated_second: 0.2,
@@ -239,13 +235,10 @@ mod tests {
             case: "defaults".to_owned(),
             solver: solver.clone(),
             cost,
-            median_per_slip: 0.02,
             break_times,
-            ledger_residual: Some(-1e-3),
         };
         let untested = MethodRow {
             break_times: BreakErrors::default(),
-            ledger_residual: None,
             ..method.clone()
         };
         let distance = DistanceRow {

@@ -1,11 +1,10 @@
 //! The study: every solver at several settings, in one run, on one thread, interleaved; cost and errors of each.
 //!
 //! The event-driven solver counts as two methods, by how it resolves motion. At each set of parameters: the first breaks
-//! against the tightest tolerance there is; the energy ledger, of all but the grid; and an ensemble of slips that is timed and
-//! whose distributions are held against a reference ensemble of other seeds. At the first
-//! set more realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A
-//! fixed step at low velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip
-//! follows from the steps in one.
+//! against the tightest tolerance there is; and an ensemble of slips that is timed and whose distributions are compared
+//! with a reference ensemble of other seeds. At the first set more realisations, not timed, make the ensembles large
+//! enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its slips: it is
+//! timed over a short stretch, and its cost per slip follows from the steps in one.
 
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cost::Cost;
@@ -13,11 +12,9 @@ use super::distance::{Distances, deviation, distances, mean};
 use super::{Method, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
-use crate::observe::{Measurements, Recording, Slip, SlipObserver, measure};
+use crate::observe::{Measurements, Recording, Slip, measure};
 use crate::run::cpu;
-use crate::solver::{
-    Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate, simulate_audited,
-};
+use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate};
 use crate::table::columns::columns;
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
@@ -27,7 +24,6 @@ use std::sync::atomic::AtomicBool;
 /// Amplitude and frequency of the modulated drive, in m and Hz: those of Fig. 2f.
 const MODULATION: (f64, f64) = (1e-6, 58.0);
 const DISCARD: u64 = 5;
-const AUDITED_SLIPS: u64 = 2;
 /// Tolerance of the reference ensemble.
 const ENSEMBLE_TOLERANCE: f64 = 1e-10;
 /// Seeds of the reference ensemble begin here, far from those of the methods: the samples are independent.
@@ -53,8 +49,6 @@ pub struct Study {
     /// Number K of first breaks whose times are compared: few enough that the coarsest fixed step has not gone its own
     /// way.
     pub breaks: usize,
-    /// Breaks over which trajectories are followed to see how far they stay together.
-    pub followed_breaks: usize,
     /// Lowest drive velocity at which a fixed step runs its ensemble, and its breaks, in m/s.
     pub fixed_step_slips_from: f64,
     pub fixed_step_breaks_from: f64,
@@ -84,7 +78,6 @@ impl Study {
             first_set_multiple: 8,
             slips: 100,
             breaks: 100,
-            followed_breaks: 30_000,
             fixed_step_slips_from: 1e-4,
             fixed_step_breaks_from: 1e-6,
             timed_steps: 3_000_000,
@@ -97,7 +90,6 @@ impl Study {
             seeds: 4,
             first_set_multiple: 1,
             slips: 6,
-            followed_breaks: 10_000,
             fixed_step_breaks_from: 1e-4,
             timed_steps: 300_000,
             ..Self::full()
@@ -182,18 +174,15 @@ impl Selection for DriveAlone {
 }
 
 columns! {
-    /// One solver at one set of parameters. Costs are those of its cheapest realisation per step: other work on the machine can only
-    /// add to them. Errors of break times and the ledger are left out where they would take too long, and the ledger
-    /// along the grid, where none is kept.
+    /// One solver at one set of parameters. Costs are those of its cheapest realisation per step: other work on the machine
+    /// can only add to them. Errors of break times are left out where they would take too long.
     #[derive(Clone, Debug, PartialEq)]
     pub struct MethodRow {
         parameters: Selected<DriveAlone>;
         case: String = "", "the drive, and what else differs from the defaults";
         solver: Method;
         cost: Cost;
-        median_per_slip as "median_cpu_per_slip": f64 = "s", "CPU time per slip by the median timing";
         break_times: BreakErrors;
-        ledger_residual: Option<f64> = "", "residual of the energy ledger, relative to the work of the drive";
     }
 }
 
@@ -277,25 +266,23 @@ impl Ensemble {
         self.slips.extend(slips);
     }
 
-    /// Costs by the CPU time per step of the fastest realisation, and of the median one. Without slips those per slip follow
-    /// from the mean interval in s.
-    fn costs(&self, mean_interval: f64) -> [Cost; 2] {
-        let mut per_step = self.per_step.clone();
-        per_step.sort_by(f64::total_cmp);
-        let (steps, slips) = (self.steps as f64, self.slips_seen as f64);
-        let is_sample = self.slips_seen > 0;
-        let steps_per_slip = if is_sample {
-            steps / slips
+    /// The cost by the CPU time per step of the fastest realisation. Without slips that of one follows from the mean interval
+    /// in s.
+    fn cost(&self, mean_interval: f64) -> Cost {
+        let per_step = self.per_step.iter().copied().fold(f64::INFINITY, f64::min);
+        let steps = self.steps as f64;
+        let steps_per_slip = if self.slips_seen > 0 {
+            steps / self.slips_seen as f64
         } else {
             mean_interval * steps / self.end_time
         };
-        [0, (per_step.len() - 1) / 2].map(|place| Cost {
-            per_simulated_second: per_step[place] * steps / self.end_time,
-            per_slip: per_step[place] * steps_per_slip,
-            per_step: per_step[place],
+        Cost {
+            per_simulated_second: per_step * steps / self.end_time,
+            per_slip: per_step * steps_per_slip,
+            per_step,
             steps_per_slip,
             timed_slips: self.slips_seen,
-        })
+        }
     }
 }
 
@@ -304,17 +291,13 @@ impl Study {
     pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<Findings> {
         let mut findings = Findings::default();
         for (set, parameters) in self.sets.iter().enumerate() {
-            report(&format!(
-                "{}: first breaks and energy ledgers",
-                set_in_words(parameters)
-            ));
-            let mut first_breaks = Reference::new(parameters, self.followed_breaks);
+            report(&format!("{}: first breaks", set_in_words(parameters)));
+            let mut first_breaks = Reference::new(parameters, self.breaks);
             let tightest = taylor(*TOLERANCES.start());
             simulated(parameters, tightest, &mut first_breaks)?;
-            let mut checks = Vec::new();
+            let mut errors = Vec::new();
             for &solver in &self.solvers {
-                let break_times = self.break_times(parameters, solver, &first_breaks)?;
-                checks.push((break_times, self.ledger_residual(parameters, solver)?));
+                errors.push(self.break_times(parameters, solver, &first_breaks)?);
             }
             report("timed ensembles");
             let mut ensembles = self.ensembles(parameters)?;
@@ -344,17 +327,14 @@ impl Study {
             );
             let pairs: Vec<(Solver, &Ensemble)> =
                 self.solvers.iter().copied().zip(&ensembles).collect();
-            for (&(solver, ensemble), (break_times, ledger_residual)) in pairs.iter().zip(checks) {
+            for (&(solver, ensemble), break_times) in pairs.iter().zip(errors) {
                 let (case, parameters) = (set_in_words(parameters), parameters.clone());
-                let [cost, median] = ensemble.costs(mean_interval);
                 findings.methods.push(MethodRow {
                     parameters: Selected::new(parameters),
                     case,
                     solver: solver.into(),
-                    cost,
-                    median_per_slip: median.per_slip,
+                    cost: ensemble.cost(mean_interval),
                     break_times,
-                    ledger_residual,
                 });
             }
             let compared =
@@ -409,35 +389,9 @@ impl Study {
         if takes_too_long && matches!(solver, Solver::FixedStep { .. }) {
             return Ok(BreakErrors::default());
         }
-        let mut comparison = Comparison::new(reference, self.breaks);
+        let mut comparison = Comparison::new(reference);
         simulated(parameters, solver, &mut comparison)?;
         Ok(comparison.errors())
-    }
-
-    fn ledger_residual(&self, parameters: &Parameters, solver: Solver) -> Result<Option<f64>> {
-        let is_on_grid = matches!(
-            solver,
-            Solver::EventDriven {
-                resolve: Resolve::Grid,
-                ..
-            }
-        );
-        if is_on_grid || self.is_stretch_only(parameters, solver) {
-            return Ok(None);
-        }
-        let recording = Recording {
-            slips: AUDITED_SLIPS,
-            discard: 0,
-            ..Recording::default()
-        };
-        let audited = simulate_audited(
-            parameters,
-            solver,
-            LIMITS,
-            &mut SlipObserver::new(parameters, &recording),
-        );
-        let (_, ledger) = audited.with_context(|| in_words(parameters, solver))?;
-        Ok(Some(ledger.residual()))
     }
 
     /// Whether slips of this solver would take too long.
@@ -554,7 +508,6 @@ mod tests {
             first_set_multiple: 3,
             slips: 4,
             breaks: 50,
-            followed_breaks: 400,
             ..Study::quick()
         };
         let findings = study.run(&mut |_| {}).unwrap();
@@ -571,11 +524,6 @@ mod tests {
                 tight.median < Some(1e-12) && tight.missing == Some(0),
                 "{tight:?}"
             );
-            assert!(
-                rows[0].ledger_residual.unwrap().abs() > 1e-4
-                    && rows[2].ledger_residual.unwrap().abs() < 1e-8
-            );
-            assert_eq!(rows[1].ledger_residual, None);
             for row in rows {
                 assert!(
                     row.cost.per_slip > 0.0 && row.cost.timed_slips == 9,
@@ -606,7 +554,6 @@ mod tests {
             solvers: vec![Solver::FixedStep { time_step: 4e-6 }],
             seeds: 1,
             slips: 4,
-            followed_breaks: 400,
             fixed_step_slips_from: 1.0,
             fixed_step_breaks_from: 1.0,
             // 1.2 s, or some ten slips.
@@ -633,20 +580,14 @@ mod tests {
             ..Summary::default()
         };
         ensemble.add(0.1, &summary, Vec::new());
-        let [cost, ..] = ensemble.costs(10.0);
+        let cost = ensemble.cost(10.0);
         assert_eq!((cost.steps_per_slip, cost.timed_slips), (1e7, 0));
         assert!(
             (cost.per_slip - 2.0).abs() < 1e-12 && (cost.per_simulated_second - 0.2).abs() < 1e-12
         );
-        // Others that other work has slowed down change nothing but the spread.
+        // Others that other work has slowed down change nothing.
         ensemble.add(0.3, &summary, Vec::new());
         ensemble.add(0.2, &summary, Vec::new());
-        let per_slip = ensemble.costs(10.0).map(|cost| cost.per_slip);
-        assert!(
-            per_slip
-                .iter()
-                .zip([2.0, 4.0, 6.0])
-                .all(|(cost, expected)| (cost - expected).abs() < 1e-12)
-        );
+        assert!((ensemble.cost(10.0).per_slip - 2.0).abs() < 1e-12);
     }
 }

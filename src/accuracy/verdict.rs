@@ -208,13 +208,11 @@ mod tests {
                 timed_slips: 9,
                 ..Cost::default()
             },
-            median_per_slip: per_slip,
             break_times: BreakErrors {
                 median: Some(error),
                 largest: Some(10.0 * error),
                 ..BreakErrors::default()
             },
-            ledger_residual: None,
         }
     }
 

@@ -25,12 +25,10 @@ const MAX_COUNT: u64 = 1_000_000;
 #[command(after_help = "\
 Before trajectories diverge, the first break times are compared with those at the tightest tolerance. After that,
 the distributions of slips are compared with a reference ensemble: their distances and the biases of their means,
-with bootstrap intervals. The energy ledger is checked, too. The event-driven solver counts as two methods, on the
-grid and in Taylor steps.
+with bootstrap intervals. The event-driven solver counts as two methods, on the grid and in Taylor steps.
 
-The cost is the CPU time of one thread in the cheapest realisation. Realisations of all solvers are timed in turn;
-their spread shows whether other work disturbed the timing, so keep the machine free. --threads is about what is not
-timed.
+The cost is the CPU time of one thread in the cheapest realisation. Realisations of all solvers are timed in turn; keep
+the machine free meanwhile. --threads is about what is not timed.
 
 The first lines say how exact a sweep with this solver is: whether a bias was found, which must be larger than what
 chance gives in as many comparisons; by how much breaks are off; and whether the slips that the sweep records could

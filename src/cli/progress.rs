@@ -4,6 +4,7 @@ use super::output;
 use crate::run::threads::Threads;
 use crate::run::{MAX_FAILURES, Reasons, RunEvent, Tally};
 use crate::table::shown::shown_bytes;
+use crate::table::value::floored;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -177,13 +178,8 @@ impl Progress {
             jobs, jobs_done, ..
         } = self.tally;
         let text = format!("{jobs_done} of {jobs} jobs{others}, {left}");
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a share of 1000"
-        )]
-        self.bar
-            .set_position((f64::from(RESOLUTION) * share) as u64);
+        let position = floored(f64::from(RESOLUTION) * share) as u64;
+        self.bar.set_position(position);
         self.bar.set_message(text.clone());
         if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();

@@ -15,6 +15,7 @@ use crate::table::columns::{Kind, Table};
 use crate::table::file::Dataset;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
+use crate::table::value::floored;
 use anyhow::Result;
 use clap::Args;
 use serde_json::{Map, Value as Json};
@@ -444,12 +445,7 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
     } else {
         0.0
     } - exponent;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "from 0 to 18"
-    )]
-    let digits = digits.clamp(0.0, 18.0) as usize;
+    let digits = floored(digits).min(18);
     let rounded = |value: f64| format!("{value:.digits$}");
     // Not -0.00, which is 0 with 0 added.
     let [value, low, high] =

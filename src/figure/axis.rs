@@ -315,10 +315,10 @@ impl Axis {
     }
 
     /// `count` >= 2 values from end to end, evenly placed.
-    pub(super) fn evenly_placed(&self, count: u32) -> impl Iterator<Item = f64> + use<> {
+    pub(super) fn evenly_placed(&self, count: usize) -> impl Iterator<Item = f64> + use<> {
         let (low, high, scale) = (self.low, self.high, self.scale);
         (0..count).map(move |step| {
-            let place = f64::from(step) / f64::from(count - 1);
+            let place = step as f64 / (count - 1) as f64;
             match scale {
                 Scale::Linear => low + place * (high - low),
                 Scale::Logarithmic => low * libm::exp(place * libm::log(high / low)),

@@ -21,7 +21,7 @@ const AVERAGE: Dot = dot(BLUE);
 const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
 const ASYMPTOTE: Stroke = Stroke::solid(RED, 2.4);
 const EXACT: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
-const CURVE_POINTS: u32 = 400;
+const CURVE_POINTS: usize = 400;
 /// Most values of η that have a column each; more are put into columns, this many a decade.
 const MAX_COLUMNS: usize = 60;
 const COLUMNS_PER_DECADE: f64 = 10.0;

@@ -6,6 +6,7 @@ use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Ink};
 use super::style::{BLACK, INKS, SCALE, shade};
 use crate::reduce::{ascending, is_same};
+use crate::table::value::floored;
 use kuva::render::color::Color;
 
 /// How the values of a quantity become colours.
@@ -53,12 +54,7 @@ impl Hues {
             }
             Self::Scale(axis) => {
                 let steps = SCALE.len() as f64;
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "an index"
-                )]
-                let step = (axis.place(value).clamp(0.0, 1.0) * steps).min(steps - 1.0) as usize;
+                let step = floored((axis.place(value) * steps).min(steps - 1.0));
                 SCALE[step]
             }
         }

@@ -12,6 +12,7 @@ use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
 use crate::observe::MapRow;
 use crate::sweep::label;
+use crate::table::value::floored;
 use anyhow::{Result, anyhow};
 use kuva::render::color::Color;
 use std::f64::consts::TAU;
@@ -91,12 +92,7 @@ pub fn simulation(
             1.2 * amplitude,
         );
         y.minor.clear();
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "some thousand points"
-        )]
-        let points = (POINTS_PER_PERIOD * (last - first) / period) as u32 + 2;
+        let points = floored(POINTS_PER_PERIOD * (last - first) / period) + 2;
         let curve = x()
             .evenly_placed(points)
             .map(|time| (time, amplitude * libm::cos(TAU * time / (factor * period))));
@@ -169,12 +165,7 @@ pub fn simulation(
 
 /// The least and the largest of the samples of each column of a figure: no peak is lost.
 fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the width of a figure"
-    )]
-    let columns = (2.0 * width) as usize;
+    let columns = floored(2.0 * width);
     let samples = trace.len().div_ceil(columns).max(1);
     if samples <= 4 {
         return trace.to_vec();
@@ -198,12 +189,7 @@ fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> 
     let (instants, time) = (map.len() / blocks, |instant: usize| {
         map[instant * blocks].time
     });
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the width of a figure"
-    )]
-    let columns = (width as usize).min(instants);
+    let columns = floored(width).min(instants);
     // Half a spacing on both sides of an instant belongs to it.
     let spacing = (time(instants - 1) - time(0)) / (instants - 1) as f64;
     let start_of = |column: usize| column * instants / columns;

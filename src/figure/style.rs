@@ -2,6 +2,7 @@
 //! long they are: text has the same size in every figure, whatever the size of the sheet.
 
 use super::picture::{Dot, Fill, Ink, Stroke};
+use crate::table::value::floored;
 use clap::ValueEnum;
 use kuva::render::color::Color;
 use std::str::FromStr;
@@ -243,12 +244,7 @@ pub(super) fn ink_on(share: f64) -> Color {
 
 fn mixed(colours: &[[f64; 3]], share: f64) -> [f64; 3] {
     let place = share.clamp(0.0, 1.0) * (colours.len() - 1) as f64;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "an index"
-    )]
-    let index = (place as usize).min(colours.len() - 2);
+    let index = floored(place).min(colours.len() - 2);
     let part = place - index as f64;
     std::array::from_fn(|channel| {
         (1.0 - part) * colours[index][channel] + part * colours[index + 1][channel]

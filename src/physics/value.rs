@@ -5,6 +5,17 @@ use std::fmt;
 /// Largest integer that a double, and so every reader of a table, holds exactly.
 const MAX_EXACT: f64 = ((1_u64 << 53) - 1) as f64;
 
+/// The whole number at or below a real: 0 for a negative one and for NaN, the largest for one beyond it.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "this is meant"
+)]
+#[inline(always)]
+pub const fn floored(value: f64) -> usize {
+    value as usize
+}
+
 /// Defines an enum whose values are words in files and tables, each written once behind its variant.
 #[macro_export]
 macro_rules! words {

@@ -9,6 +9,7 @@
 
 use super::confidence::simpson;
 use super::sequence::Estimate;
+use crate::table::value::floored;
 use std::f64::consts::{PI, TAU};
 
 /// The unit vector of an angle in rad.
@@ -31,12 +32,7 @@ impl Estimate<2> {
     /// Correlated angles count as their effective number, rounded down: by their plain number, any drift of the phase
     /// would be significant.
     pub(super) fn rayleigh(&self) -> Option<f64> {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between 1 and the number of angles"
-        )]
-        let effective = self.effective()? as u64;
+        let effective = floored(self.effective()?) as u64;
         self.resultant_length()
             .map(|length| rayleigh_probability(effective, length))
     }

@@ -18,6 +18,7 @@ use crate::model::selected::Selected;
 use crate::results::{Results, ResultsError};
 use crate::sweep::{AllButSeed, Digits, Refinement, Statistic, Sweep, label};
 use crate::table::columns::{Interval, columns, tables};
+use crate::table::value::floored;
 use crate::table::value::words;
 use std::collections::BTreeMap;
 
@@ -228,12 +229,7 @@ impl<'a> Edge<'a> {
             .partition_point(|set| set.row as f64 <= place)
             .clamp(1, all.len() - 1);
         let (low, high) = (all[above - 1].row, all[above].row);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between two rows"
-        )]
-        let nearest = place.round() as u64;
+        let nearest = floored(place.round()) as u64;
         let window = window(place);
         let inner = window.saturating_sub(1).max(1);
         let wanted_row = (high - low > window).then(|| nearest.clamp(low + inner, high - inner));
@@ -341,18 +337,13 @@ pub fn lines<'a>(
     };
     let (first, step) = scale(sweep, refinement).unwrap_or((f64::NAN, f64::NAN));
     let width = to / step;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "1 to 3"
-    )]
     let window = |place: f64| {
         let value = if refinement.is_log {
             1.0
         } else {
             (first + step * place).abs()
         };
-        (LARGEST_SHARE * value / step).clamp(1.0, WINDOW) as u64
+        floored((LARGEST_SHARE * value / step).clamp(1.0, WINDOW)) as u64
     };
     let line = |rows: &Vec<u64>, sets: &Vec<(u64, &'a SetOfEdges)>, statistic: usize| {
         // Without a value, a set says nothing.

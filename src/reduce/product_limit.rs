@@ -8,6 +8,8 @@
 //! interval, ended or not: the estimate plus the influence of the interval on it (infinitesimal jackknife). Errors follow
 //! from them as from values; without running intervals, they are the values.
 
+use crate::table::value::floored;
+
 /// An interval; they are in order of length.
 #[derive(Clone, Copy, Debug)]
 struct Step {
@@ -118,12 +120,7 @@ impl ProductLimit {
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share.clamp(0.0, 1.0) * last as f64;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "between 0 and the last index"
-    )]
-    let below = place as usize;
+    let below = floored(place);
     let above = (below + 1).min(last);
     Some(sorted[below] + (place - below as f64) * (sorted[above] - sorted[below]))
 }

@@ -12,6 +12,7 @@ use crate::observe::{Averages, Regime, Slip};
 use crate::results::tables::JobOutcome;
 pub use crate::sweep::SetRow;
 use crate::table::columns::Interval;
+use crate::table::value::floored;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
@@ -255,12 +256,7 @@ impl SetSlips {
         let attached_fraction = jobs.over_time(|job| job.attached_fraction);
         let slip_share = jobs.over_time(|job| job.slip_share);
         let mean = |[mean]: [f64; 1]| mean;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a ratio of positive numbers"
-        )]
-        let whole = |periods: f64| periods.round() as u64;
+        let whole = |periods: f64| floored(periods.round()) as u64;
         let row = SetRow {
             set_id: jobs.set_id,
             frequency: jobs.parameters.frequency(),

@@ -5,6 +5,7 @@ use super::swept::ascending;
 use crate::model::Symbol;
 use crate::sweep::{Digits, Expression, Label, label, nearest};
 use crate::table::columns::{Column, Kind, Row, Value, columns};
+use crate::table::value::floored;
 
 pub const FREQUENCY: &str = "frequency";
 
@@ -122,12 +123,7 @@ impl Values {
 
     /// The word of a value.
     pub fn word(&self, value: f64) -> Option<&str> {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "an index, if there are words"
-        )]
-        self.words.get(value as usize).map(String::as_str)
+        self.words.get(floored(value)).map(String::as_str)
     }
 
     pub fn label(&self) -> Label {

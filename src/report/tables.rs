@@ -8,6 +8,7 @@ use crate::results::layout::Layout;
 use crate::sweep::{Job, Label, Sweep, label};
 use crate::table::columns::{Column, Row, Table, Value, columns};
 use crate::table::file::Dataset;
+use crate::table::value::floored;
 use serde::Serialize;
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
@@ -206,12 +207,7 @@ impl Sets {
         for batch in bins.rows::<HistogramBin>() {
             for bin in batch? {
                 if let Some(&place) = sets.places.get(&bin.set_id) {
-                    #[expect(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "a number of a bin"
-                    )]
-                    let number = (bin.low / (bin.high - bin.low)).round() as u64;
+                    let number = floored((bin.low / (bin.high - bin.low)).round()) as u64;
                     sets.histograms[place].extend([number, bin.count]);
                 }
             }

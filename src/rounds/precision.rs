@@ -11,6 +11,7 @@
 
 use crate::reduce::SetRow;
 use crate::sweep::{MIN_SEEDS, Precision};
+use crate::table::value::floored;
 
 /// The seeds that a set with some and these statistics is to have next: no more than it has if it may have no more. `None` if
 /// every statistic is known to the target, or if there is nothing to know: no job has a value.
@@ -36,12 +37,7 @@ pub(super) fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option
     } else {
         many
     };
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a count, at most twice one"
-    )]
-    let next = next as u64;
+    let next = floored(next) as u64;
     Some(next.max(seeds + 1).min(most))
 }
 

@@ -4,6 +4,8 @@
 //! beyond a turn of the calendar waits aside. A contact has at most one reattachment, so lists run through the contacts
 //! and nothing is allocated. Contract: reattachments come in order of time, then block, then contact.
 
+use crate::value::floored;
+
 /// Bins of a turn, and of a mean delay.
 const BINS: usize = 4096;
 const BINS_PER_DELAY: f64 = 512.0;
@@ -188,13 +190,8 @@ impl Reattachments {
     }
 
     /// Number of the bin of a time.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "not negative; saturates far ahead"
-    )]
     fn bin(&self, due: Due) -> u64 {
-        (due.time() * self.bins_per_second) as u64
+        floored(due.time() * self.bins_per_second) as u64
     }
 
     /// Puts one into its bin.

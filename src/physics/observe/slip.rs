@@ -13,6 +13,7 @@ use crate::columns::columns;
 use crate::model::theory::eta;
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
+use crate::value::floored;
 use std::f64::consts::TAU;
 
 columns! {
@@ -43,12 +44,8 @@ impl Modulation {
 
     /// Number n of periods nearest to an interval in s; `None` without modulation.
     pub fn periods(&self, interval: f64) -> Option<u64> {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "intervals are > 0"
-        )]
-        self.period.map(|period| (interval / period).round() as u64)
+        self.period
+            .map(|period| floored((interval / period).round()) as u64)
     }
 }
 

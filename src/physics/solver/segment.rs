@@ -2,6 +2,7 @@
 
 use super::harmonic::Harmonic;
 use super::polynomial;
+use crate::value::floored;
 
 /// How F_S runs along a segment.
 #[derive(Clone, Copy, Debug)]
@@ -252,12 +253,7 @@ impl Segment<'_> {
                 ..
             } => {
                 let at = first + elapsed / spacing;
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "not before the start"
-                )]
-                let step = (at as usize).min(steps.len() - 1);
+                let step = floored(at).min(steps.len() - 1);
                 steps[step].value(at - step as f64)
             }
         }

@@ -130,10 +130,8 @@ impl Series {
     }
 }
 
-/// Rows that are taken through all orders together, since their sums need not wait for each other: many with many
-/// registers.
-const MANY: usize = 9;
-const FEW: usize = 3;
+/// Rows that are taken through all orders together, since their sums need not wait for each other.
+const ROWS: usize = 3;
 
 /// State at s in [0, 1] of a step of `length` s.
 #[inline(always)]
@@ -146,13 +144,9 @@ pub(super) fn evaluate<S: Simd, const R: usize>(
 ) {
     let rows = series.rows_in::<R>();
     let mut r = 0;
-    while S::HAS_MANY_REGISTERS && r + MANY <= rows {
-        evaluate_rows::<S, MANY>(simd, series, rows, r, s, length, state);
-        r += MANY;
-    }
-    while r + FEW <= rows {
-        evaluate_rows::<S, FEW>(simd, series, rows, r, s, length, state);
-        r += FEW;
+    while r + ROWS <= rows {
+        evaluate_rows::<S, ROWS>(simd, series, rows, r, s, length, state);
+        r += ROWS;
     }
     while r < rows {
         evaluate_rows::<S, 1>(simd, series, rows, r, s, length, state);
@@ -217,13 +211,9 @@ pub(super) fn reachable<S: Simd, const R: usize>(
     let rows = series.rows_in::<R>();
     blocks.clear();
     let mut r = 0;
-    while S::HAS_MANY_REGISTERS && r + MANY <= rows {
-        reachable_rows::<S, MANY>(simd, chain, series, rows, r, blocks);
-        r += MANY;
-    }
-    while r + FEW <= rows {
-        reachable_rows::<S, FEW>(simd, chain, series, rows, r, blocks);
-        r += FEW;
+    while r + ROWS <= rows {
+        reachable_rows::<S, ROWS>(simd, chain, series, rows, r, blocks);
+        r += ROWS;
     }
     while r < rows {
         reachable_rows::<S, 1>(simd, chain, series, rows, r, blocks);

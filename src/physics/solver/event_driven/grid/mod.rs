@@ -22,6 +22,7 @@ use crate::model::simd::Simd;
 use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::segment::CubicStep;
 use crate::solver::{Observer, SimulationError};
+use crate::value::floored;
 
 /// Step in units of 1/ω_max at a tolerance of 1e-3, and at most: stable below 2√3.
 const STEP_AT_DEFAULT: f64 = 2.0;
@@ -288,24 +289,14 @@ impl Integration<'_> {
         }
         let steps_until = |time: f64| {
             // Casts saturate: nothing need be due.
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a count, which saturates"
-            )]
-            (((time - self.frame.time) * self.grid.step.inverse_length) as usize).saturating_add(1)
+            floored((time - self.frame.time) * self.grid.step.inverse_length).saturating_add(1)
         };
         // To the next reattachment, and to where a leap may be tried.
         let mut steps = steps_until(self.slider.interface.next_reattachment());
         if self.next_leap > self.frame.time {
             steps = steps.min(steps_until(self.next_leap));
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a count, which saturates"
-        )]
-        let steps = steps.min(room as usize);
+        let steps = steps.min(floored(room));
         let done = self
             .kernels
             .advance(&mut self.slider, &mut self.grid, self.frame.time, steps);
