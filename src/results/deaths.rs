@@ -8,7 +8,7 @@
 use crate::results::layout::{Layout, PartName};
 use crate::results::pending::Pending;
 use crate::results::tables;
-use crate::results::workers::Member;
+use crate::results::workers::{Member, PREFIX};
 use crate::sweep::Outline;
 use crate::table::shown::shown_bytes;
 use crate::table::storage::{StorageError, gone_is_fine};
@@ -104,7 +104,8 @@ impl Layout<'_> {
         let living = self.living(SystemTime::now())?;
         let mut marks = self.marks()?;
         let workers = workers.iter().filter_map(|worker| worker.to_str());
-        for worker in workers.filter(|worker| !living.contains_key(*worker)) {
+        let is_dead = |worker: &&str| worker.starts_with(PREFIX) && !living.contains_key(*worker);
+        for worker in workers.filter(is_dead) {
             for part in self.notes(worker)? {
                 marks.entry(part).or_default().push(worker.into());
             }

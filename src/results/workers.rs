@@ -41,7 +41,7 @@ pub const SILENCE: Duration = if cfg!(test) {
 };
 pub(crate) const BEAT_THREAD: &str = "beat";
 /// What the names of workers, and of their staging folders, begin with.
-const PREFIX: &str = "worker-";
+pub(super) const PREFIX: &str = "worker-";
 /// What the name of a worker's file ends with while it is being written.
 const NEW: &str = ".new";
 /// Staged file whose links are the claims of a worker.

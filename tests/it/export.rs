@@ -142,7 +142,7 @@ fn what_is_there_is_kept_and_a_place_in_a_results_directory_is_refused() {
     fs::create_dir_all(folder.path("mine/.unfinished-thesis")).unwrap();
     folder.write("mine/.unfinished-thesis/ch1.txt", "precious");
     folder.write("file", "mine");
-    symlink("r/figures", folder.path("link")).unwrap();
+    symlink("r/tables", folder.path("link")).unwrap();
     folder.ends(0, "run cheap.toml --out other --no-reduce --shard 1/2");
     let before = folder.contents("");
     for there in ["mine", "file"] {

@@ -339,6 +339,7 @@ fn write_nonsense<R: Row>(path: &Path, column: Index, row: Index, value: Index) 
         .map(|column| column.name)
         .filter(is_left_out)
         .collect();
+    Disk.remove(path).unwrap();
     let mut writer =
         TableWriter::<R>::without(&left_out, Disk.create(path).unwrap(), &footer).unwrap();
     for Batch { path, rows } in batches

@@ -257,11 +257,14 @@ fn a_time_limit_ends_a_simulation() {
 #[test]
 fn the_slowest_drives_that_are_allowed_end() {
     let folder = Folder::new();
-    for velocity in ["1e-50", "1e-104"] {
-        folder.ends(
-            0,
-            &format!("simulate --set V0={velocity} --slips 1 --record discard=0"),
-        );
+    let simulate = |code: i32, velocity: &str| {
+        let one_slip = "--slips 1 --record discard=0";
+        folder.ends(code, &format!("simulate --set V0={velocity} {one_slip}"))
+    };
+    simulate(0, "7e-15");
+    for velocity in ["6e-15", "1e-50", "1e-104"] {
+        let refused = simulate(2, velocity).stderr;
+        assert!(refused.contains("write V0 = 6.96e-15 or more"), "{refused}");
     }
 }
 
