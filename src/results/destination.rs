@@ -224,7 +224,7 @@ pub fn refuse_reserved(path: &Path) -> Result<(), ResultsError> {
     })
 }
 
-/// Refuses such a place in a results directory, as it is named or where links lead.
+/// Refuses such a place in a results directory, by its name or by where links lead.
 fn refuse_within_results(
     path: &Path,
     is_refused: impl Fn(&Path) -> bool,

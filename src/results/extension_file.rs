@@ -109,7 +109,7 @@ impl Record {
         checksum::to_json(self).unwrap_or_default()
     }
 
-    /// What tells the parts of the extension from others, in their footers: all but what follows from their columns.
+    /// What distinguishes the parts of the extension from others in their footers: all but what follows from their columns.
     pub fn footer(&self, name: &str) -> Footer {
         let rest = Self {
             tables: BTreeMap::new(),

@@ -72,7 +72,7 @@ const LABELS: [(&str, &str, &str); 31] = [
     ),
 ];
 
-/// Digits that tell all doubles apart.
+/// Digits that distinguish all doubles.
 const MAX_DIGITS: usize = 17;
 
 /// Longest meaning, in bytes, that is what a column is in a few words.

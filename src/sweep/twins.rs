@@ -1,5 +1,5 @@
 //! Twins: two values of a quantity that agree in twelve digits but not in all, such as 30 and 29.999999999999996. Each
-//! would be a set of its own with the same realisations, counted twice by whoever groups by a column.
+//! would be a set of its own with the same realisations, counted twice where rows are grouped by a column.
 
 use super::axes::Axis;
 use super::grid::Sweep;

@@ -258,7 +258,7 @@ fn check_footer(path: &Path, metadata: &ParquetMetaData, expected: &Footer) -> R
     for (key, expected) in &expected.0 {
         if text(key).is_some_and(|found| found != expected) {
             return Err(format!(
-                "its {key} is another: it is not of this directory as it is now"
+                "its {key} differs: the file does not belong to this directory now"
             ));
         }
     }

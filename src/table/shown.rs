@@ -37,7 +37,7 @@ impl fmt::Display for Shown<'_> {
 }
 
 /// Whether a terminal shows a character for what it is, and nothing else happens: neither one that turns the direction of
-/// writing, nor one that cannot be seen, or not be told from a space.
+/// writing, nor one that cannot be seen or looks like a space.
 pub fn is_plain(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     let has_no_width = matches!(

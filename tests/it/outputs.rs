@@ -1,4 +1,4 @@
-//! Files and folders that commands write where their user says: what the program did not make stays as it is.
+//! Files and folders that commands write where their user says: what the program did not make is left alone.
 
 use crate::program::Folder;
 use std::fs;

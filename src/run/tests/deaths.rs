@@ -20,7 +20,7 @@ fn marked(root: &Path) -> Vec<Marked> {
         .marked
 }
 
-/// Leaves the marks of so many deaths at the parts of these numbers.
+/// Leaves the marks of this number of deaths at the parts of these numbers.
 fn leave_marks(root: &Path, deaths: &[(u64, usize)]) {
     fs::create_dir_all(root.join("run/deaths")).unwrap();
     for &(index, deaths) in deaths {
