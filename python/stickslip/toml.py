@@ -22,11 +22,12 @@ def dumps(sweep: Mapping[str, Any]) -> str:
 
 
 def value(key: str, given: Any, depth: int = 0) -> str:
-    """One value as TOML. Arrays of numpy and the like are lists, members of an enumeration their values."""
+    """One value as TOML. Arrays of numpy, pandas, polars and pyarrow are lists, members of an enumeration their values."""
     if depth > _DEEPEST:
         raise SweepError(f"{key}: lists and dicts lie within each other {_DEEPEST} deep; nothing in a sweep does")
-    if hasattr(given, "tolist"):
-        given = given.tolist()
+    for as_list in ("tolist", "to_list", "to_pylist"):
+        if hasattr(given, as_list):
+            given = getattr(given, as_list)()
     match given:
         case bool():
             return "true" if given else "false"

@@ -100,10 +100,12 @@ def test_a_dict_runs_as_the_file_with_its_text_does(stickslip, tmp_path):
     assert again.directory == tmp_path / "dict" and results_in(tmp_path / "dict") == expected
 
 
-def test_arrays_of_numpy_are_lists(tmp_path):
-    sweep = {"name": "arrays", "axes": {"V0": np.geomspace(1e-5, 1e-4, 3), "seed": np.arange(2)}, "record": {"slips": 1}}
+@pytest.mark.parametrize("array", [np.array, pd.Series, pl.Series, pa.array])
+def test_arrays_of_every_library_are_lists(tmp_path, array):
+    velocities = list(np.geomspace(1e-5, 1e-4, 3))
+    sweep = {"name": "arrays", "axes": {"V0": array(velocities), "seed": array([0, 1])}, "record": {"slips": 1}}
     jobs = module.run(sweep, tmp_path / "arrays", progress=False).jobs().to_pandas()
-    assert sorted(set(jobs["V0"])) == list(np.geomspace(1e-5, 1e-4, 3)) and set(jobs["seed"]) == {0, 1}
+    assert sorted(set(jobs["V0"])) == velocities and set(jobs["seed"]) == {0, 1}
 
 
 def test_every_library_takes_the_slips(results, opened):
