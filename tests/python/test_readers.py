@@ -110,4 +110,4 @@ def test_a_folder_that_duckdb_takes_for_a_column_is_warned_of_and_the_documented
     plain = duckdb.sql(f"select {columns} from '{files}'").fetchall()
     right = duckdb.sql(f"select {columns} from read_parquet('{files}', hive_partitioning = false)").fetchall()
     assert (plain != right) == is_column, plain
-    assert [row[:2] for row in right] == [(1e-4, 0.0)] * 3
+    assert {row[:2] for row in right} == {(1e-4, 0.0)}
