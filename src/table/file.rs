@@ -636,7 +636,7 @@ mod tests {
         check(&path, &expected.clone().with("unknown", "key")).unwrap();
         let error = check(&path, &Footer::empty().with("sweep", "another")).unwrap_err();
         assert!(
-            error.to_string().contains("its sweep is another"),
+            error.to_string().contains("its sweep differs"),
             "{error}"
         );
         for other in &others {
