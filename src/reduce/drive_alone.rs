@@ -149,7 +149,7 @@ impl Passage {
             phases.push(unit(phase(
                 time - cycle.cycle_start,
                 cycle.period,
-                cycle.eta(),
+                cycle.eta,
             )));
             periods.extend(last.map(|last| unit(TAU * ((time - last) / cycle.period).fract())));
             last = Some(time);

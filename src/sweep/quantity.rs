@@ -162,10 +162,7 @@ impl Point {
         match (quantity, self.fixes_period) {
             (_, Some((fixing, value))) if fixing == quantity && self.is_modulated() => value,
             (Quantity::Eta, _) => self.parameters.eta(),
-            (Quantity::Frequency, _) => self
-                .parameters
-                .modulation_period
-                .map_or(0.0, |period| 1.0 / period),
+            (Quantity::Frequency, _) => self.parameters.frequency().unwrap_or(0.0),
             (Quantity::Parameter(Symbol::T), _) => {
                 self.parameters.modulation_period.unwrap_or(f64::INFINITY)
             }

@@ -6,6 +6,34 @@ const SWEEP: &str = "name = \"small\"\n[model]\nN = 10\nNs = 5\n[axes]\nDelta = 
                      seed = { count = 4 }\n[record]\nslips = 8\n";
 
 #[test]
+fn all_sets_of_a_value_of_an_eta_axis_have_that_value_one_bin_and_one_window_of_the_phase() {
+    let folder = Folder::new();
+    let sweep = "name = \"eta\"\n[model]\nN = 2\nNs = 4\n[axes]\nV0 = [3e-5, 1e-4, 3e-4]\n\
+                 Delta = [3e-7, 7e-7, 1e-6]\neta = [0.5, 1, 2, 3, 7]\n[record]\nslips = 4\ndiscard = 0\n";
+    folder.write("eta.toml", sweep);
+    folder.ends(0, "run eta.toml --out out");
+    let axis = [0.5, 1.0, 2.0, 3.0, 7.0];
+    for table in ["tables/jobs/part-000-000000.parquet", "reduced/sets.parquet"] {
+        let found = folder.file(&format!("out/{table}")).reals("eta");
+        assert!(!found.is_empty());
+        assert!(found.iter().all(|eta| axis.contains(eta)), "{found:?}");
+    }
+    for eta in axis {
+        let shown = format!("show out --csv --where eta=={eta}");
+        assert_eq!(folder.ends(0, &shown).stdout.lines().count(), 1 + 9);
+    }
+    let bins = folder.file("out/reduced/backbone.parquet");
+    let of_one = bins.reals("eta_low").iter().position(|&low| low == 1.0);
+    assert_eq!(bins.counts("sets")[of_one.unwrap()], 9);
+    // From φ_max and its margin down a turn, where an η a hair below 1 would reach π.
+    let slips = folder.table("out", "slips");
+    let (etas, phases) = (slips.reals("eta"), slips.reals("phase"));
+    let of_one = etas.iter().zip(phases).filter(|(eta, _)| **eta == 1.0);
+    let top = 0.5 * std::f64::consts::PI + 0.5;
+    assert!(of_one.clone().count() > 30 && of_one.clone().all(|(_, phase)| phase <= top));
+}
+
+#[test]
 fn run_ends_with_the_result_and_show_tells_it_again() {
     let folder = Folder::new();
     folder.write("small.toml", SWEEP);

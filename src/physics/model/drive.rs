@@ -22,6 +22,8 @@ pub struct Drive {
     pub angular_frequency: f64,
     /// Period T, in s; 0 when the modulation is off.
     pub period: f64,
+    /// η of the cycle in force, see [`eta`].
+    pub eta: f64,
     /// A maximum of the modulation, in s: the cycle starts there.
     pub cycle_start: f64,
     /// Where the next cycle starts, in s; infinite if none does.
@@ -83,6 +85,7 @@ impl Drive {
             amplitude: parameters.modulation_amplitude,
             angular_frequency: parameters.modulation_frequency(),
             period,
+            eta: parameters.eta(),
             cycle_start: 0.0,
             cycle_end: if ramp.is_some() {
                 period
@@ -99,6 +102,7 @@ impl Drive {
         let start = self.cycle_end;
         (self.period, self.amplitude) = ramp.at(start);
         self.angular_frequency = TAU / self.period;
+        self.eta = eta(self.angular_frequency, self.amplitude, self.velocity);
         self.cycle_start = start;
         self.cycle_end = if ramp.is_over(start) {
             f64::INFINITY
@@ -117,11 +121,6 @@ impl Drive {
     /// Whether the modulation is on.
     pub fn is_modulated(&self) -> bool {
         self.amplitude > 0.0
-    }
-
-    /// η of the cycle in force, see [`eta`].
-    pub fn eta(&self) -> f64 {
-        eta(self.angular_frequency, self.amplitude, self.velocity)
     }
 
     /// Phase of the modulation at a time in s, in (-2π, 2π) rad; reduced before scaling, so that it stays exact in long
@@ -143,7 +142,7 @@ impl Drive {
         }
         let periods = (time - self.cycle_start) / self.period;
         // u is θ + η (cos θ - 1) in units of V0 T/2π, at most θ, and so not further before this turn begins.
-        let (whole, level, eta) = (periods.floor(), TAU * periods.fract(), self.eta());
+        let (whole, level, eta) = (periods.floor(), TAU * periods.fract(), self.eta);
         let load = |angle: f64| angle + eta * (libm::cos(angle) - 1.0);
         // It grows from 0 to the maximum, and from the minimum on.
         let (mut low, mut high) = match load_maximum_phase(eta) {

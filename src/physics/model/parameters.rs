@@ -4,7 +4,7 @@
 //! files, flags, table columns, the documentation) goes through [`Symbol`].
 
 use super::fields::fields;
-use super::theory::{eta, typical_interval};
+use super::theory::{eta, to_twelve_digits, typical_interval};
 use crate::value::{Value, words};
 use std::f64::consts::TAU;
 
@@ -176,14 +176,10 @@ impl Parameters {
             .max(self.modulation_frequency())
     }
 
-    /// The frequency of the modulation in Hz as people write it: its period is the reciprocal to the last bit, and the
-    /// reciprocal of that to twelve digits is what they wrote. `None` without modulation.
+    /// The frequency of the modulation in Hz, to twelve digits. `None` without modulation.
     pub fn frequency(&self) -> Option<f64> {
-        self.modulation_period.map(|period| {
-            format!("{:.11e}", 1.0 / period)
-                .parse()
-                .unwrap_or(1.0 / period)
-        })
+        self.modulation_period
+            .map(|period| to_twelve_digits(1.0 / period))
     }
 
     /// η of the modulation, see [`eta`](super::theory::eta).

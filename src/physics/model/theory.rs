@@ -3,10 +3,15 @@
 use super::Parameters;
 use std::f64::consts::{PI, TAU};
 
+/// A number that follows from others, to the twelve digits that people write: so 1/T is the frequency that T came from.
+pub fn to_twelve_digits(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}
+
 /// η = 2πΔ/(T V0), the ratio of the harmonic to the uniform loading rate, from the angular frequency 2π/T in rad/s, the
-/// amplitude Δ in m and the velocity V0 in m/s; 0 without modulation.
+/// amplitude Δ in m and the velocity V0 in m/s, to twelve digits; 0 without modulation.
 pub fn eta(angular_frequency: f64, amplitude: f64, drive_velocity: f64) -> f64 {
-    angular_frequency * amplitude / drive_velocity
+    to_twelve_digits(angular_frequency * amplitude / drive_velocity)
 }
 
 /// Φ_max = asin(1/η), in rad: the phase of the largest load in each period, for η >= 1; `None` below, where the load only
@@ -157,6 +162,19 @@ mod tests {
         let [below, above] =
             [2999, 3001].map(|count: u64| count as f64 * (finite_resultant(0.5, count) - 0.5));
         assert!((below / above - 1.0).abs() < 2e-3, "{below} {above}");
+    }
+
+    #[test]
+    fn the_eta_of_a_period_that_an_eta_gave_is_that_eta() {
+        for value in [0.5, 1.0, 3.0, 7.0] {
+            for amplitude in [3e-7, 7e-7, 1e-6, 4.77e-7] {
+                for velocity in [3e-5, 1e-4, 7e-3] {
+                    let period = TAU * amplitude / (value * velocity);
+                    assert_eq!(eta(TAU / period, amplitude, velocity), value);
+                }
+            }
+        }
+        assert_eq!(eta(0.0, 1e-6, 1e-4), 0.0);
     }
 
     #[test]

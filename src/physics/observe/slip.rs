@@ -427,7 +427,7 @@ impl SlipObserver {
                 periods: interval.and_then(|interval| modulation.periods(interval)),
                 phase: modulation
                     .period
-                    .map(|period| phase(onset.time - drive.cycle_start, period, drive.eta())),
+                    .map(|period| phase(onset.time - drive.cycle_start, period, drive.eta)),
                 peak_force: onset.force,
                 drop: onset.force - active.least_at_last_break,
                 nucleation: first.time,
