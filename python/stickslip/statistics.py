@@ -33,16 +33,6 @@ def near_whole(periods: pandas.Series) -> pandas.Series:
     return (periods - periods.round()).abs() < 0.1
 
 
-def rayleigh_p(angles: ArrayLike) -> float:
-    """p-value of the Rayleigh test of many independent angles in rad against uniform ones, by Wilkie's formula."""
-    return float(rayleigh_p_of(len(angles), resultant_length(angles)))
-
-
-def rayleigh_p_of(count: int, length: ArrayLike) -> numpy.ndarray:
-    """The same, from the number of angles and their resultant length."""
-    return numpy.exp(numpy.sqrt(1 + 4 * count + 4 * count**2 * (1 - numpy.square(length))) - (1 + 2 * count))
-
-
 @dataclass(frozen=True)
 class Estimate:
     """A value and the ends of its 95 % interval, equal to it if nothing varies, from this many independent units."""

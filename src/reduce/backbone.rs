@@ -1,9 +1,9 @@
 //! The φ-η back-bone: phases pooled in logarithmic bins of η (Fig. 3e).
 
-use super::PhaseLimits;
 use super::circular::unit;
 use super::sequence::{Estimate, Sequences, add};
 use super::set::{FinishedSet, OfSet};
+use super::top_of_phases;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::table::columns::{columns, tables};
 use serde::Serialize;
@@ -28,7 +28,6 @@ columns! {
             "lower end of its 95 % confidence interval, for these sets; the whole turn if no direction is excluded";
         phase_mean_high: Option<f64> = "rad", "upper end";
         resultant_length: Option<f64> = "", "|<exp(i phi)>| of all slips";
-        rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test of all slips, with effective_slips";
         set_phase_mean: Option<f64> = "rad", "circular mean over the sets that have a phase of their mean phase";
         set_phase_mean_low: Option<f64> = "rad", "lower end of its 95 % confidence interval, for these sets";
         set_phase_mean_high: Option<f64> = "rad", "upper end";
@@ -164,10 +163,9 @@ impl Backbone {
         let row = |(index, bin): (i32, Bin)| {
             let (eta_low, eta_high) = (edge(index), edge(index + 1));
             let eta_centre = (eta_low * eta_high).sqrt();
-            let limits = PhaseLimits::at(eta_centre);
+            let top = top_of_phases(eta_centre);
             let [phases, means] = [bin.phases, bin.means].map(Together::estimate);
-            let [interval, means_interval] =
-                [&phases, &means].map(|of| of.direction_interval(limits.top));
+            let [interval, means_interval] = [&phases, &means].map(|of| of.direction_interval(top));
             BackboneBin {
                 eta_low,
                 eta_high,
@@ -176,12 +174,11 @@ impl Backbone {
                 phased_sets: means.count(),
                 slips: phases.count(),
                 effective_slips: phases.effective(),
-                phase_mean: phases.direction(limits.top),
+                phase_mean: phases.direction(top),
                 phase_mean_low: interval.map(|interval| interval.low),
                 phase_mean_high: interval.map(|interval| interval.high),
                 resultant_length: phases.resultant_length(),
-                rayleigh_p: phases.rayleigh(),
-                set_phase_mean: means.direction(limits.top),
+                set_phase_mean: means.direction(top),
                 set_phase_mean_low: means_interval.map(|interval| interval.low),
                 set_phase_mean_high: means_interval.map(|interval| interval.high),
                 phase_minimum: minimum_phase(eta_centre),
@@ -213,9 +210,9 @@ mod tests {
         let mut backbone = Backbone::default();
         let mut push = |period: f64, phases: &[f64]| {
             let jobs = jobs(1e-6, period);
-            let (limits, mut set) = (PhaseLimits::at(jobs.parameters.eta()), SetSlips::default());
+            let mut set = SetSlips::default();
             for &phase in phases {
-                set.push(0, &slip(None, Some(phase)), &limits);
+                set.push(0, &slip(None, Some(phase)));
             }
             backbone.push(&set.finish(jobs));
         };
@@ -239,9 +236,8 @@ mod tests {
         let mut backbone = Backbone::default();
         for &(seed, phases) in sets {
             let (jobs, mut set) = (jobs(1e-6, 0.01), SetSlips::default());
-            let limits = PhaseLimits::at(jobs.parameters.eta());
             for &phase in phases {
-                set.push(seed, &slip(None, Some(phase)), &limits);
+                set.push(seed, &slip(None, Some(phase)));
             }
             backbone.push(&set.finish(jobs));
         }
@@ -309,12 +305,11 @@ mod tests {
             let shared: Vec<f64> = (0..30).map(|_| draws.normal()).collect();
             for _ in 0..12 {
                 let (jobs, mut set) = (jobs(1e-6, 0.01), SetSlips::default());
-                let limits = PhaseLimits::at(jobs.parameters.eta());
                 for (seed, of_seed) in (0..).zip(shared.chunks(15)) {
                     for shared in of_seed {
                         let phase =
                             0.3 * (0.8_f64.sqrt() * shared + 0.2_f64.sqrt() * draws.normal()) - 0.9;
-                        set.push(seed, &slip(None, Some(phase)), &limits);
+                        set.push(seed, &slip(None, Some(phase)));
                     }
                 }
                 backbone.push(&set.finish(jobs));

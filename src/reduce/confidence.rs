@@ -170,7 +170,7 @@ fn cosine_integral(angle: f64, nu: f64) -> f64 {
 }
 
 /// Integral by Simpson's rule of a function that has these values at an even number of steps of this width.
-pub(super) fn simpson(steps: u32, width: f64, value: impl Fn(u32) -> f64) -> f64 {
+fn simpson(steps: u32, width: f64, value: impl Fn(u32) -> f64) -> f64 {
     let weighted = |step| {
         value(step)
             * if step == 0 || step == steps {

@@ -4,10 +4,9 @@
 //! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before.
 //!
 //! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 200 more for the jobs of
-//! [`MAX_SLIPS`] slips and 40 to 80 for each of these, and as much again for those of the set at hand; where the tables
+//! [`MAX_SLIPS`] slips and 32 to 64 for each of these, and as much again for those of the set at hand; where the tables
 //! hold more, the slips are read again for the next sets.
 
-use super::PhaseLimits;
 use super::drive_alone::{Controls, Explained};
 use super::sample::Point;
 use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
@@ -174,7 +173,7 @@ impl<'a> Gathering<'a> {
                     set.points
                         .push((here, Point::of(&set.jobs.parameters, &slip)));
                 }
-                set.push(job.seed, &slip);
+                set.slips.push(job.seed, &slip);
             }
         }
         Ok(sets)
@@ -232,7 +231,6 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
 #[derive(Clone)]
 pub(super) struct Gathered {
     pub(super) jobs: SetJobs,
-    limits: PhaseLimits,
     pub(super) slips: SetSlips,
     /// Points among them, with their place in table order.
     points: Vec<(u64, Point)>,
@@ -240,29 +238,10 @@ pub(super) struct Gathered {
 
 impl Gathered {
     pub(super) fn new(jobs: SetJobs) -> Self {
-        let limits = PhaseLimits::at(jobs.parameters.eta());
         Self {
             jobs,
-            limits,
             slips: SetSlips::default(),
             points: Vec::new(),
-        }
-    }
-
-    pub(super) fn push(&mut self, seed: u64, slip: &Slip) {
-        let Parameters {
-            ramp_time,
-            drive_velocity,
-            ..
-        } = self.jobs.parameters;
-        if ramp_time > 0.0 {
-            self.slips.push(
-                seed,
-                slip,
-                &PhaseLimits::at(slip.modulation.eta(drive_velocity)),
-            );
-        } else {
-            self.slips.push(seed, slip, &self.limits);
         }
     }
 

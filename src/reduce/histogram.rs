@@ -50,7 +50,6 @@ pub(super) fn histogram(set: &SetRow, sorted: &[f64]) -> Vec<HistogramBin> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::PhaseLimits;
     use super::super::set::SetSlips;
     use super::super::set::tests::{jobs, slip};
     use super::*;
@@ -59,11 +58,7 @@ mod tests {
     fn a_histogram_counts_every_interval_once_and_its_density_integrates_to_one() {
         let mut set = SetSlips::default();
         for step in 0..500_u32 {
-            set.push(
-                0,
-                &slip(Some(0.1 + 0.001 * f64::from(step % 37)), None),
-                &PhaseLimits::at(0.0),
-            );
+            set.push(0, &slip(Some(0.1 + 0.001 * f64::from(step % 37)), None));
         }
         let set = set.finish(jobs(0.0, 1.0));
         let bins = histogram(&set.row, &set.intervals);

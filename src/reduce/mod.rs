@@ -46,31 +46,12 @@ pub use values::{FREQUENCY, Values, set_columns, sets_where};
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
 
-/// Where phases can lie at some η.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct PhaseLimits {
-    eta: f64,
-    /// Upper end of the turn in which a mean phase is given, in rad. For η >= 1 the seam is in the middle of the gap between
-    /// Φ_max - 2π and φ_min, where no slip begins.
-    top: f64,
-}
-
-impl PhaseLimits {
-    fn at(eta: f64) -> Self {
-        let seam = minimum_phase(eta)
-            .zip(load_maximum_phase(eta))
-            .map(|(low, high)| 0.5 * (low + high - TAU));
-        Self {
-            eta,
-            top: seam.map_or(PI, |seam| seam + TAU),
-        }
-    }
-
-    /// φ + η cos φ for η < 1, where the load only grows: how far the load is between one maximum of the modulation and the
-    /// next, in rad. Slips that come at random loads are uniform in it; in φ their density is 1 - η sin φ.
-    fn load_phase(&self, phase: f64) -> Option<f64> {
-        (self.eta < 1.0).then(|| phase + self.eta * libm::cos(phase))
-    }
+/// Upper end of the turn in which mean phases at some η are given, in rad. For η >= 1 the seam is in the middle of the gap
+/// between Φ_max - 2π and φ_min, where no slip begins.
+fn top_of_phases(eta: f64) -> f64 {
+    minimum_phase(eta)
+        .zip(load_maximum_phase(eta))
+        .map_or(PI, |(low, high)| 0.5 * (low + high + TAU))
 }
 
 #[cfg(test)]

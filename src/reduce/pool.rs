@@ -87,7 +87,7 @@ impl Pool {
         for PooledJob { seed, facts, slips } in jobs {
             gathered.jobs.push(*seed, facts);
             for slip in slips {
-                gathered.push(*seed, slip);
+                gathered.slips.push(*seed, slip);
             }
         }
         gathered.finish_with(&self.explained[set]).0

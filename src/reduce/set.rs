@@ -1,10 +1,10 @@
 //! The table of sets, a row for each with all seeds together: intervals, locking and phase statistics.
 
-use super::PhaseLimits;
 use super::circular::unit;
 use super::gather::JobFacts;
 use super::product_limit::{ProductLimit, quantile};
 use super::sequence::{Estimate, Sequences};
+use super::top_of_phases;
 use crate::model::Parameters;
 use crate::model::selected::Selected;
 use crate::model::theory::{finite_resultant, random_load_mean};
@@ -95,7 +95,7 @@ impl SetJobs {
     }
 }
 
-/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 40 bytes.
+/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 32 bytes.
 #[derive(Clone, Copy, Debug)]
 struct SlipStats {
     /// Interval before it, in s.
@@ -103,13 +103,12 @@ struct SlipStats {
     /// The interval in periods of the modulation at its end.
     periods: f64,
     phase: f64,
-    load_phase: f64,
     /// Stress drop, in N; missing of a slip that is still to come when its job ends.
     drop: f64,
 }
 
 impl SlipStats {
-    fn of(slip: &Slip, limits: &PhaseLimits) -> Self {
+    fn of(slip: &Slip) -> Self {
         let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
         Self {
             interval: or_missing(slip.interval),
@@ -119,7 +118,6 @@ impl SlipStats {
                     .map(|(interval, period)| interval / period),
             ),
             phase: or_missing(slip.phase),
-            load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
             drop: slip.drop,
         }
     }
@@ -131,7 +129,6 @@ impl SlipStats {
             interval,
             periods,
             phase: f64::NAN,
-            load_phase: f64::NAN,
             drop: f64::NAN,
         }
     }
@@ -161,9 +158,9 @@ struct JobSlips {
 }
 
 impl SetSlips {
-    pub(super) fn push(&mut self, seed: u64, slip: &Slip, limits: &PhaseLimits) {
+    pub(super) fn push(&mut self, seed: u64, slip: &Slip) {
         let job = self.jobs.entry(seed).or_default();
-        job.slips.push(SlipStats::of(slip, limits));
+        job.slips.push(SlipStats::of(slip));
         let always = [
             slip.peak_force,
             slip.duration,
@@ -221,23 +218,17 @@ impl SetSlips {
         let by_job: Vec<&[SlipStats]> =
             self.jobs.values().map(|job| job.slips.as_slice()).collect();
         let eta = jobs.parameters.eta();
-        let limits = PhaseLimits::at(eta);
+        let top = top_of_phases(eta);
         let tau = Intervals::new(&by_job, |slip| slip.interval);
         let over_period = Intervals::new(&by_job, |slip| slip.periods);
         let intervals = tau.estimate(|slip| [slip.interval]);
         let drops = estimate(&by_job, |slip| non_nan(slip.drop).map(|drop| [drop]));
         // The whole turns go first: they would cost the sine its digits.
         let locking = over_period.estimate(|slip| unit(TAU * slip.periods.fract()));
-        let of_angle = |angle: fn(&SlipStats) -> f64| {
-            sequences(&by_job, |slip| non_nan(angle(slip)).map(unit)).centred()
-        };
-        let (of_phases, (_, loads)) = (
-            of_angle(|slip| slip.phase),
-            of_angle(|slip| slip.load_phase),
-        );
+        let of_phases = sequences(&by_job, |slip| non_nan(slip.phase).map(unit)).centred();
         let phases = of_phases.1;
 
-        let phase_interval = phases.direction_interval(limits.top);
+        let phase_interval = phases.direction_interval(top);
         let expected = (phases.count() > 0).then(|| {
             let [real, imaginary] = random_load_mean(eta);
             finite_resultant(real.hypot(imaginary), phases.count())
@@ -287,14 +278,12 @@ impl SetSlips {
             periods: over_period.quantile(0.5).map(whole),
             locking_index: locking.resultant_length(),
             locking_interval: locking.length_interval(),
-            phase_mean: phases.direction(limits.top),
+            phase_mean: phases.direction(top),
             phase_interval,
             has_phase: phase_interval.is_some_and(|Interval { low, high }| high - low < WHOLE_TURN),
             resultant_length: phases.resultant_length(),
             length_interval: phases.length_interval(),
             expected_resultant: expected,
-            rayleigh_p: phases.rayleigh(),
-            load_rayleigh_p: loads.rayleigh(),
             drop_mean: drops.mean().map(mean),
             drop_interval: drops.interval(),
             drop_deviation,
@@ -470,12 +459,11 @@ pub(super) mod tests {
     }
 
     fn reduced(jobs: SetJobs, slips: impl IntoIterator<Item = Slip>) -> SetRow {
-        let limits = PhaseLimits::at(jobs.parameters.eta());
         let mut set = SetSlips::default();
         let mut seed = 0;
         for slip in slips {
             seed += u64::from(slip.number == 0);
-            set.push(seed, &slip, &limits);
+            set.push(seed, &slip);
         }
         set.finish(jobs).row
     }
@@ -512,7 +500,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn slips_at_random_loads_are_uniform_in_the_load_phase_but_not_in_the_phase() {
+    fn slips_at_random_loads_have_a_resultant_of_half_eta() {
         let jobs = jobs(1e-6, 0.1);
         let eta = jobs.parameters.eta();
         assert!((0.3..0.9).contains(&eta), "{eta}");
@@ -532,9 +520,7 @@ pub(super) mod tests {
             slip(None, Some(low))
         });
         let row = reduced(jobs, phases);
-        assert!(row.rayleigh_p.unwrap() < 1e-3);
         assert!((row.resultant_length.unwrap() - 0.5 * eta).abs() < 1e-3);
-        assert!(row.load_rayleigh_p.unwrap() > 0.99);
     }
 
     #[test]

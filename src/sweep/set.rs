@@ -68,9 +68,6 @@ columns! {
         resultant_excess_interval as "resultant_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         expected_resultant: Option<f64> = "",
             "mean resultant length of as many independent slips at random loads that exceed all before; null without modulation";
-        rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test against uniform phases, with effective_slips";
-        load_rayleigh_p: Option<f64> = "",
-            "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1: slips at random loads are uniform in it";
         drop_mean: Option<f64> = "N", "mean stress drop";
         drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
@@ -171,17 +168,10 @@ impl Statistic {
     }
 
     /// Whether the population has a value of it, with an error that leaving out seeds shows: quantiles jump, numbers of
-    /// values, bounds and p-values change with their number, and angles have no order.
+    /// values and bounds change with their number, and angles have no order.
     pub fn can_cross(self) -> bool {
-        const OTHERS: &[&str] = &[
-            "share_below",
-            "tau_05",
-            "tau_25",
-            "tau_50",
-            "tau_75",
-            "tau_95",
-        ];
-        let is_of_sample = ["effective_", "tau_mean_", "rayleigh_", "load_"]
+        const OTHERS: &[&str] = &["tau_05", "tau_25", "tau_50", "tau_75", "tau_95"];
+        let is_of_sample = ["effective_", "tau_mean_"]
             .iter()
             .any(|begin| self.key.starts_with(begin));
         self.kind == Kind::Real && !self.is_angle() && !is_of_sample && !OTHERS.contains(&self.key)

@@ -635,10 +635,7 @@ mod tests {
         // Earlier programs wrote fewer keys.
         check(&path, &expected.clone().with("unknown", "key")).unwrap();
         let error = check(&path, &Footer::empty().with("sweep", "another")).unwrap_err();
-        assert!(
-            error.to_string().contains("its sweep differs"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("its sweep differs"), "{error}");
         for other in &others {
             fs::copy(&path, other).unwrap();
             let errors = [

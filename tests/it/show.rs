@@ -13,7 +13,10 @@ fn all_sets_of_a_value_of_an_eta_axis_have_that_value_one_bin_and_one_window_of_
     folder.write("eta.toml", sweep);
     folder.ends(0, "run eta.toml --out out");
     let axis = [0.5, 1.0, 2.0, 3.0, 7.0];
-    for table in ["tables/jobs/part-000-000000.parquet", "reduced/sets.parquet"] {
+    for table in [
+        "tables/jobs/part-000-000000.parquet",
+        "reduced/sets.parquet",
+    ] {
         let found = folder.file(&format!("out/{table}")).reals("eta");
         assert!(!found.is_empty());
         assert!(found.iter().all(|eta| axis.contains(eta)), "{found:?}");
