@@ -1,18 +1,37 @@
 //! Confidence intervals: they contain the true value in 95 of 100 repetitions.
+//!
+//! Where few slips differ from all others, as in a deep tongue, sums of jobs hardly vary, and the little that they vary by is
+//! skewed. Two things are added to Student's t: towards the side on which a sum is skewed, what the third moment says of
+//! rare events; and slips of a kind that none of those seen is of, of which there may be [`MAX_UNSEEN`]. Errors on one side are
+//! put together by their squares (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693 (2008)).
 
-use super::sequence::Estimate;
+use super::sequence::{Estimate, Sequences};
 use crate::table::columns::Interval;
 use std::f64::consts::PI;
 
 /// Share of repetitions in which an interval contains the true value.
 const CONFIDENCE: f64 = 0.95;
 
-/// Above this resultant length, chance is mostly that of the few vectors that point elsewhere.
+/// Above this resultant length, chance is mostly that of the vectors along their mean.
 const LONG: f64 = 0.5;
 
 /// Of the degrees of freedom of slips in a few jobs, those that the variance of a standard deviation has: squares have
 /// heavy tails. Measured, as all coverage: docs/coverage.md.
 const OF_SQUARES: f64 = 0.25;
+
+/// Events of which none is seen in 5 of 100 repetitions: -ln 0.05.
+const MAX_UNSEEN: f64 = 3.0;
+
+/// How far a count of rare events k lies from the middle √((1.96² k) + a²) of its interval: so k = 0 ends at [`MAX_UNSEEN`], and
+/// the others where the binomial distribution (mid-P) does, to 5 %.
+const RARE: f64 = 0.5 * MAX_UNSEEN;
+
+/// What a slip of a kind that none of those seen is of would take from a sum, or add to it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Unseen {
+    pub(super) below: f64,
+    pub(super) above: f64,
+}
 
 const fn about(mean: f64, half: f64) -> Interval {
     Interval {
@@ -27,31 +46,45 @@ impl Estimate<1> {
         Some(student(self.freedom(share_of_freedom)?) * self.variance(&[1.0]).sqrt())
     }
 
-    /// Of the mean; `None` for fewer than two values.
-    pub(super) fn interval(&self) -> Option<Interval> {
-        let [mean] = self.mean()?;
-        Some(about(mean, self.half(1.0)?))
+    /// The interval of the mean; `None` for fewer than two values.
+    fn about_mean(&self, share_of_freedom: f64, unseen: Unseen) -> Option<Interval> {
+        let ([mean], half) = (self.mean()?, self.half(share_of_freedom)?);
+        let n = self.count() as f64;
+        let [skew] = self.rare.map(|rare| RARE * rare / n);
+        let wide = skew.abs() + libm::hypot(half, skew);
+        let error = |is_skewed: bool, unseen: f64| {
+            libm::hypot(if is_skewed { wide } else { half }, MAX_UNSEEN * unseen / n)
+        };
+        Some(Interval {
+            low: mean - error(skew < 0.0, unseen.below),
+            high: mean + error(skew > 0.0, unseen.above),
+        })
     }
 
-    /// Standard deviation (n - 1) of the values whose squared deviations from their mean these are, and its interval, of equal
-    /// width to both sides of its logarithm; `None` for fewer than two values.
-    pub(super) fn deviation(&self) -> (Option<f64>, Option<Interval>) {
+    /// Of the mean; `None` for fewer than two values.
+    pub(super) fn interval(&self) -> Option<Interval> {
+        self.interval_with(Unseen::default())
+    }
+
+    /// The same where slips may be missing.
+    pub(super) fn interval_with(&self, unseen: Unseen) -> Option<Interval> {
+        self.about_mean(1.0, unseen)
+    }
+
+    /// Standard deviation (n - 1) of the values whose squared deviations from their mean these are, and its interval; `None`
+    /// for fewer than two values.
+    pub(super) fn deviation(&self, unseen: Unseen) -> (Option<f64>, Option<Interval>) {
         let n = self.count() as f64;
-        let squares = self.mean().filter(|_| n > 1.0).map(|[square]| square);
-        let deviation = squares.map(|square| (square * n / (n - 1.0)).sqrt());
-        let ends = || {
-            let (deviation, square) = (deviation?, squares?);
-            let half = if square > 0.0 {
-                0.5 * self.half(OF_SQUARES)? / square
-            } else {
-                0.0
-            };
-            Some(Interval {
-                low: deviation * libm::exp(-half),
-                high: deviation * libm::exp(half),
-            })
-        };
-        (deviation, ends())
+        let of_sample = |square: f64| (square.max(0.0) * n / (n - 1.0)).sqrt();
+        let square = self.mean().filter(|_| n > 1.0).map(|[square]| square);
+        let ends = square.and(self.about_mean(OF_SQUARES, unseen));
+        (
+            square.map(of_sample),
+            ends.map(|squares| Interval {
+                low: of_sample(squares.low),
+                high: of_sample(squares.high),
+            }),
+        )
     }
 
     /// Shares of the values between whose quantiles the median lies, if these are the values' indicators of not exceeding it
@@ -64,42 +97,45 @@ impl Estimate<1> {
 }
 
 impl Estimate<2> {
-    /// Along the mean and across it: the length of the mean, and the variances of the mean both ways.
-    fn polar(&self) -> Option<(f64, f64, f64)> {
+    /// The unit vector along the mean.
+    pub(super) fn heading(&self) -> Option<[f64; 2]> {
         let [x, y] = self.mean()?;
         let length = libm::hypot(x, y);
-        let along = if length > 0.0 {
+        Some(if length > 0.0 {
             [x / length, y / length]
         } else {
             [1.0, 0.0]
-        };
+        })
+    }
+
+    /// The length of the mean, and its variances along the mean and across it.
+    fn polar(&self) -> Option<(f64, f64, f64)> {
+        let [x, y] = self.heading()?;
         Some((
-            length,
-            self.variance(&along),
-            self.variance(&[-along[1], along[0]]),
+            self.resultant_length()?,
+            self.variance(&[x, y]),
+            self.variance(&[-y, x]),
         ))
     }
 
-    /// Of the resultant length R of unit vectors; `None` for fewer than two.
+    /// Of the resultant length R of unit vectors with these deviations from their mean; `None` for fewer than two.
     ///
     /// Of short ones: the square of the length of a mean has the mean R² + s² + s'² and the variance 4 R² s² + 2 (s⁴ +
     /// s'⁴), with the variances s² along and s'² across. The interval contains every R from which the measured square is
     /// less than t standard deviations away (score interval). It also holds near R = 0, where chance alone makes a
-    /// resultant longer. Of long ones, few vectors that point elsewhere make 1 - R, and it is skewed: its logarithm is
-    /// less so.
-    pub(super) fn length_interval(&self) -> Option<Interval> {
+    /// resultant longer. Long ones are the mean of the components along their direction.
+    pub(super) fn length_interval(
+        &self,
+        deviations: &Sequences<2>,
+        unseen: Unseen,
+    ) -> Option<Interval> {
         let ((length, along, across), t) = (self.polar()?, student(self.freedom(1.0)?));
         if length > LONG {
-            let rest = (1.0 - length).max(0.0);
-            let half = if rest > 0.0 {
-                t * along.sqrt() / rest
-            } else {
-                0.0
-            };
-            let end = |half: f64| (1.0 - rest * libm::exp(half)).max(0.0);
+            let components = deviations.along(&self.heading()?).estimate();
+            let Interval { low, high } = components.interval_with(unseen)?;
             return Some(Interval {
-                low: end(half),
-                high: end(-half),
+                low: (length + low).max(0.0),
+                high: (length + high).min(1.0),
             });
         }
         let unbiased = length * length - along - across;
@@ -132,9 +168,7 @@ impl Estimate<2> {
 /// The mean of independent values, and its interval.
 #[cfg(test)]
 pub(crate) fn mean_of(values: &[f64]) -> (Option<f64>, Option<Interval>) {
-    let mean =
-        super::sequence::Sequences::independent(values.iter().map(|&value| [value]).collect())
-            .estimate();
+    let mean = Sequences::independent(values.iter().map(|&value| [value]).collect()).estimate();
     (mean.mean().map(|[mean]| mean), mean.interval())
 }
 
@@ -185,7 +219,6 @@ fn simpson(steps: u32, width: f64, value: impl Fn(u32) -> f64) -> f64 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::circular::unit;
-    use super::super::sequence::Sequences;
     use super::*;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -273,17 +306,19 @@ pub(super) mod tests {
                         .collect()
                 })
                 .collect();
-            let vectors = Sequences::of(
+            let (deviations, vectors) = Sequences::of(
                 sample
                     .iter()
                     .map(|job| job.iter().map(|&angle| unit(angle))),
             )
-            .estimate();
+            .centred();
             let reals =
                 Sequences::of(sample.iter().map(|job| job.iter().map(|&angle| [angle]))).estimate();
             let holds = |interval: Interval, truth| interval.low <= truth && truth <= interval.high;
             held[0] += f64::from(u8::from(holds(
-                vectors.length_interval().unwrap(),
+                vectors
+                    .length_interval(&deviations, Unseen::default())
+                    .unwrap(),
                 resultant,
             )));
             // No direction is near the seam a turn away.

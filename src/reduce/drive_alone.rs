@@ -3,16 +3,18 @@
 //! The control of a job has its parameters and seed, and no modulation. Its onset at t comes when the driven end has moved
 //! V0 t; under the modulation it first gets there at the [first passage](Drive::first_passage), through start-up as in the run.
 //! Phases and intervals of these passages go through the estimators of the slips. What is seen beyond them is the slider's:
-//! the excess, whose interval takes in both errors by those of the two (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693
-//! (2008)).
+//! the excess, of pairs of a job and its control.
 
 use super::circular::unit;
-use super::sequence::{Estimate, Sequences};
+use super::confidence::Unseen;
+use super::sequence::Sequences;
+use super::set::{FinishedSet, OfSet};
+use super::tongue::Tongue;
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;
 use crate::results::tables::JobOfSlip;
-use crate::sweep::{SetRow, Sweep};
+use crate::sweep::Sweep;
 use crate::table::columns::{Interval, columns};
 use crate::table::file::Dataset;
 use std::collections::{BTreeMap, HashMap};
@@ -76,53 +78,128 @@ pub(super) struct Explained {
 }
 
 impl Explained {
-    /// Adds to a set what is explained of its jobs with these seeds, which are in order.
-    pub(super) fn add_to(&self, row: &mut SetRow, seeds: &[u64]) {
-        row.is_control = self.is_control;
+    /// Adds to a set what is explained of its jobs.
+    pub(super) fn add_to(&self, set: &mut FinishedSet) {
+        set.row.is_control = self.is_control;
         let Some(passages) = &self.passages else {
             return;
         };
-        let passages: Vec<&Passage> = passages
-            .iter()
-            .filter(|(seed, _)| seeds.binary_search(seed).is_ok())
-            .map(|(_, passage)| passage)
-            .collect();
-        let phases =
-            Sequences::of(passages.iter().map(|job| job.phases.iter().copied())).estimate();
-        let intervals =
-            Sequences::of(passages.iter().map(|job| job.periods.iter().copied())).estimate();
-        let seen = (row.resultant_length, row.length_interval);
-        (
-            row.resultant_drive,
-            row.resultant_excess,
-            row.resultant_excess_interval,
-        ) = beyond(seen, &phases);
-        let seen = (row.locking_index, row.locking_interval);
-        (
-            row.locking_index_drive,
-            row.locking_index_excess,
-            row.locking_excess_interval,
-        ) = beyond(seen, &intervals);
+        let unseen = |of: fn(&Tongue) -> Unseen| set.tongue.as_ref().map(of).unwrap_or_default();
+        let of = |seen: &OfSet, unseen, alone: fn(&Passage) -> &Vec<[f64; 2]>| {
+            let passages = passages.iter().map(|(&seed, job)| (seed, alone(job)));
+            Beyond::of((&set.seeds, seen), unseen, &passages.collect())
+        };
+        let phases = of(&set.phases, unseen(Tongue::of_phases), |job| &job.phases);
+        let locking = of(&set.locking, unseen(Tongue::of_intervals), |job| {
+            &job.periods
+        });
+        let row = &mut set.row;
+        row.resultant_drive = phases.alone;
+        row.resultant_excess = phases.excess;
+        row.resultant_excess_interval = phases.interval;
+        row.locking_index_drive = locking.alone;
+        row.locking_index_excess = locking.excess;
+        row.locking_excess_interval = locking.interval;
     }
 }
 
-/// The resultant length by the drive alone, the excess of what is seen, and its interval.
-fn beyond(
-    (seen, interval): (Option<f64>, Option<Interval>),
-    drive: &Estimate<2>,
-) -> (Option<f64>, Option<f64>, Option<Interval>) {
-    let Some(alone) = drive.resultant_length() else {
-        return (None, None, None);
-    };
-    let excess = seen.map(|seen| seen - alone);
-    let ends = || {
-        let (seen, own, of_drive) = (seen?, interval?, drive.length_interval()?);
-        Some(Interval {
-            low: excess? - libm::hypot(seen - own.low, of_drive.high - alone),
-            high: excess? + libm::hypot(own.high - seen, alone - of_drive.low),
+/// A resultant length by the drive alone, and the excess of what is seen.
+#[derive(Debug, Default)]
+struct Beyond {
+    alone: Option<f64>,
+    excess: Option<f64>,
+    interval: Option<Interval>,
+}
+
+impl Beyond {
+    /// Of the jobs with these seeds and the passages of the same seeds, or of all if there are no such pairs.
+    fn of(
+        (seeds, seen): (&[u64], &OfSet),
+        unseen: Unseen,
+        passages: &BTreeMap<u64, &Vec<[f64; 2]>>,
+    ) -> Self {
+        let [x, y] = seen.1.mean().unwrap_or_default();
+        let vector = |&[from_x, from_y]: &[f64; 2]| [from_x + x, from_y + y];
+        let pairs: Vec<_> = seeds
+            .iter()
+            .zip(seen.0.jobs())
+            .filter_map(|(seed, job)| Some((job.iter().map(vector), *passages.get(seed)?)))
+            .collect();
+        if pairs.is_empty() {
+            let alone = Sequences::of(passages.values().map(|job| job.iter().copied())).centred();
+            return Self::of_independent(seen, &alone, unseen);
+        }
+        let seen = Sequences::of(pairs.iter().map(|(job, _)| job.clone())).centred();
+        let alone = Sequences::of(pairs.iter().map(|(_, job)| job.iter().copied())).centred();
+        Self::of_pairs(&seen, &alone, unseen)
+    }
+
+    /// The interval is that of the jackknife over the pairs, to first order.
+    fn of_pairs(seen: &OfSet, alone: &OfSet, unseen: Unseen) -> Self {
+        let ends = |excess: f64| {
+            let (seen_by, alone_by) = (Influences::of(seen)?, Influences::of(alone)?);
+            let pairs = seen_by.of_jobs.iter().zip(&alone_by.of_jobs);
+            let unseen = Unseen {
+                below: unseen.below * seen_by.of_vector,
+                above: 0.0,
+            };
+            let error = Sequences::independent(pairs.map(|(seen, alone)| [seen - alone]).collect())
+                .estimate()
+                .interval_with(unseen)?;
+            Some(Interval {
+                low: excess + error.low,
+                high: excess + error.high,
+            })
+        };
+        Self::with(seen, alone, ends)
+    }
+
+    fn of_independent(seen: &OfSet, alone: &OfSet, unseen: Unseen) -> Self {
+        let ends = |excess: f64| {
+            let own = seen.1.length_interval(&seen.0, unseen)?;
+            let of_drive = alone.1.length_interval(&alone.0, Unseen::default())?;
+            let (seen, alone) = (seen.1.resultant_length()?, alone.1.resultant_length()?);
+            Some(Interval {
+                low: excess - libm::hypot(seen - own.low, of_drive.high - alone),
+                high: excess + libm::hypot(own.high - seen, alone - of_drive.low),
+            })
+        };
+        Self::with(seen, alone, ends)
+    }
+
+    fn with(seen: &OfSet, alone: &OfSet, ends: impl Fn(f64) -> Option<Interval>) -> Self {
+        let alone = alone.1.resultant_length();
+        let excess = seen
+            .1
+            .resultant_length()
+            .zip(alone)
+            .map(|(seen, alone)| seen - alone);
+        Self {
+            alone,
+            excess,
+            interval: excess.and_then(ends),
+        }
+    }
+}
+
+/// What jobs add to a resultant length, to first order; all together add nothing.
+struct Influences {
+    /// Times the number of jobs.
+    of_jobs: Vec<f64>,
+    /// The same of a vector that shortens the sum by 1.
+    of_vector: f64,
+}
+
+impl Influences {
+    fn of((deviations, mean): &OfSet) -> Option<Self> {
+        let along = deviations.along(&mean.heading()?);
+        let of_vector = along.jobs().count() as f64 / mean.count() as f64;
+        let of_job = |job: &[[f64; 1]]| of_vector * job.iter().map(|[part]| part).sum::<f64>();
+        Some(Self {
+            of_jobs: along.jobs().map(of_job).collect(),
+            of_vector,
         })
-    };
-    (Some(alone), excess, ends())
+    }
 }
 
 /// The passages of a job: the unit vectors of their phases, and of their intervals in periods as angles.
@@ -164,12 +241,19 @@ mod tests {
     use super::*;
     use crate::model::selected::Selected;
     use crate::model::theory::random_load_mean;
+    use crate::sweep::SetRow;
     use std::path::Path;
 
     const FREQUENCY: f64 = 29.0;
 
-    /// What is found of a set with this amplitude, of which the control has these onsets; nothing is seen of it but `row`.
-    fn explained(amplitude: f64, onsets: &[Vec<f64>], seeds: &[u64], row: SetRow) -> SetRow {
+    /// What is found of a set with this amplitude, of which the control has these onsets, and of whose jobs with these seeds
+    /// the phases and intervals are `seen`.
+    fn explained(
+        amplitude: f64,
+        onsets: &[Vec<f64>],
+        seeds: &[u64],
+        seen: &[Vec<[f64; 2]>],
+    ) -> SetRow {
         let text = format!(
             "name = \"a\"\n[model]\nDelta = {amplitude:?}\nfrequency = {FREQUENCY:?}\n[axes]\nseed = {{ count = 9 }}\n\
              [record]\ncontrol = true\n"
@@ -190,12 +274,24 @@ mod tests {
             control,
         )]));
         let explained = controls.explain(&sweep, &parameters);
-        let mut row = SetRow {
-            parameters: Selected::new(parameters),
-            ..row
+        let vectors = || Sequences::of(seen.iter().cloned()).centred();
+        let mut set = FinishedSet {
+            row: SetRow {
+                parameters: Selected::new(parameters),
+                ..SetRow::default()
+            },
+            seeds: seeds.to_vec(),
+            phases: vectors(),
+            locking: vectors(),
+            ..FinishedSet::default()
         };
-        explained.add_to(&mut row, seeds);
-        row
+        explained.add_to(&mut set);
+        set.row
+    }
+
+    /// Vectors of jobs that none of the tests below looks at.
+    fn unseen(seeds: &[u64]) -> Vec<Vec<[f64; 2]>> {
+        vec![vec![[1.0, 0.0]; 3]; seeds.len()]
     }
 
     #[test]
@@ -209,7 +305,7 @@ mod tests {
         for eta in [0.5, 1.2, 5.0] {
             let amplitude = eta * 1e-4 / (TAU * FREQUENCY);
             let [real, imaginary] = random_load_mean(eta);
-            let found = explained(amplitude, &onsets, &[0], SetRow::default())
+            let found = explained(amplitude, &onsets, &[0], &unseen(&[0]))
                 .resultant_drive
                 .unwrap();
             // A standard error is 0.005 at most.
@@ -228,72 +324,90 @@ mod tests {
                 .collect::<Vec<f64>>()
         };
         let (whole, free) = (apart(3.0 / FREQUENCY), apart(0.1234));
-        let of = |seeds: &[u64]| {
-            explained(
-                1e-6,
-                &[whole.clone(), free.clone()],
-                seeds,
-                SetRow::default(),
-            )
-        };
+        let of =
+            |seeds: &[u64]| explained(1e-6, &[whole.clone(), free.clone()], seeds, &unseen(seeds));
         let row = of(&[0, 5]);
         for length in [row.resultant_drive, row.locking_index_drive] {
             assert!((length.unwrap() - 1.0).abs() < 1e-9, "{length:?}");
         }
         assert!(of(&[0, 1]).resultant_drive.unwrap() < 0.99);
-        let none = of(&[5]);
-        assert_eq!(
-            (none.resultant_drive, none.locking_index_excess),
-            (None, None)
-        );
     }
 
     #[test]
-    fn the_interval_of_an_excess_takes_in_both_errors() {
+    fn without_common_seeds_the_excess_is_that_of_independent_jobs() {
+        let mut draws = Draws::new(5);
+        let mut job = || vec![unit(0.2 * draws.normal()), unit(0.2 * draws.normal())];
+        let seen: Vec<_> = (0..9).map(|_| job()).collect();
+        let seeds: Vec<u64> = (20..29).collect();
+        let onsets = [vec![0.1, 0.25, 0.37, 0.52], vec![0.13, 0.24, 0.41, 0.5]];
+        let row = explained(1e-6, &onsets, &seeds, &seen);
+        let (vectors, mean) = Sequences::of(seen).centred();
+        let own = mean.length_interval(&vectors, Unseen::default()).unwrap();
+        let excess = row.resultant_excess.unwrap();
+        let seen = mean.resultant_length().unwrap();
+        assert!((excess - (seen - row.resultant_drive.unwrap())).abs() < 1e-15);
+        let interval = row.resultant_excess_interval.unwrap();
+        assert!(excess - interval.low > seen - own.low);
+    }
+
+    #[test]
+    fn what_is_seen_of_pairs_as_the_drive_gives_it_has_no_excess_and_no_error() {
         let mut draws = Draws::new(3);
         let mut job = || {
-            (0..30)
+            (1..30)
                 .map(|number| 0.11 * f64::from(number) + 0.05 * draws.uniform())
                 .collect::<Vec<_>>()
         };
         let onsets: Vec<Vec<f64>> = (0..9).map(|_| job()).collect();
-        let of = |half: f64| {
-            let interval = Some(Interval {
-                low: 0.9 - half,
-                high: 0.9 + half,
-            });
-            let seen = SetRow {
-                resultant_length: Some(0.9),
-                length_interval: interval,
-                ..SetRow::default()
-            };
-            explained(1e-6, &onsets, &[0, 1, 2, 3, 4, 5, 6, 7, 8], seen)
+        let seeds: Vec<u64> = (0..9).collect();
+        let parameters = Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(1.0 / FREQUENCY),
+            ..Parameters::default()
         };
-        let row = of(0.05);
-        let (excess, wide, narrow) = (
-            row.resultant_excess.unwrap(),
-            row.resultant_excess_interval,
-            of(0.0),
-        );
-        assert!((excess - (0.9 - row.resultant_drive.unwrap())).abs() < 1e-15);
-        let halves = |interval: Option<Interval>| {
-            interval
-                .map(|Interval { low, high }| [excess - low, high - excess])
-                .unwrap()
+        let slip = |onset: &f64| Onset {
+            onset: *onset,
+            interval: None,
         };
-        for (wide, alone) in halves(wide)
-            .into_iter()
-            .zip(halves(narrow.resultant_excess_interval))
-        {
-            assert!(
-                alone > 0.0 && (wide - alone.hypot(0.05)).abs() < 1e-12,
-                "{wide} {alone}"
-            );
+        let passages = onsets.iter().map(|onsets| {
+            let slips: Vec<Onset> = onsets.iter().map(slip).collect();
+            Passage::of(&parameters.clone().validated().unwrap(), &slips).phases
+        });
+        let row = explained(1e-6, &onsets, &seeds, &passages.collect::<Vec<_>>());
+        assert_eq!(row.resultant_excess, Some(0.0));
+        let Interval { low, high } = row.resultant_excess_interval.unwrap();
+        assert!(low.abs() < 1e-12 && high.abs() < 1e-12, "{low} {high}");
+    }
+
+    /// Seen and drive share most of what varies from seed to seed.
+    #[test]
+    fn intervals_of_excesses_of_pairs_cover() {
+        const REPETITIONS: u64 = 1000;
+        let holds = |repetition: u64, pairs: u64| {
+            let mut draws = Draws::new(repetition);
+            let (mut seen, mut alone) = (Vec::new(), Vec::new());
+            for _ in 0..pairs {
+                let common = 0.3 * draws.normal();
+                let mut job = |spread: f64| {
+                    (0..15)
+                        .map(|_| unit(common + spread * draws.normal()))
+                        .collect::<Vec<_>>()
+                };
+                seen.push(job(0.3));
+                alone.push(job(0.6));
+            }
+            let [seen, alone] = [seen, alone].map(|jobs| Sequences::of(jobs).centred());
+            let found = Beyond::of_pairs(&seen, &alone, Unseen::default());
+            let length = |spread: f64| libm::exp(-0.5 * (0.09 + spread * spread));
+            let excess = length(0.3) - length(0.6);
+            found
+                .interval
+                .is_some_and(|interval| interval.low <= excess && excess <= interval.high)
+        };
+        for pairs in [2, 8, 30] {
+            let held = (0..REPETITIONS).filter(|&repetition| holds(repetition, pairs));
+            let share = 100.0 * held.count() as f64 / REPETITIONS as f64;
+            assert!((91.0..98.5).contains(&share), "{pairs}: {share}");
         }
-        assert_eq!(
-            (row.locking_index_excess, row.locking_excess_interval),
-            (None, None),
-            "none is seen"
-        );
     }
 }

@@ -256,7 +256,7 @@ impl Gathered {
 
     pub(super) fn finish_with(self, explained: &Explained) -> (FinishedSet, Vec<(u64, Point)>) {
         let mut set = self.slips.finish(self.jobs);
-        explained.add_to(&mut set.row, &set.seeds);
+        explained.add_to(&mut set);
         (set, self.points)
     }
 }

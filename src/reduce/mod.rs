@@ -19,6 +19,7 @@ mod sample;
 mod sequence;
 mod set;
 mod swept;
+mod tongue;
 mod values;
 
 pub use crate::sweep::SetRow;

@@ -78,7 +78,12 @@ impl Pool {
         Ok(Self { sets, explained })
     }
 
-    fn finish<'a>(&self, set: usize, jobs: impl IntoIterator<Item = &'a PooledJob>) -> FinishedSet {
+    fn finish<'a>(
+        &self,
+        set: usize,
+        jobs: impl IntoIterator<Item = &'a PooledJob>,
+        most: usize,
+    ) -> FinishedSet {
         let parameters = self.sets[set].0.clone();
         let mut gathered = Gathered::new(SetJobs {
             parameters,
@@ -86,27 +91,28 @@ impl Pool {
         });
         for PooledJob { seed, facts, slips } in jobs {
             gathered.jobs.push(*seed, facts);
-            for slip in slips {
+            for slip in slips.iter().take(most) {
                 gathered.slips.push(*seed, slip);
             }
         }
         gathered.finish_with(&self.explained[set]).0
     }
 
-    /// The row of a set of these of its jobs.
+    /// The row of a set of these of its jobs, and of so many of the slips of each.
     pub(crate) fn row<'a>(
         &self,
         set: usize,
         jobs: impl IntoIterator<Item = &'a PooledJob>,
+        most: usize,
     ) -> SetRow {
-        self.finish(set, jobs).row
+        self.finish(set, jobs, most).row
     }
 
     /// The bin of all sets with these of their jobs; all of them lie within one.
     pub(crate) fn bin(&self, jobs: Range<usize>) -> BackboneBin {
         let mut backbone = Backbone::default();
         for (set, (_, all)) in self.sets.iter().enumerate() {
-            backbone.push(&self.finish(set, &all[jobs.clone()]));
+            backbone.push(&self.finish(set, &all[jobs.clone()], usize::MAX));
         }
         backbone.finish()[0]
     }

@@ -116,16 +116,15 @@ impl<const D: usize> Sequences<D> {
         let independent = zeroth.times(n / (n - inflation));
         let correlated = correlated.times(n / (n - weight));
         let jobs = self.jobs().filter(|job| !job.is_empty()).count();
-        let (covariances, freedom) = if jobs >= MANY_JOBS {
-            let sums = Self::of(self.jobs().map(|job| [sum(job)])).products(0);
-            (
-                [sums.times(jobs as f64 / (jobs as f64 - 1.0)); 2],
-                jobs as f64 - 1.0,
-            )
+        let (covariances, freedom, rare) = if jobs >= MANY_JOBS {
+            let sums = Self::of(self.jobs().map(|job| [sum(job)]));
+            let of_jobs = sums.products(0).times(jobs as f64 / (jobs as f64 - 1.0));
+            ([of_jobs; 2], jobs as f64 - 1.0, rare(&sums.values))
         } else {
             // Exact in two limits: n - 1 for independent values, and the number of jobs - 1 if the slips of a job are
             // equal.
-            ([independent, correlated], n / weight - 1.0)
+            let freedom = n / weight - 1.0;
+            ([independent, correlated], freedom, rare(&self.values))
         };
         let inflation = (correlated.trace() / independent.trace()).max(1.0);
         (
@@ -137,8 +136,21 @@ impl<const D: usize> Sequences<D> {
                 inflation,
                 jobs,
                 freedom,
+                rare,
             },
         )
+    }
+
+    /// Their components along a unit vector.
+    pub(super) fn along(&self, direction: &[f64; D]) -> Sequences<1> {
+        let component = |value: &[f64; D]| {
+            let products = value.iter().zip(direction).map(|(x, part)| x * part);
+            [products.sum::<f64>()]
+        };
+        Sequences {
+            values: self.values.iter().map(component).collect(),
+            starts: self.starts.clone(),
+        }
     }
 
     /// Sum of the symmetrised products of values a lag apart within jobs.
@@ -171,6 +183,16 @@ fn sum<const D: usize>(values: &[[f64; D]]) -> [f64; D] {
     values.iter().fold([0.0; D], |mut sum, value| {
         add(&mut sum, value);
         sum
+    })
+}
+
+/// Third moments over second ones, of deviations that vary independently.
+fn rare<const D: usize>(deviations: &[[f64; D]]) -> [f64; D] {
+    std::array::from_fn(|component| {
+        let of = deviations.iter().map(|deviation| deviation[component]);
+        let second: f64 = of.clone().map(|x| x * x).sum();
+        let third: f64 = of.map(|x| x * x * x).sum();
+        if second > 0.0 { third / second } else { 0.0 }
     })
 }
 
@@ -235,6 +257,8 @@ pub(super) struct Estimate<const D: usize> {
     jobs: usize,
     /// Degrees of freedom of the variance; infinite where it is zero.
     freedom: f64,
+    /// What a rare event adds to the sum, if rare events make its variance: the third moment over the second.
+    pub(super) rare: [f64; D],
 }
 
 impl<const D: usize> Default for Estimate<D> {
@@ -247,6 +271,7 @@ impl<const D: usize> Default for Estimate<D> {
             inflation: 1.0,
             jobs: 0,
             freedom: f64::INFINITY,
+            rare: [0.0; D],
         }
     }
 }

@@ -1,9 +1,11 @@
 //! The table of sets, a row for each with all seeds together: intervals, locking and phase statistics.
 
 use super::circular::unit;
+use super::confidence::Unseen;
 use super::gather::JobFacts;
 use super::product_limit::{ProductLimit, quantile};
 use super::sequence::{Estimate, Sequences};
+use super::tongue::Tongue;
 use super::top_of_phases;
 use crate::model::Parameters;
 use crate::model::selected::Selected;
@@ -223,10 +225,26 @@ impl SetSlips {
         let over_period = Intervals::new(&by_job, |slip| slip.periods);
         let intervals = tau.estimate(|slip| [slip.interval]);
         let drops = estimate(&by_job, |slip| non_nan(slip.drop).map(|drop| [drop]));
+        let whole = |periods: f64| floored(periods.round()) as u64;
+        let periods = over_period.quantile(0.5).map(whole);
+        let mean = |[mean]: [f64; 1]| mean;
+        let periods_mean = over_period.estimate(|slip| [slip.periods]).mean().map(mean);
+        let tongue = Tongue::of(&over_period.sorted, periods);
+        let unseen = |of: &dyn Fn(&Tongue) -> Unseen| tongue.as_ref().map(of).unwrap_or_default();
+        // What a period more changes.
+        let step = |of: &Estimate<1>| {
+            let ([mean], periods) = of.mean().zip(periods_mean).unwrap_or(([0.0], 1.0));
+            mean / periods
+        };
         // The whole turns go first: they would cost the sine its digits.
-        let locking = over_period.estimate(|slip| unit(TAU * slip.periods.fract()));
+        let of_intervals = sequences(&by_job, |slip| {
+            non_nan(slip.periods)
+                .filter(|_| !slip.is_to_come())
+                .map(|periods| unit(TAU * periods.fract()))
+        })
+        .centred();
         let of_phases = sequences(&by_job, |slip| non_nan(slip.phase).map(unit)).centred();
-        let phases = of_phases.1;
+        let (locking, phases) = (of_intervals.1, of_phases.1);
 
         let phase_interval = phases.direction_interval(top);
         let expected = (phases.count() > 0).then(|| {
@@ -239,15 +257,15 @@ impl SetSlips {
             move |value: f64| [(value - mean) * (value - mean)]
         };
         let (tau_square, drop_square) = (square(&intervals), square(&drops));
-        let (tau_deviation, tau_deviation_interval) =
-            tau.estimate(|slip| tau_square(slip.interval)).deviation();
+        let (tau_deviation, tau_deviation_interval) = tau
+            .estimate(|slip| tau_square(slip.interval))
+            .deviation(unseen(&|tongue| tongue.of_squares(step(&intervals))));
         let (drop_deviation, drop_deviation_interval) =
-            estimate(&by_job, |slip| non_nan(slip.drop).map(&drop_square)).deviation();
+            estimate(&by_job, |slip| non_nan(slip.drop).map(&drop_square))
+                .deviation(unseen(&|tongue| tongue.of_squares(step(&drops))));
         let friction = jobs.over_time(|job| job.friction);
         let attached_fraction = jobs.over_time(|job| job.attached_fraction);
         let slip_share = jobs.over_time(|job| job.slip_share);
-        let mean = |[mean]: [f64; 1]| mean;
-        let whole = |periods: f64| floored(periods.round()) as u64;
         let row = SetRow {
             set_id: jobs.set_id,
             frequency: jobs.parameters.frequency(),
@@ -264,7 +282,8 @@ impl SetSlips {
             effective_slips: phases.effective(),
             effective_intervals: intervals.effective(),
             tau_mean: intervals.mean().map(mean),
-            tau_interval: intervals.interval(),
+            tau_interval: intervals
+                .interval_with(unseen(&|tongue| tongue.of_mean(step(&intervals)))),
             tau_bound: tau.bound(),
             tau_deviation,
             tau_deviation_interval,
@@ -274,18 +293,19 @@ impl SetSlips {
             median_interval: tau.median_interval(),
             tau_75,
             tau_95,
-            periods_mean: over_period.estimate(|slip| [slip.periods]).mean().map(mean),
-            periods: over_period.quantile(0.5).map(whole),
+            periods_mean,
+            periods,
             locking_index: locking.resultant_length(),
-            locking_interval: locking.length_interval(),
+            locking_interval: locking
+                .length_interval(&of_intervals.0, unseen(&Tongue::of_intervals)),
             phase_mean: phases.direction(top),
             phase_interval,
             has_phase: phase_interval.is_some_and(|Interval { low, high }| high - low < WHOLE_TURN),
             resultant_length: phases.resultant_length(),
-            length_interval: phases.length_interval(),
+            length_interval: phases.length_interval(&of_phases.0, unseen(&Tongue::of_phases)),
             expected_resultant: expected,
             drop_mean: drops.mean().map(mean),
-            drop_interval: drops.interval(),
+            drop_interval: drops.interval_with(unseen(&|tongue| tongue.of_mean(step(&drops)))),
             drop_deviation,
             drop_deviation_interval,
             peak_force_mean: means[0],
@@ -309,6 +329,8 @@ impl SetSlips {
             intervals,
             seeds,
             phases: of_phases,
+            locking: of_intervals,
+            tongue,
         }
     }
 }
@@ -406,14 +428,17 @@ impl<'a> Intervals<'a> {
 pub(super) type OfSet = (Sequences<2>, Estimate<2>);
 
 /// A set whose slips are all there.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct FinishedSet {
     pub(super) row: SetRow,
     /// Its intervals in s, sorted.
     pub(super) intervals: Vec<f64>,
-    /// Seeds of the jobs of these phases.
+    /// Seeds of the jobs of these phases and intervals.
     pub(super) seeds: Vec<u64>,
     pub(super) phases: OfSet,
+    /// Intervals in periods, as angles.
+    pub(super) locking: OfSet,
+    pub(super) tongue: Option<Tongue>,
 }
 
 #[cfg(test)]

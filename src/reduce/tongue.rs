@@ -1,0 +1,78 @@
+//! Tongues: sets whose intervals are n periods each, up to a jitter.
+//!
+//! Few slips are off n there, and a small set may have seen none. Each would change its statistics much, so its intervals allow
+//! for some of them (`Unseen`). How much each would change is a choice by which intervals hold the true value as often as
+//! they say: docs/coverage.md.
+
+use super::confidence::Unseen;
+
+/// Standard deviation of intervals about whole numbers of periods, in periods, from which jitter alone puts slips off n.
+const MAX_JITTER: f64 = 0.1;
+
+/// What a slip off n takes from the sum of the cosines of phases about their mean.
+const OF_PHASES: f64 = 0.75;
+
+/// The same of the intervals before and after it, as angles.
+const OF_INTERVALS: f64 = 1.3;
+
+/// Periods that are missing after an interval shorter than n: most are followed by one that is as much longer.
+const OF_SHORTER: f64 = 0.4;
+
+/// The intervals of a set in a tongue.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tongue {
+    /// Periods beyond n, summed over all intervals.
+    beyond: f64,
+    has_shorter: bool,
+}
+
+impl Tongue {
+    /// Of intervals in periods; `None` if they are in no tongue with n >= 1.
+    pub(super) fn of(periods: &[f64], n: Option<u64>) -> Option<Self> {
+        let n = n.filter(|&n| n > 0)? as f64;
+        let count = periods.len() as f64;
+        let rest = periods.iter().map(|periods| periods - periods.round());
+        let mean = rest.clone().sum::<f64>() / count;
+        let squares: f64 = rest.map(|rest| (rest - mean) * (rest - mean)).sum();
+        ((squares / count).sqrt() < MAX_JITTER).then(|| Self {
+            beyond: periods.iter().map(|periods| periods.round() - n).sum(),
+            has_shorter: periods.iter().any(|periods| periods.round() < n),
+        })
+    }
+
+    /// Of a quantity that grows by `step` with each period of an interval.
+    pub(super) fn of_mean(&self, step: f64) -> Unseen {
+        Unseen {
+            below: if self.has_shorter && self.beyond >= 0.0 {
+                OF_SHORTER * step
+            } else {
+                0.0
+            },
+            above: if self.beyond > 0.0 { 0.0 } else { step },
+        }
+    }
+
+    /// Of the squared deviations of such a quantity from its mean.
+    pub(super) fn of_squares(&self, step: f64) -> Unseen {
+        Unseen {
+            below: 0.0,
+            above: if self.beyond == 0.0 { step * step } else { 0.0 },
+        }
+    }
+
+    /// Of the phases of slips as unit vectors.
+    pub(super) const fn of_phases(&self) -> Unseen {
+        Unseen {
+            below: OF_PHASES,
+            above: 0.0,
+        }
+    }
+
+    /// Of intervals in periods as unit vectors.
+    pub(super) const fn of_intervals(&self) -> Unseen {
+        Unseen {
+            below: OF_INTERVALS,
+            above: 0.0,
+        }
+    }
+}
