@@ -12,7 +12,7 @@ use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;
 use crate::results::tables::JobOfSlip;
-use crate::sweep::{SetRow, Sweep};
+use crate::sweep::{Plan, SetRow};
 use crate::table::columns::{Interval, columns};
 use crate::table::file::Dataset;
 use std::collections::{BTreeMap, HashMap};
@@ -35,11 +35,11 @@ impl Controls {
     /// Those of these sets, from the table of slips.
     pub(super) fn read<'a>(
         slips: Dataset<'_>,
-        sweep: &Sweep,
+        plan: Plan<'_>,
         sets: impl Iterator<Item = &'a Parameters>,
     ) -> Result<Self, ResultsError> {
         let mut controls: HashMap<String, BTreeMap<u64, Vec<Onset>>> = sets
-            .filter_map(|set| Some((sweep.control_of(set)?, BTreeMap::new())))
+            .filter_map(|set| Some((plan.control_of(set)?, BTreeMap::new())))
             .collect();
         if controls.is_empty() {
             return Ok(Self::default());
@@ -55,14 +55,14 @@ impl Controls {
     }
 
     /// What the drive alone explains of a set with these parameters.
-    pub(super) fn explain(&self, sweep: &Sweep, parameters: &Parameters) -> Explained {
-        let control = sweep
+    pub(super) fn explain(&self, plan: Plan<'_>, parameters: &Parameters) -> Explained {
+        let control = plan
             .control_of(parameters)
             .and_then(|control| self.0.get(&control));
         let passage = |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Passage::of(parameters, slips));
         let passages = control.map(|control| control.iter().map(passage).collect());
         Explained {
-            is_control: sweep.is_control(parameters),
+            is_control: plan.is_control(parameters),
             passages,
         }
     }
@@ -164,6 +164,7 @@ mod tests {
     use super::*;
     use crate::model::selected::Selected;
     use crate::model::theory::random_load_mean;
+    use crate::sweep::{Extension, Sweep};
     use std::path::Path;
 
     const FREQUENCY: f64 = 29.0;
@@ -185,11 +186,13 @@ mod tests {
             onsets.iter().zip(lasts).map(slip).collect::<Vec<_>>()
         };
         let control = (0..).zip(onsets.iter().map(slips)).collect();
+        let extensions = [Extension::new(&sweep, &[])];
+        let plan = Plan::new(&extensions);
         let controls = Controls(HashMap::from([(
-            sweep.control_of(&parameters).unwrap(),
+            plan.control_of(&parameters).unwrap(),
             control,
         )]));
-        let explained = controls.explain(&sweep, &parameters);
+        let explained = controls.explain(plan, &parameters);
         let mut row = SetRow {
             parameters: Selected::new(parameters),
             ..row
