@@ -507,6 +507,20 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
             "{sets} with jobs that ended at max_time = {time} s: {slips} of {wanted} slips; a longer one, here, runs them again"
         ));
     }
+    let has_few_cycles = |row: &&SetRow| {
+        let period = row.parameters.parameters.modulation_period;
+        row.phase_mean.is_none()
+            && period
+                .zip(row.tau_mean)
+                .is_some_and(|(period, tau)| period >= tau)
+    };
+    let sets = rows.iter().filter(has_few_cycles).count() as u64;
+    if sets > 0 {
+        notes.push(format!(
+            "{} without a phase: the jobs hold less than two cycles of the modulation; more slips give one",
+            output::count(sets, "set")
+        ));
+    }
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
     if failed > 0 {
         let root = output::quoted_path(results.layout().root());

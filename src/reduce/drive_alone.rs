@@ -8,6 +8,7 @@
 
 use super::circular::unit;
 use super::sequence::{Estimate, Sequences};
+use super::set::Cycles;
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;
@@ -77,7 +78,7 @@ pub(super) struct Explained {
 
 impl Explained {
     /// Adds to a set what is explained of its jobs with these seeds, which are in order.
-    pub(super) fn add_to(&self, row: &mut SetRow, seeds: &[u64]) {
+    pub(super) fn add_to(&self, row: &mut SetRow, seeds: &[u64], cycles: Option<Cycles>) {
         row.is_control = self.is_control;
         let Some(passages) = &self.passages else {
             return;
@@ -87,8 +88,13 @@ impl Explained {
             .filter(|(seed, _)| seeds.binary_search(seed).is_ok())
             .map(|(_, passage)| passage)
             .collect();
+        let of_jobs: Vec<&[(f64, [f64; 2])]> = passages.iter().map(|job| &*job.phases).collect();
+        let of_jobs = match cycles {
+            None => of_jobs,
+            Some(cycles) => cycles.within(&of_jobs, |(time, _)| *time),
+        };
         let phases =
-            Sequences::of(passages.iter().map(|job| job.phases.iter().copied())).estimate();
+            Sequences::of(of_jobs.iter().map(|job| job.iter().map(|(_, unit)| *unit))).estimate();
         let intervals =
             Sequences::of(passages.iter().map(|job| job.periods.iter().copied())).estimate();
         let seen = (row.resultant_length, row.length_interval);
@@ -97,6 +103,9 @@ impl Explained {
             row.resultant_excess,
             row.resultant_excess_interval,
         ) = beyond(seen, &phases);
+        if row.periods == Some(0) {
+            return;
+        }
         let seen = (row.locking_index, row.locking_interval);
         (
             row.locking_index_drive,
@@ -125,10 +134,11 @@ fn beyond(
     (Some(alone), excess, ends())
 }
 
-/// The passages of a job: the unit vectors of their phases, and of their intervals in periods as angles.
+/// The passages of a job: their times in s and the unit vectors of their phases, and those of their intervals in periods as
+/// angles.
 #[derive(Debug)]
 struct Passage {
-    phases: Vec<[f64; 2]>,
+    phases: Vec<(f64, [f64; 2])>,
     periods: Vec<[f64; 2]>,
 }
 
@@ -146,11 +156,8 @@ impl Passage {
             .and_then(|slip| Some(passage(slip.onset - slip.interval?).0));
         for slip in slips {
             let (time, cycle) = passage(slip.onset);
-            phases.push(unit(phase(
-                time - cycle.cycle_start,
-                cycle.period,
-                cycle.eta,
-            )));
+            let phase = phase(time - cycle.cycle_start, cycle.period, cycle.eta);
+            phases.push((time, unit(phase)));
             periods.extend(last.map(|last| unit(TAU * ((time - last) / cycle.period).fract())));
             last = Some(time);
         }
@@ -197,7 +204,7 @@ mod tests {
             parameters: Selected::new(parameters),
             ..row
         };
-        explained.add_to(&mut row, seeds);
+        explained.add_to(&mut row, seeds, None);
         row
     }
 

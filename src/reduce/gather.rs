@@ -4,7 +4,7 @@
 //! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before.
 //!
 //! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 200 more for the jobs of
-//! [`MAX_SLIPS`] slips and 32 to 64 for each of these, and as much again for those of the set at hand; where the tables
+//! [`MAX_SLIPS`] slips and 40 to 80 for each of these, and as much again for those of the set at hand; where the tables
 //! hold more, the slips are read again for the next sets.
 
 use super::drive_alone::{Controls, Explained};
@@ -255,7 +255,7 @@ impl Gathered {
 
     pub(super) fn finish_with(self, explained: &Explained) -> (FinishedSet, Vec<(u64, Point)>) {
         let mut set = self.slips.finish(self.jobs);
-        explained.add_to(&mut set.row, &set.seeds);
+        explained.add_to(&mut set.row, &set.seeds, set.cycles);
         (set, self.points)
     }
 }
