@@ -65,6 +65,8 @@ const FORMAT: u32 = 1;
 /// Sets that the end of a run shows, and reads for its columns and for what ended otherwise.
 const FIRST: usize = 12;
 const MAX_READ: usize = 10_000;
+/// Sets that a note names.
+const MAX_NAMED: usize = 4;
 
 /// What is found of a set, where there is anything.
 const FOUND: [&str; 9] = [
@@ -505,6 +507,20 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
             "{sets} with jobs that ended at max_time = {time} s: {slips} of {wanted} slips; a longer one, here, runs them again"
         ));
     }
+    let has_few_cycles = |row: &&SetRow| {
+        let period = row.parameters.parameters.modulation_period;
+        row.phase_mean.is_none()
+            && period
+                .zip(row.tau_mean)
+                .is_some_and(|(period, tau)| period >= tau)
+    };
+    let sets = rows.iter().filter(has_few_cycles).count() as u64;
+    if sets > 0 {
+        notes.push(format!(
+            "{} without a phase: the jobs hold less than two cycles of the modulation; more slips give one",
+            output::count(sets, "set")
+        ));
+    }
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
     if failed > 0 {
         let root = output::quoted_path(results.layout().root());
@@ -513,14 +529,30 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
             output::count(failed, "job")
         ));
     }
-    let gone = rows
-        .iter()
-        .filter(|row| sweep.set_with(&row.parameters.parameters).is_none())
-        .count();
-    if gone > 0 {
+    let is_gone = |set: &usize| {
+        let parameters = &rows[*set].parameters.parameters;
+        sweep.set_with(parameters).is_none()
+    };
+    let gone: Vec<usize> = (0..rows.len()).filter(is_gone).collect();
+    if !gone.is_empty() {
+        let columns: Vec<Values> = differing(&rows.iter())
+            .into_iter()
+            .filter_map(|symbol| Values::of(rows, key_of(symbol)).ok())
+            .collect();
+        let setting = |&set: &usize| {
+            let settings = columns
+                .iter()
+                .filter_map(|values| Some(values.setting(values.numbers[set]?)));
+            settings.collect::<Vec<_>>().join(", ")
+        };
+        let mut named: Vec<String> = gone.iter().take(MAX_NAMED).map(setting).collect();
+        if let Some(more @ 1..) = gone.len().checked_sub(MAX_NAMED) {
+            named.push(format!("{more} more"));
+        }
         notes.push(format!(
-            "no longer in the sweep: {} of these",
-            output::count(gone as u64, "set")
+            "no longer in the sweep: {} of these: {}",
+            output::count(gone.len() as u64, "set"),
+            named.join("; ")
         ));
     }
     notes

@@ -1,18 +1,20 @@
 //! Sets of two directories compared seed by seed. A seed gives the same disorder in both, so what both owe to it drops out of
 //! their difference, and smaller effects show than two separate intervals would tell.
+//!
+//! Values are those of the table of sets, of the jobs with seeds that both have. The error of a difference is that of a mean
+//! over these seeds, of what each adds to it: the jackknife to first order, in a time proportional to the number of slips.
 
 use super::circular::unit;
-use super::gather::{JobOfSet, each_job};
-use super::sequence::Sequences;
+use super::gather::{Gathering, JobOfSet, MAX_SLIPS, each_job};
+use super::sequence::{Sequences, add};
 use super::set::SetRow;
 use super::values::{FREQUENCY, Values};
-use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol};
-use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
+use crate::results::tables::{JOBS, JobOfSlip, JobOutcome, SLIPS};
 use crate::results::{Results, ResultsError};
 use crate::table::columns::{Column, Kind, columns};
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 columns! {
     struct Compared {
@@ -24,74 +26,89 @@ columns! {
 /// What is compared: columns of the sets.
 const STATISTICS: [&str; 3] = ["tau_mean", "mean_friction", "resultant_length"];
 
-/// Sums over a job: of the intervals, the number of them; the force over time, the time; the vectors of phases, their number.
-type Sums = [f64; 7];
+/// A sum of vectors, or of numbers as such, and of their weights.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    vector: [f64; 2],
+    weight: f64,
+}
 
-/// The jobs of a set by their seeds.
-type Set = (Parameters, BTreeMap<u64, Sums>);
+impl Sum {
+    fn push(&mut self, vector: [f64; 2], weight: f64) {
+        add(&mut self.vector, &vector);
+        self.weight += weight;
+    }
 
-fn statistics(jobs: impl Iterator<Item = Sums>) -> [Option<f64>; 3] {
-    let total = jobs.fold(Sums::default(), |total, job| {
-        std::array::from_fn(|index| total[index] + job[index])
-    });
-    let [intervals, count, force, time, x, y, phases] = total;
-    let ratio = |sum: f64, of: f64| (of > 0.0).then(|| sum / of);
-    [
-        ratio(intervals, count),
-        ratio(force, time),
-        ratio(libm::hypot(x, y), phases),
-    ]
+    /// What each of these adds to the length of their mean, times their number.
+    fn added(all: &[Self]) -> Vec<f64> {
+        let mut total = Self::default();
+        for sum in all {
+            total.push(sum.vector, sum.weight);
+        }
+        let length = libm::hypot(total.vector[0], total.vector[1]);
+        let [x, y] = total.vector.map(|part| part / length);
+        let of_one = |sum: &Self| {
+            let along = x * sum.vector[0] + y * sum.vector[1];
+            all.len() as f64 * (along - length / total.weight * sum.weight) / total.weight
+        };
+        all.iter().map(of_one).collect()
+    }
+}
+
+/// The jobs of a set.
+struct Set {
+    id: String,
+    parameters: Parameters,
+    /// By their seeds: sums of what makes each of the statistics.
+    jobs: BTreeMap<u64, [Sum; 3]>,
 }
 
 fn sets_of(results: &Results<'_>) -> Result<Vec<Set>, ResultsError> {
-    let sweep = results.sweep();
+    let plan = results.plan();
     let jobs = results.dataset(JOBS)?;
     let slips = results.committed_files(SLIPS, &jobs)?;
-    let mut sets: BTreeMap<String, Set> = BTreeMap::new();
+    let mut sets: HashMap<String, Set> = HashMap::new();
     each_job(
         &jobs,
-        &|parameters| !sweep.is_control(parameters),
+        &|parameters| !plan.is_control(parameters),
         |JobOfSet { set_id, facts }, parameters| {
+            if facts.outcome == JobOutcome::Failed {
+                return;
+            }
             let seed = parameters.seed;
-            let (_, jobs) = sets
-                .entry(set_id)
-                .or_insert_with(|| (parameters, BTreeMap::new()));
-            let friction = facts.averaged_time.zip(facts.mean_friction);
-            let (time, force) =
-                friction.map_or((0.0, 0.0), |(time, friction)| (time, time * friction));
-            jobs.insert(seed, [0.0, 0.0, force, time, 0.0, 0.0, 0.0]);
+            let mut friction = Sum::default();
+            if let Some((time, force)) = facts.averaged_time.zip(facts.mean_friction) {
+                friction.push([time * force, 0.0], time);
+            }
+            sets.entry(set_id)
+                .or_insert_with_key(|id| Set {
+                    id: id.clone(),
+                    parameters,
+                    jobs: BTreeMap::new(),
+                })
+                .jobs
+                .insert(seed, [Sum::default(), friction, Sum::default()]);
         },
     )?;
     for batch in slips.rows::<(JobOfSlip, Compared)>() {
-        for (job, Compared { interval, phase }) in batch? {
-            let Some(sums) = sets
-                .get_mut(&job.set_id)
-                .and_then(|(_, jobs)| jobs.get_mut(&job.seed))
-            else {
+        for (job, slip) in batch? {
+            let set = sets.get_mut(&job.set_id);
+            let Some([tau, _, phase]) = set.and_then(|set| set.jobs.get_mut(&job.seed)) else {
                 continue;
             };
-            let [x, y] = phase.map_or([0.0; 2], unit);
-            let one = |is_there: bool| f64::from(u8::from(is_there));
-            let slip = [
-                interval.unwrap_or(0.0),
-                one(interval.is_some()),
-                0.0,
-                0.0,
-                x,
-                y,
-                one(phase.is_some()),
-            ];
-            sums.iter_mut()
-                .zip(slip)
-                .for_each(|(sum, slip)| *sum += slip);
+            if let Some(interval) = slip.interval {
+                tau.push([interval, 0.0], 1.0);
+            }
+            if let Some(angle) = slip.phase {
+                phase.push(unit(angle), 1.0);
+            }
         }
     }
     let mut sets: Vec<Set> = sets.into_values().collect();
-    sets.sort_by(|(left, _), (right, _)| {
-        let key = |set: &Parameters| Symbol::ALL.map(|symbol| set.get(symbol));
-        key(left)
-            .partial_cmp(&key(right))
-            .unwrap_or(Ordering::Equal)
+    sets.sort_by(|left, right| {
+        let key = |set: &Set| Symbol::ALL.map(|symbol| set.parameters.get(symbol));
+        let orders = key(left).partial_cmp(&key(right));
+        orders.unwrap_or(Ordering::Equal)
     });
     Ok(sets)
 }
@@ -102,97 +119,117 @@ fn varied(sets: &[Set]) -> impl Fn(&Symbol) -> bool {
         *symbol != Symbol::Seed
             && sets
                 .iter()
-                .any(|(set, _)| set.get(*symbol) != sets[0].0.get(*symbol))
+                .any(|set| set.parameters.get(*symbol) != sets[0].parameters.get(*symbol))
+    }
+}
+
+/// A set of A and one of B, with the seeds that both have, in order.
+struct Pair<'a> {
+    sets: [&'a Set; 2],
+    seeds: Vec<u64>,
+}
+
+/// The rows of the sets on one side of the pairs, of the jobs with their seeds.
+fn rows_of(
+    results: &Results<'_>,
+    pairs: &[Pair<'_>],
+    side: usize,
+) -> Result<HashMap<String, SetRow>, ResultsError> {
+    let wanted: HashMap<&str, &[u64]> = pairs
+        .iter()
+        .map(|pair| (&*pair.sets[side].id, &*pair.seeds))
+        .collect();
+    let is_wanted = |parameters: &Parameters| {
+        wanted
+            .get(&*results.sweep().set_id(parameters))
+            .is_some_and(|seeds| seeds.binary_search(&parameters.seed).is_ok())
+    };
+    let mut rows = HashMap::new();
+    Gathering::of_jobs(results, &is_wanted)?.each_set(MAX_SLIPS, u64::MAX, |set, _| {
+        let row = set.slips.finish(set.jobs).row;
+        rows.insert(row.set_id.clone(), row);
+        Ok(())
+    })?;
+    Ok(rows)
+}
+
+/// A column of what is found, empty so far.
+fn empty(name: String, kind: Kind) -> Values {
+    let column = Column {
+        name: name.into(),
+        unit: "",
+        meaning: "",
+        kind,
+        nullable: true,
+    };
+    Values {
+        column,
+        numbers: Vec::new(),
+        intervals: Vec::new(),
+        words: Vec::new(),
     }
 }
 
 /// Sets of two directories A and B that agree in all parameters that either varies: these parameters, the common seeds, and
-/// mean interval, mean friction and resultant length in A, in B, and their differences B - A with 95 % intervals, from the
-/// jackknife over common seeds.
+/// mean interval, mean friction and resultant length in A, in B, and their differences B - A with 95 % intervals.
 pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsError> {
-    let (a, b) = (sets_of(a)?, sets_of(b)?);
+    let sets = [sets_of(a)?, sets_of(b)?];
     let keys: Vec<Symbol> = Symbol::ALL
         .into_iter()
-        .filter(|key| varied(&a)(key) || varied(&b)(key))
+        .filter(|key| sets.iter().any(|sets| varied(sets)(key)))
         .collect();
-    let key = |set: &Parameters| {
+    let key = |set: &Set| {
         keys.iter()
-            .map(|&symbol| set.get(symbol).to_string())
+            .map(|&symbol| set.parameters.get(symbol).to_string())
             .collect::<Vec<_>>()
     };
-    let of_b: BTreeMap<Vec<String>, &BTreeMap<u64, Sums>> =
-        b.iter().map(|(set, jobs)| (key(set), jobs)).collect();
-    let mut found: [Values; 10] = std::array::from_fn(|index| {
-        let name = match index.checked_sub(1) {
-            None => "seeds".to_owned(),
-            Some(index) => format!(
-                "{}_{}",
-                STATISTICS[index / 3],
-                ["a", "b", "difference"][index % 3]
-            ),
-        };
-        let column = Column {
-            name: name.into(),
-            unit: "",
-            meaning: "",
-            kind: Kind::Real,
-            nullable: true,
-        };
-        Values {
-            column,
-            numbers: Vec::new(),
-            intervals: Vec::new(),
-            words: Vec::new(),
-        }
-    });
+    let of_b: BTreeMap<Vec<String>, &Set> = sets[1].iter().map(|set| (key(set), set)).collect();
+    let pair = |set| {
+        let other = of_b.get(&key(set)).copied()?;
+        let is_common = |seed: &&u64| other.jobs.contains_key(seed);
+        Some(Pair {
+            sets: [set, other],
+            seeds: set.jobs.keys().filter(is_common).copied().collect(),
+        })
+    };
+    let mut pairs: Vec<Pair<'_>> = sets[0].iter().filter_map(pair).collect();
+    pairs.retain(|pair| !pair.seeds.is_empty());
+    let rows_of_a = rows_of(a, &pairs, 0)?;
+    let rows_of_b = rows_of(b, &pairs, 1)?;
+
     let mut rows = Vec::new();
-    for (set, of_a) in &a {
-        let Some(of_b) = of_b.get(&key(set)) else {
-            continue;
-        };
-        let seeds: Vec<u64> = of_a
-            .keys()
-            .copied()
-            .filter(|seed| of_b.contains_key(seed))
-            .collect();
-        let without = |left_out: Option<u64>| {
-            let kept = seeds.iter().filter(move |&&seed| Some(seed) != left_out);
-            [of_a, *of_b].map(|jobs| statistics(kept.clone().map(|seed| jobs[seed])))
-        };
-        let ([in_a, in_b], parts) = (
-            without(None),
-            seeds
-                .iter()
-                .map(|&seed| without(Some(seed)))
-                .collect::<Vec<_>>(),
-        );
-        rows.push(SetRow {
-            parameters: Selected::new(set.clone()),
-            ..SetRow::default()
-        });
-        let count = seeds.len() as f64;
-        let mut put = |index: usize, number: Option<f64>, interval| {
-            found[index].numbers.push(number);
-            found[index].intervals.push(interval);
-        };
-        put(0, Some(count), None);
-        for index in 0..STATISTICS.len() {
-            let difference = |[a, b]: [[Option<f64>; 3]; 2]| Some(b[index]? - a[index]?);
-            let whole = difference([in_a, in_b]);
-            let pseudo: Option<Vec<[f64; 1]>> = parts
-                .iter()
-                .map(|part| Some([count * whole? - (count - 1.0) * difference(*part)?]))
-                .collect();
-            let interval =
-                pseudo.and_then(|values| Sequences::independent(values).estimate().interval());
-            put(3 * index + 1, in_a[index], None);
-            put(3 * index + 2, in_b[index], None);
-            put(
-                3 * index + 3,
-                whole,
-                interval.map(|interval| (interval.low, interval.high)),
-            );
+    let mut seeds = empty("seeds".to_owned(), Kind::Count);
+    let mut found = STATISTICS.map(|name| {
+        ["a", "b", "difference"].map(|which| empty(format!("{name}_{which}"), Kind::Real))
+    });
+    for pair in &pairs {
+        let [row_of_a, row_of_b] = [&rows_of_a[&pair.sets[0].id], &rows_of_b[&pair.sets[1].id]];
+        seeds.numbers.push(Some(pair.seeds.len() as f64));
+        seeds.intervals.push(None);
+        for (index, [in_a, in_b, difference]) in found.iter_mut().enumerate() {
+            let [of_a, of_b] = [row_of_a, row_of_b].map(|row| row.number(STATISTICS[index]));
+            let whole = of_b.zip(of_a).map(|(b, a)| b - a);
+            let [added_a, added_b] = pair.sets.map(|set| {
+                let sums = pair.seeds.iter().map(|seed| set.jobs[seed][index]);
+                Sum::added(&sums.collect::<Vec<_>>())
+            });
+            let added = added_a.iter().zip(added_b).map(|(a, b)| [b - a]);
+            let around_zero = Sequences::independent(added.collect())
+                .estimate()
+                .interval();
+            let interval = whole
+                .zip(around_zero)
+                .map(|(whole, interval)| (whole + interval.low, whole + interval.high));
+            for (values, number, interval) in [
+                (in_a, of_a, None),
+                (in_b, of_b, None),
+                (difference, whole, interval),
+            ] {
+                values.numbers.push(number);
+                values.intervals.push(interval);
+            }
         }
+        rows.push(row_of_a.clone());
     }
     let column = |symbol: &Symbol| {
         if *symbol == Symbol::T {
@@ -204,8 +241,8 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
     let parameters = keys
         .iter()
         .filter_map(|symbol| Values::of(&rows, column(symbol)).ok());
-    let found = found
-        .into_iter()
+    let found = std::iter::once(seeds)
+        .chain(found.into_iter().flatten())
         .filter(|values| values.numbers.iter().any(Option::is_some));
     Ok(parameters.chain(found).collect())
 }

@@ -8,13 +8,13 @@
 use super::circular::unit;
 use super::confidence::Unseen;
 use super::sequence::Sequences;
-use super::set::{FinishedSet, OfSet};
+use super::set::{Cycles, FinishedSet, OfSet};
 use super::tongue::Tongue;
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;
 use crate::results::tables::JobOfSlip;
-use crate::sweep::Sweep;
+use crate::sweep::Plan;
 use crate::table::columns::{Interval, columns};
 use crate::table::file::Dataset;
 use std::collections::{BTreeMap, HashMap};
@@ -37,11 +37,11 @@ impl Controls {
     /// Those of these sets, from the table of slips.
     pub(super) fn read<'a>(
         slips: Dataset<'_>,
-        sweep: &Sweep,
+        plan: Plan<'_>,
         sets: impl Iterator<Item = &'a Parameters>,
     ) -> Result<Self, ResultsError> {
         let mut controls: HashMap<String, BTreeMap<u64, Vec<Onset>>> = sets
-            .filter_map(|set| Some((sweep.control_of(set)?, BTreeMap::new())))
+            .filter_map(|set| Some((plan.control_of(set)?, BTreeMap::new())))
             .collect();
         if controls.is_empty() {
             return Ok(Self::default());
@@ -57,14 +57,14 @@ impl Controls {
     }
 
     /// What the drive alone explains of a set with these parameters.
-    pub(super) fn explain(&self, sweep: &Sweep, parameters: &Parameters) -> Explained {
-        let control = sweep
+    pub(super) fn explain(&self, plan: Plan<'_>, parameters: &Parameters) -> Explained {
+        let control = plan
             .control_of(parameters)
             .and_then(|control| self.0.get(&control));
         let passage = |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Passage::of(parameters, slips));
         let passages = control.map(|control| control.iter().map(passage).collect());
         Explained {
-            is_control: sweep.is_control(parameters),
+            is_control: plan.is_control(parameters),
             passages,
         }
     }
@@ -85,22 +85,48 @@ impl Explained {
             return;
         };
         let unseen = |of: fn(&Tongue) -> Unseen| set.tongue.as_ref().map(of).unwrap_or_default();
-        let of = |seen: &OfSet, unseen, alone: fn(&Passage) -> &Vec<[f64; 2]>| {
-            let passages = passages.iter().map(|(&seed, job)| (seed, alone(job)));
-            Beyond::of((&set.seeds, seen), unseen, &passages.collect())
-        };
-        let phases = of(&set.phases, unseen(Tongue::of_phases), |job| &job.phases);
-        let locking = of(&set.locking, unseen(Tongue::of_intervals), |job| {
-            &job.periods
-        });
-        let row = &mut set.row;
-        row.resultant_drive = phases.alone;
-        row.resultant_excess = phases.excess;
-        row.resultant_excess_interval = phases.interval;
-        row.locking_index_drive = locking.alone;
-        row.locking_index_excess = locking.excess;
-        row.locking_excess_interval = locking.interval;
+        let phases = phases_of(passages, set.cycles);
+        let phases = Beyond::of(
+            (&set.seeds, &set.phases),
+            unseen(Tongue::of_phases),
+            &phases,
+        );
+        set.row.resultant_drive = phases.alone;
+        set.row.resultant_excess = phases.excess;
+        set.row.resultant_excess_interval = phases.interval;
+        if set.row.periods == Some(0) {
+            return;
+        }
+        let periods = passages
+            .iter()
+            .map(|(&seed, job)| (seed, job.periods.clone()));
+        let locking = Beyond::of(
+            (&set.seeds, &set.locking),
+            unseen(Tongue::of_intervals),
+            &periods.collect(),
+        );
+        set.row.locking_index_drive = locking.alone;
+        set.row.locking_index_excess = locking.excess;
+        set.row.locking_excess_interval = locking.interval;
     }
+}
+
+/// The phases of passages, by their seeds.
+fn phases_of(
+    passages: &BTreeMap<u64, Passage>,
+    cycles: Option<Cycles>,
+) -> BTreeMap<u64, Vec<[f64; 2]>> {
+    let of_jobs: Vec<&[(f64, [f64; 2])]> = passages.values().map(|job| &*job.phases).collect();
+    let of_jobs = match cycles {
+        None => of_jobs,
+        Some(cycles) => cycles.within(&of_jobs, |(time, _)| *time),
+    };
+    let vectors = |job: &[(f64, [f64; 2])]| job.iter().map(|(_, vector)| *vector).collect();
+    passages
+        .keys()
+        .copied()
+        .zip(of_jobs.into_iter().map(vectors))
+        .collect()
 }
 
 /// A resultant length by the drive alone, and the excess of what is seen.
@@ -116,14 +142,14 @@ impl Beyond {
     fn of(
         (seeds, seen): (&[u64], &OfSet),
         unseen: Unseen,
-        passages: &BTreeMap<u64, &Vec<[f64; 2]>>,
+        passages: &BTreeMap<u64, Vec<[f64; 2]>>,
     ) -> Self {
         let [x, y] = seen.1.mean().unwrap_or_default();
         let vector = |&[from_x, from_y]: &[f64; 2]| [from_x + x, from_y + y];
         let pairs: Vec<_> = seeds
             .iter()
             .zip(seen.0.jobs())
-            .filter_map(|(seed, job)| Some((job.iter().map(vector), *passages.get(seed)?)))
+            .filter_map(|(seed, job)| Some((job.iter().map(vector), passages.get(seed)?)))
             .collect();
         if pairs.is_empty() {
             let alone = Sequences::of(passages.values().map(|job| job.iter().copied())).centred();
@@ -202,10 +228,11 @@ impl Influences {
     }
 }
 
-/// The passages of a job: the unit vectors of their phases, and of their intervals in periods as angles.
+/// The passages of a job: their times in s and the unit vectors of their phases, and those of their intervals in periods as
+/// angles.
 #[derive(Debug)]
 struct Passage {
-    phases: Vec<[f64; 2]>,
+    phases: Vec<(f64, [f64; 2])>,
     periods: Vec<[f64; 2]>,
 }
 
@@ -223,11 +250,8 @@ impl Passage {
             .and_then(|slip| Some(passage(slip.onset - slip.interval?).0));
         for slip in slips {
             let (time, cycle) = passage(slip.onset);
-            phases.push(unit(phase(
-                time - cycle.cycle_start,
-                cycle.period,
-                cycle.eta,
-            )));
+            let phase = phase(time - cycle.cycle_start, cycle.period, cycle.eta);
+            phases.push((time, unit(phase)));
             periods.extend(last.map(|last| unit(TAU * ((time - last) / cycle.period).fract())));
             last = Some(time);
         }
@@ -241,7 +265,7 @@ mod tests {
     use super::*;
     use crate::model::selected::Selected;
     use crate::model::theory::random_load_mean;
-    use crate::sweep::SetRow;
+    use crate::sweep::{Extension, SetRow, Sweep};
     use std::path::Path;
 
     const FREQUENCY: f64 = 29.0;
@@ -269,11 +293,13 @@ mod tests {
             onsets.iter().zip(lasts).map(slip).collect::<Vec<_>>()
         };
         let control = (0..).zip(onsets.iter().map(slips)).collect();
+        let extensions = [Extension::new(&sweep, &[])];
+        let plan = Plan::new(&extensions);
         let controls = Controls(HashMap::from([(
-            sweep.control_of(&parameters).unwrap(),
+            plan.control_of(&parameters).unwrap(),
             control,
         )]));
-        let explained = controls.explain(&sweep, &parameters);
+        let explained = controls.explain(plan, &parameters);
         let vectors = || Sequences::of(seen.iter().cloned()).centred();
         let mut set = FinishedSet {
             row: SetRow {
@@ -371,7 +397,11 @@ mod tests {
         };
         let passages = onsets.iter().map(|onsets| {
             let slips: Vec<Onset> = onsets.iter().map(slip).collect();
-            Passage::of(&parameters.clone().validated().unwrap(), &slips).phases
+            Passage::of(&parameters.clone().validated().unwrap(), &slips)
+                .phases
+                .into_iter()
+                .map(|(_, vector)| vector)
+                .collect()
         });
         let row = explained(1e-6, &onsets, &seeds, &passages.collect::<Vec<_>>());
         assert_eq!(row.resultant_excess, Some(0.0));

@@ -4,7 +4,7 @@
 //! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before.
 //!
 //! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 200 more for the jobs of
-//! [`MAX_SLIPS`] slips and 32 to 64 for each of these, and as much again for those of the set at hand; where the tables
+//! [`MAX_SLIPS`] slips and 40 to 80 for each of these, and as much again for those of the set at hand; where the tables
 //! hold more, the slips are read again for the next sets.
 
 use super::drive_alone::{Controls, Explained};
@@ -15,7 +15,7 @@ use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
 use crate::results::tables::{All, JOBS, JobOfSlip, JobOutcome, SLIPS};
 use crate::results::{Results, ResultsError};
-use crate::sweep::Sweep;
+use crate::sweep::Plan;
 use crate::table::columns::columns;
 use crate::table::file::Dataset;
 use std::cmp::Ordering;
@@ -85,7 +85,7 @@ pub(super) struct Gathering<'a> {
     pub(super) sets: Vec<SetJobs>,
     slips: Dataset<'a>,
     is_wanted: Wanted<'a>,
-    sweep: &'a Sweep,
+    plan: Plan<'a>,
     controls: Controls,
 }
 
@@ -95,7 +95,7 @@ impl<'a> Gathering<'a> {
         results: &'a Results<'a>,
         is_wanted: Wanted<'a>,
     ) -> Result<Self, ResultsError> {
-        let sweep = results.sweep();
+        let plan = results.plan();
         // Listed once: what other runs commit meanwhile is left out as a whole.
         let jobs = results.dataset(JOBS)?;
         let slips = results.committed_files(SLIPS, &jobs)?;
@@ -113,13 +113,12 @@ impl<'a> Gathering<'a> {
         })?;
         let mut sets: Vec<SetJobs> = sets.into_values().collect();
         sets.sort_by(by_parameters);
-        let controls =
-            Controls::read(slips.clone(), sweep, sets.iter().map(|set| &set.parameters))?;
+        let controls = Controls::read(slips.clone(), plan, sets.iter().map(|set| &set.parameters))?;
         Ok(Self {
             sets,
             slips,
             is_wanted,
-            sweep,
+            plan,
             controls,
         })
     }
@@ -134,7 +133,7 @@ impl<'a> Gathering<'a> {
     ) -> Result<(), ResultsError> {
         for chunk in chunks(std::mem::take(&mut self.sets), max_slips) {
             for set in self.slips_of(chunk, spacing)? {
-                let explained = self.controls.explain(self.sweep, &set.jobs.parameters);
+                let explained = self.controls.explain(self.plan, &set.jobs.parameters);
                 gathered(set, &explained)?;
             }
         }

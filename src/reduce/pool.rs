@@ -30,13 +30,13 @@ pub(crate) struct Pool {
 impl Pool {
     pub(crate) fn of(layout: &Layout<'_>) -> Result<Self, ResultsError> {
         let results = Results::read(layout)?;
-        let sweep = results.sweep();
+        let plan = results.plan();
         let jobs = results.dataset(JOBS)?;
         let slips = results.committed_files(SLIPS, &jobs)?;
         let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
         each_job(
             &jobs,
-            &|parameters| !sweep.is_control(parameters),
+            &|parameters| !plan.is_control(parameters),
             |JobOfSet { set_id, facts }, parameters| {
                 let seed = parameters.seed;
                 let (_, set) = sets
@@ -62,7 +62,7 @@ impl Pool {
                 }
             }
         }
-        let controls = Controls::read(slips, sweep, sets.values().map(|(set, _)| set))?;
+        let controls = Controls::read(slips, plan, sets.values().map(|(set, _)| set))?;
         let mut sets: Vec<_> = sets
             .into_values()
             .map(|(set, jobs)| (set, jobs.into_values().collect()))
@@ -73,7 +73,7 @@ impl Pool {
         });
         let explained = sets
             .iter()
-            .map(|(set, _)| controls.explain(sweep, set))
+            .map(|(set, _)| controls.explain(plan, set))
             .collect();
         Ok(Self { sets, explained })
     }

@@ -20,7 +20,11 @@ pub(super) const SOURCE: &str = "reduced_from";
 
 /// A checksum of the sweep that was asked for last, and of names and sizes of the committed files of jobs.
 pub(super) fn source(results: &Results<'_>) -> Result<String, ResultsError> {
-    let mut digest = Sha256::new_with_prefix(results.sweep().text());
+    let mut digest = Sha256::new();
+    // All: which sets are controls follows from them.
+    for sweep in results.plan().sweeps() {
+        digest.update(sweep.text());
+    }
     for path in results.dataset(JOBS)?.files() {
         digest.update(path.file_name().unwrap_or_default().as_encoded_bytes());
         digest.update(results.layout().storage.length(path)?.to_le_bytes());

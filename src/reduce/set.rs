@@ -97,9 +97,10 @@ impl SetJobs {
     }
 }
 
-/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 32 bytes.
+/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 40 bytes.
 #[derive(Clone, Copy, Debug)]
 struct SlipStats {
+    onset: f64,
     /// Interval before it, in s.
     interval: f64,
     /// The interval in periods of the modulation at its end.
@@ -113,6 +114,7 @@ impl SlipStats {
     fn of(slip: &Slip) -> Self {
         let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
         Self {
+            onset: slip.onset,
             interval: or_missing(slip.interval),
             periods: or_missing(
                 slip.interval
@@ -128,6 +130,7 @@ impl SlipStats {
     fn to_come(interval: f64, period: Option<f64>) -> Self {
         let periods = period.map_or(f64::NAN, |period| interval / period);
         Self {
+            onset: f64::NAN,
             interval,
             periods,
             phase: f64::NAN,
@@ -243,7 +246,13 @@ impl SetSlips {
                 .map(|periods| unit(TAU * periods.fract()))
         })
         .centred();
-        let of_phases = sequences(&by_job, |slip| non_nan(slip.phase).map(unit)).centred();
+        let tau_mean = intervals.mean().map(mean);
+        let cycles = Cycles::of(&jobs.parameters, tau_mean);
+        let in_cycles: Vec<&[SlipStats]> = match &cycles {
+            None => by_job.clone(),
+            Some(cycles) => cycles.within(&by_job, |slip| slip.onset),
+        };
+        let of_phases = sequences(&in_cycles, |slip| non_nan(slip.phase).map(unit)).centred();
         let (locking, phases) = (of_intervals.1, of_phases.1);
 
         let phase_interval = phases.direction_interval(top);
@@ -266,6 +275,7 @@ impl SetSlips {
         let friction = jobs.over_time(|job| job.friction);
         let attached_fraction = jobs.over_time(|job| job.attached_fraction);
         let slip_share = jobs.over_time(|job| job.slip_share);
+        let can_lock = periods != Some(0);
         let row = SetRow {
             set_id: jobs.set_id,
             frequency: jobs.parameters.frequency(),
@@ -281,7 +291,7 @@ impl SetSlips {
             intervals: tau.sorted.len() as u64,
             effective_slips: phases.effective(),
             effective_intervals: intervals.effective(),
-            tau_mean: intervals.mean().map(mean),
+            tau_mean,
             tau_interval: intervals
                 .interval_with(unseen(&|tongue| tongue.of_mean(step(&intervals)))),
             tau_bound: tau.bound(),
@@ -295,9 +305,10 @@ impl SetSlips {
             tau_95,
             periods_mean,
             periods,
-            locking_index: locking.resultant_length(),
+            locking_index: locking.resultant_length().filter(|_| can_lock),
             locking_interval: locking
-                .length_interval(&of_intervals.0, unseen(&Tongue::of_intervals)),
+                .length_interval(&of_intervals.0, unseen(&Tongue::of_intervals))
+                .filter(|_| can_lock),
             phase_mean: phases.direction(top),
             phase_interval,
             has_phase: phase_interval.is_some_and(|Interval { low, high }| high - low < WHOLE_TURN),
@@ -331,6 +342,47 @@ impl SetSlips {
             phases: of_phases,
             locking: of_intervals,
             tongue,
+            cycles,
+        }
+    }
+}
+
+/// Whole cycles of a modulation that is as slow as slips follow each other, or slower: a run holds few of them, and where it
+/// begins and ends would be a phase.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cycles {
+    period: f64,
+}
+
+impl Cycles {
+    /// Cycles that a job must have on average.
+    const MIN: f64 = 2.0;
+
+    /// Those of a set with this mean interval; `None` if all slips count.
+    fn of(parameters: &Parameters, tau_mean: Option<f64>) -> Option<Self> {
+        let period = parameters.modulation_period?;
+        let is_slow = parameters.ramp_time == 0.0 && period >= tau_mean?;
+        is_slow.then_some(Self { period })
+    }
+
+    /// Of each job, the slips within whole cycles from its first one on; none if these are too few.
+    pub(super) fn within<'a, T>(self, jobs: &[&'a [T]], onset: impl Fn(&T) -> f64) -> Vec<&'a [T]> {
+        let mut total = 0.0;
+        let mut of_job = |slips: &&'a [T]| -> &'a [T] {
+            let onsets = || slips.iter().map(&onset).filter(|onset| !onset.is_nan());
+            let Some((first, last)) = onsets().next().zip(onsets().last()) else {
+                return &[];
+            };
+            let cycles = ((last - first) / self.period).floor();
+            total += cycles;
+            let end = first + cycles * self.period;
+            &slips[..onsets().take_while(|onset| *onset < end).count()]
+        };
+        let within = jobs.iter().map(&mut of_job).collect();
+        if total >= Self::MIN * jobs.len() as f64 {
+            within
+        } else {
+            Vec::new()
         }
     }
 }
@@ -439,6 +491,8 @@ pub(super) struct FinishedSet {
     /// Intervals in periods, as angles.
     pub(super) locking: OfSet,
     pub(super) tongue: Option<Tongue>,
+    /// The cycles within which phases count, if not all do.
+    pub(super) cycles: Option<Cycles>,
 }
 
 #[cfg(test)]

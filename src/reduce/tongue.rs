@@ -13,7 +13,7 @@ const MAX_JITTER: f64 = 0.1;
 const OF_PHASES: f64 = 0.75;
 
 /// The same of the intervals before and after it, as angles.
-const OF_INTERVALS: f64 = 1.3;
+const OF_INTERVALS: f64 = 1.4;
 
 /// Periods that are missing after an interval shorter than n: most are followed by one that is as much longer.
 const OF_SHORTER: f64 = 0.4;

@@ -8,7 +8,7 @@ use super::axes::Axis;
 use super::grid::{Sweep, find_rows};
 use super::quantity::{Point, Quantity};
 use super::rounds::{Bounds, Refinement, Round, Rounds, Standing};
-use crate::model::{Parameters, Symbol};
+use crate::model::Parameters;
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
 
@@ -27,7 +27,7 @@ impl Sweep {
     pub fn seed_axis(&self) -> Option<usize> {
         self.axes
             .iter()
-            .position(|axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)])
+            .position(|axis| axis.quantities() == [Quantity::SEED])
     }
 
     /// Number of seeds of a set in the grid.
@@ -82,14 +82,7 @@ impl Sweep {
 
     /// The set of a job with these canonical parameters, whatever its seed.
     pub fn set_with(&self, parameters: &Parameters) -> Option<u64> {
-        let mut point = Point {
-            parameters: parameters.clone(),
-            fixes_period: None,
-        };
-        if let Some(axis) = self.seed_axis() {
-            self.axes[axis].apply(0, &mut point);
-        }
-        self.find(&point.parameters).map(|point| self.set_of(point))
+        self.find_set(parameters).map(|point| self.set_of(point))
     }
 
     /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ in

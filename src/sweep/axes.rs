@@ -35,7 +35,7 @@ pub(super) enum Axis {
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     pub columns: Vec<Column>,
-    /// Rows in the order of the parameters that they lead to, the period last.
+    /// Rows in the order of the parameters that they lead to, the seed and then the period last.
     sorted: Vec<u32>,
     /// For each row, whether no earlier one equals it in all but what fixes the period.
     is_first: Vec<bool>,
@@ -53,7 +53,7 @@ impl Axis {
     pub fn table(columns: Vec<Column>) -> Result<Self, Repeated> {
         let period = columns.iter().find(|column| column.quantity.is_period());
         let ranks = |row: u32| {
-            let others = columns.iter().filter(|column| !column.quantity.is_period());
+            let others = but_seed(&columns).chain(columns.iter().filter(|column| column.is_seed()));
             let others: Vec<Value> = others.map(|column| column.values[row as usize]).collect();
             (others, period.map(|period| period.rank(row)), row)
         };
@@ -131,6 +131,35 @@ impl Axis {
         column.map(|column| &*column.values)
     }
 
+    /// The seeds of the rows that can lead to these parameters but for the seed; `None` if it does not move the seed.
+    pub fn seeds<'a>(
+        &'a self,
+        wanted: &'a Parameters,
+    ) -> Option<Box<dyn Iterator<Item = u64> + 'a>> {
+        let table = match self {
+            Self::Counted {
+                symbol,
+                first,
+                count,
+            } => {
+                return (*symbol == Symbol::Seed)
+                    .then(|| Box::new(*first..first + count) as Box<dyn Iterator<Item = u64>>);
+            }
+            Self::Table(table) => table,
+        };
+        let seeds = table.columns.iter().find(|column| column.is_seed())?;
+        let order = move |row: &u32| table.compare_but_seed(*row, wanted);
+        let begin = table.sorted.partition_point(|row| order(row).is_lt());
+        let found = table.sorted[begin..]
+            .iter()
+            .take_while(move |row| order(row).is_eq());
+        let seed = |row: &u32| match seeds.values[*row as usize] {
+            Value::Count(seed) => Some(seed),
+            _ => None,
+        };
+        Some(Box::new(found.filter_map(seed)))
+    }
+
     /// The only row that can lead to these parameters; without modulation the first of those that differ in the period alone.
     pub fn find(&self, wanted: &Parameters) -> Option<u64> {
         match self {
@@ -159,18 +188,30 @@ impl Axis {
     }
 }
 
+/// The columns that fix neither the seed nor the period.
+fn but_seed(columns: &[Column]) -> impl Iterator<Item = &Column> {
+    columns
+        .iter()
+        .filter(|column| !column.is_seed() && !column.quantity.is_period())
+}
+
 impl Table {
     /// Where a row stands among the sorted ones, against one that leads to these parameters.
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
-        let columns = |fix_period| {
-            self.columns
-                .iter()
-                .filter(move |column| column.quantity.is_period() == fix_period)
+        let of = |is_last: fn(&Column) -> bool| {
+            let mut last = self.columns.iter().filter(move |column| is_last(column));
+            last.next()
+                .map_or(Ordering::Equal, |column| column.compare(row, wanted))
         };
-        let mut orders = columns(false)
-            .chain(columns(true))
-            .map(|column| column.compare(row, wanted));
-        orders
+        self.compare_but_seed(row, wanted)
+            .then_with(|| of(Column::is_seed))
+            .then_with(|| of(|column| column.quantity.is_period()))
+    }
+
+    /// The same, whatever seed and period.
+    fn compare_but_seed(&self, row: u32, wanted: &Parameters) -> Ordering {
+        but_seed(&self.columns)
+            .map(|column| column.compare(row, wanted))
             .find(|order| order.is_ne())
             .unwrap_or(Ordering::Equal)
     }
@@ -197,6 +238,10 @@ impl Column {
                 _ => Ordering::Equal,
             },
         }
+    }
+
+    fn is_seed(&self) -> bool {
+        self.quantity == Quantity::SEED
     }
 
     fn is_inverse_period(&self) -> bool {

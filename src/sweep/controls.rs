@@ -1,15 +1,20 @@
 //! Controls: the same jobs without modulation, from which follows what the drive alone explains (`control = true`).
 //!
 //! They are points of the sweep, after those of its grid: its axes but for those of the modulation, and the conditions that
-//! name none of them. What is a job of the grid anyway is no control.
+//! name none of them, as far as a modulated job needs them. What is a job of the grid anyway is no control; and what any
+//! grid of a directory has had is none there, whatever the seeds.
 
 use super::axes::{Axis, Column};
 use super::grid::Sweep;
-use super::quantity::Quantity;
+use super::plan::Plan;
+use super::quantity::{Point, Quantity};
 use super::rounds::merged;
 use crate::model::{Parameters, Symbol};
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::ops::RangeInclusive;
+
+/// The version of the plan from which controls that no job needs are left out.
+const ONLY_NEEDED: u32 = 7;
 
 impl Quantity {
     /// Whether it means nothing without modulation, or is the amplitude.
@@ -57,28 +62,35 @@ impl Sweep {
                 .into_iter()
                 .any(|name| name.is_of_modulation())
         });
-        Self {
+        let mut controls = Self {
             base: self.base.without_modulation(),
             axes: self.axes.iter().filter_map(Axis::unmodulated).collect(),
             conditions: conditions.cloned().collect(),
             rounds: None,
             controls: None,
             ..self.clone()
+        };
+        let drops_conditions = controls.conditions.len() < self.conditions.len();
+        if drops_conditions && self.plan_version >= ONLY_NEEDED {
+            controls.needed = Some(self.needed_of(&controls));
         }
+        controls
     }
 
-    /// Whether these canonical parameters are a job as a control alone.
-    pub fn is_control(&self, parameters: &Parameters) -> bool {
-        self.controls.is_some()
-            && self
-                .find(parameters)
-                .is_some_and(|point| point >= self.point_count())
-    }
-
-    /// Id of the set that is the control of a modulated job; `None` if the sweep has no controls.
-    pub fn control_of(&self, parameters: &Parameters) -> Option<String> {
-        let is_wanted = self.controls.is_some() && parameters.modulation_amplitude > 0.0;
-        is_wanted.then(|| self.set_id(&parameters.without_modulation()))
+    /// The sets of the sweep of its controls that its modulated jobs need, in order.
+    fn needed_of(&self, controls: &Self) -> Vec<u64> {
+        let set = |point: Point| {
+            (point.is_modulated() && self.admits(&point))
+                .then(|| controls.set_with(&point.parameters.without_modulation()))
+                .flatten()
+        };
+        let sets: BTreeSet<u64> = if self.reads_seed() {
+            let points = self.admitted(0..self.point_count());
+            points.filter_map(|(_, point)| set(point)).collect()
+        } else {
+            self.points_of_one_seed().filter_map(set).collect()
+        };
+        sets.into_iter().collect()
     }
 
     /// These points of the grid, and the controls of their jobs.
@@ -110,9 +122,25 @@ impl Sweep {
     }
 }
 
+impl Plan<'_> {
+    /// Whether a set was run as a control alone: no grid has ever had it.
+    pub fn is_control(self, set: &Parameters) -> bool {
+        set.modulation_amplitude == 0.0
+            && self
+                .sweeps()
+                .all(|sweep| sweep.find_set_in_grid(set).is_none())
+    }
+
+    /// Id of the set that is the control of a modulated one; `None` if no sweep has asked for controls.
+    pub fn control_of(self, set: &Parameters) -> Option<String> {
+        let sweep = self.sweeps().find(|sweep| sweep.controls.is_some())?;
+        (set.modulation_amplitude > 0.0).then(|| sweep.set_id(&set.without_modulation()))
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::Job;
+    use super::super::{Extension, Job, PLAN_VERSION};
     use super::*;
     use std::path::Path;
 
@@ -133,6 +161,8 @@ mod tests {
         let axes = "[axes]\nV0 = [1e-5, 1e-4]\nDelta = [3e-7, 6e-7]\neta = [0.5, 2, 7]\nseed = { count = 4 }\n";
         let sweep = sweep(axes);
         let jobs = controls(&sweep);
+        let extensions = [Extension::new(&sweep, &[])];
+        let plan = Plan::new(&extensions);
         assert_eq!(
             (sweep.point_count(), sweep.jobs().count(), jobs.len()),
             (48, 56, 8)
@@ -143,18 +173,15 @@ mod tests {
                     && job.parameters.clone().validated().is_ok()
             );
             assert_eq!(sweep.find(&job.parameters), Some(job.point));
-            assert!(sweep.is_control(&job.parameters) && sweep.contains(&job.parameters));
+            assert!(plan.is_control(&job.parameters) && sweep.contains(&job.parameters));
         }
         let first = sweep.jobs().next().unwrap().parameters;
         let own = sweep
             .jobs()
             .find(|job| job.parameters == first.without_modulation())
             .unwrap();
-        assert_eq!(
-            sweep.control_of(&first),
-            Some(sweep.set_id(&own.parameters))
-        );
-        assert_eq!(sweep.control_of(&own.parameters), None);
+        assert_eq!(plan.control_of(&first), Some(sweep.set_id(&own.parameters)));
+        assert_eq!(plan.control_of(&own.parameters), None);
     }
 
     #[test]
@@ -175,6 +202,70 @@ mod tests {
             .map(|job| (job.parameters.blocks, job.parameters.drive_velocity))
             .collect();
         assert_eq!(of, [(9, 1e-5), (70, 1e-5)]);
+    }
+
+    #[test]
+    fn only_controls_that_a_job_needs_are_run_but_a_directory_keeps_those_of_its_version() {
+        let text = |condition: &str| {
+            format!(
+                "name = \"a\"\nwhere = \"{condition}\"\n[record]\ncontrol = true\n[axes]\nV0 = [1e-5, 1e-4]\n\
+                 Delta = [3e-7, 6e-7]\neta = [0.5, 2]\nseed = {{ first = 3, count = 2 }}\n"
+            )
+        };
+        let velocities = |condition: &str, version: u32| -> Vec<(f64, u64)> {
+            let sweep = Sweep::parse_stored(&text(condition), Path::new("test.toml"), version);
+            controls(&sweep.unwrap())
+                .iter()
+                .map(|job| (job.parameters.drive_velocity, job.parameters.seed))
+                .collect()
+        };
+        let (slow, fast) = ([(1e-5, 3), (1e-5, 4)], [(1e-4, 3), (1e-4, 4)]);
+        let all = [slow, fast].concat();
+        for condition in [
+            "V0 * eta < 1.5e-4",
+            "eta < 1 and V0 < 5e-5",
+            "eta < V0 * 1e4",
+        ] {
+            assert_eq!(velocities(condition, ONLY_NEEDED - 1), all, "{condition}");
+        }
+        assert_eq!(velocities("V0 * eta < 1.5e-4", PLAN_VERSION), all);
+        assert_eq!(velocities("eta < 1 and V0 < 5e-5", PLAN_VERSION), slow);
+        assert_eq!(velocities("eta < V0 * 1e4", PLAN_VERSION), fast);
+        assert_eq!(
+            velocities("seed > 3 and V0 * eta > 1e-4", PLAN_VERSION),
+            fast
+        );
+    }
+
+    #[test]
+    fn a_set_is_a_control_if_no_grid_of_the_directory_had_it_whatever_the_seeds() {
+        let axes = |delta: &str, seeds: &str| {
+            format!("[model]\nfrequency = 29\n[axes]\nDelta = {delta}\nseed = {seeds}\n")
+        };
+        let plain = |axes: &str| {
+            Sweep::parse(&format!("name = \"a\"\n{axes}"), Path::new("test.toml")).unwrap()
+        };
+        let modulated = axes("[1e-6]", "{ count = 4 }");
+        let later = axes("[1e-6]", "{ first = 4, count = 4 }");
+        let set = controls(&sweep(&modulated)).remove(0).parameters;
+        assert_eq!(set.seed, 0);
+        let is_control = |sweeps: &[Sweep]| {
+            let extensions: Vec<Extension> = sweeps
+                .iter()
+                .map(|sweep| Extension::new(sweep, &[]))
+                .collect();
+            Plan::new(&extensions).is_control(&set)
+        };
+        assert!(
+            is_control(&[sweep(&modulated), sweep(&later)]),
+            "other seeds"
+        );
+        assert!(
+            is_control(&[sweep(&modulated), plain(&modulated)]),
+            "no longer asked for"
+        );
+        let both = plain(&axes("[0, 1e-6]", "{ first = 9, count = 1 }"));
+        assert!(!is_control(&[both, sweep(&modulated)]), "a set of a grid");
     }
 
     #[test]

@@ -11,10 +11,14 @@ use super::expression::Expression;
 use super::job::{Identity, Job, settings};
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
+use crate::model::theory::to_twelve_digits;
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;
 use crate::solver::Solver;
 use std::ops::Range;
+
+/// The version of the plan from which conditions see twelve digits of what fixes the period.
+const CONDITIONS_SEE_COLUMNS: u32 = 7;
 
 #[derive(Clone, Debug)]
 pub struct Sweep {
@@ -30,6 +34,10 @@ pub struct Sweep {
     pub(super) rounds: Option<Rounds>,
     /// The sweep of its controls; see `controls.rs`.
     pub(super) controls: Option<Box<Self>>,
+    /// Of a sweep of controls, its sets that are run, in order; `None`: all.
+    pub(super) needed: Option<Vec<u64>>,
+    /// The version of the plan by which it is read.
+    pub(super) plan_version: u32,
 }
 
 impl Sweep {
@@ -125,6 +133,13 @@ impl Sweep {
         self.find_in_grid(parameters).or_else(control)
     }
 
+    /// Number of the point of a job with these canonical parameters, whatever its seed.
+    pub fn find_set(&self, parameters: &Parameters) -> Option<u64> {
+        let control =
+            || Some(self.point_count() + self.controls.as_ref()?.find_set_in_grid(parameters)?);
+        self.find_set_in_grid(parameters).or_else(control)
+    }
+
     fn find_in_grid(&self, parameters: &Parameters) -> Option<u64> {
         let rows: Vec<u64> = self
             .axes
@@ -132,13 +147,41 @@ impl Sweep {
             .map(|axis| axis.find(parameters))
             .collect::<Option<_>>()?;
         let point = self.point(&rows).canonical();
-        let is_job = point.parameters == *parameters && self.admits(&point);
-        is_job.then(|| {
+        let number = || {
             self.axes
                 .iter()
                 .zip(rows)
                 .fold(0, |number, (axis, row)| number * axis.len() + row)
-        })
+        };
+        let is_job = point.parameters == *parameters && self.admits(&point);
+        is_job.then(number).filter(|&number| self.is_needed(number))
+    }
+
+    /// Number of a point of the grid with these canonical parameters, whatever the seed.
+    pub(super) fn find_set_in_grid(&self, parameters: &Parameters) -> Option<u64> {
+        // Where no condition reads the seed, all seeds are jobs or none is.
+        let tried = if self.reads_seed() { usize::MAX } else { 1 };
+        let seeds = self.axes.iter().find_map(|axis| axis.seeds(parameters));
+        seeds
+            .unwrap_or_else(|| Box::new(std::iter::once(self.base.seed)))
+            .take(tried)
+            .find_map(|seed| {
+                self.find_in_grid(&Parameters {
+                    seed,
+                    ..parameters.clone()
+                })
+            })
+    }
+
+    /// Whether a condition reads the seed.
+    pub(super) fn reads_seed(&self) -> bool {
+        let mut names = self.conditions.iter().flat_map(Expression::names);
+        names.any(|name| *name == Quantity::SEED)
+    }
+
+    fn is_needed(&self, number: u64) -> bool {
+        let is_among = |needed: &Vec<u64>| needed.binary_search(&self.set_of(number)).is_ok();
+        self.needed.as_ref().is_none_or(is_among)
     }
 
     pub fn job_id(&self, parameters: &Parameters) -> String {
@@ -208,7 +251,7 @@ impl Sweep {
         points: Range<u64>,
     ) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
         self.walk(self.row_counts(), points)
-            .filter(|(_, point)| self.admits(point))
+            .filter(|(number, point)| self.admits(point) && self.is_needed(*number))
     }
 
     /// The points of one seed that are jobs if the conditions hold, in canonical form.
@@ -254,11 +297,20 @@ impl Sweep {
         point
     }
 
-    /// Whether a canonical point fulfils the conditions.
-    fn admits(&self, point: &Point) -> bool {
+    /// Whether a canonical point fulfils the conditions, which see η and the frequency as columns have them.
+    pub(super) fn admits(&self, point: &Point) -> bool {
+        let number = |&quantity: &Quantity| {
+            let number = point.number(quantity);
+            let is_derived = matches!(quantity, Quantity::Eta | Quantity::Frequency);
+            if is_derived && self.plan_version >= CONDITIONS_SEE_COLUMNS {
+                to_twelve_digits(number)
+            } else {
+                number
+            }
+        };
         self.conditions
             .iter()
-            .all(|condition| condition.evaluate(&|&quantity| point.number(quantity)) == 1.0)
+            .all(|condition| condition.evaluate(&number) == 1.0)
     }
 }
 

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-9;
 pub const PART_JOBS: usize = 4096;
 /// Version of how sweeps become parts: values of axes, order, cost and limits. A directory keeps the one that it was started
 /// with.
-pub const PLAN_VERSION: u32 = 6;
+pub const PLAN_VERSION: u32 = 7;
 
 /// A sweep of a directory, and what of it counts there.
 #[derive(Clone, Debug)]
@@ -167,6 +167,13 @@ impl<'a> Plan<'a> {
     /// The plan of these extensions. Their sweeps differ in axes, conditions and bounds only, see [`Sweep::differences`].
     pub const fn new(extensions: &'a [Extension]) -> Self {
         Self { extensions }
+    }
+
+    /// The sweeps, those of rounds once.
+    pub fn sweeps(self) -> impl Iterator<Item = &'a Sweep> + use<'a> {
+        self.extensions
+            .chunk_by(|left, right| left.sweep.text() == right.sweep.text())
+            .filter_map(|rounds| Some(&rounds.first()?.sweep))
     }
 
     /// The parts of an extension, in order.

@@ -24,6 +24,7 @@ const DERIVABLE: RangeInclusive<f64> = 1e-100..=1e100;
 
 impl Quantity {
     pub const BREAK_ON: Self = Self::Parameter(Symbol::BreakOn);
+    pub const SEED: Self = Self::Parameter(Symbol::Seed);
 
     pub const fn key(self) -> &'static str {
         match self {
@@ -161,8 +162,18 @@ impl Point {
     pub fn number(&self, quantity: Quantity) -> f64 {
         match (quantity, self.fixes_period) {
             (_, Some((fixing, value))) if fixing == quantity && self.is_modulated() => value,
-            (Quantity::Eta, _) => self.parameters.eta(),
-            (Quantity::Frequency, _) => self.parameters.frequency().unwrap_or(0.0),
+            (Quantity::Eta, _) => {
+                let Parameters {
+                    modulation_amplitude,
+                    drive_velocity,
+                    ..
+                } = self.parameters;
+                self.parameters.modulation_frequency() * modulation_amplitude / drive_velocity
+            }
+            (Quantity::Frequency, _) => self
+                .parameters
+                .modulation_period
+                .map_or(0.0, |period| 1.0 / period),
             (Quantity::Parameter(Symbol::T), _) => {
                 self.parameters.modulation_period.unwrap_or(f64::INFINITY)
             }

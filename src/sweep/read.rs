@@ -9,12 +9,13 @@ use super::checks::{self, Places};
 use super::expression::Expression;
 use super::grid::Sweep;
 use super::job::Identity;
+use super::plan::PLAN_VERSION;
 use super::quantity::Quantity;
 use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{MAX_SETS, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
-use crate::model::{Parameters, Symbol};
+use crate::model::Parameters;
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver, TOLERANCES};
 use crate::table::storage::{Disk, Storage};
@@ -39,18 +40,19 @@ impl Sweep {
     /// Reads the text of a sweep file; the path is for messages only.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SweepError> {
         let source = Source::new(path, text);
-        read(&source, true).map_err(|_| source.error())
+        read(&source, true, PLAN_VERSION).map_err(|_| source.error())
     }
 
-    /// The same with a text that a results directory holds: what its sweep was allowed when it began stays readable.
-    pub fn parse_stored(text: &str, path: &Path) -> Result<Self, SweepError> {
+    /// The same with a text that a results directory holds, under its version of the plan: what its sweep was allowed when it
+    /// began stays readable.
+    pub fn parse_stored(text: &str, path: &Path, plan_version: u32) -> Result<Self, SweepError> {
         let source = Source::new(path, text);
-        read(&source, false).map_err(|_| source.error())
+        read(&source, false, plan_version).map_err(|_| source.error())
     }
 }
 
 /// Reads all of a file, as far as it goes.
-fn read(source: &Source<'_>, is_new: bool) -> Result<Sweep, Refused> {
+fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, Refused> {
     let table = source.table()?;
     let file = Section {
         source,
@@ -136,6 +138,8 @@ fn read(source: &Source<'_>, is_new: bool) -> Result<Sweep, Refused> {
         identity,
         rounds,
         controls: None,
+        needed: None,
+        plan_version,
     };
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places, is_new)?;
@@ -244,7 +248,7 @@ fn read_conditions(
     rounds: Option<&str>,
 ) -> Result<Vec<Expression<Quantity>>, Refused> {
     let quantity = |name: &str| match (Quantity::comparable(name)?, rounds) {
-        (Quantity::Parameter(Symbol::Seed), Some(section)) => Err(format!(
+        (Quantity::SEED, Some(section)) => Err(format!(
             "seed is chosen by {section}; leave it out of conditions, and begin at another seed by \
              seeds = {{ first = .., from = .., to = .. }}"
         )),

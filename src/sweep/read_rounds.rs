@@ -58,7 +58,7 @@ pub(super) type Seeds = (RangeInclusive<u64>, u64, Axis);
 pub(super) fn read_seeds(section: &Section<'_>, places: &mut Places<'_>) -> Result<Seeds, Refused> {
     let form = "seeds of a set at first and at most, such as { from = 24, to = 256 }";
     let entry = section.required("seeds", "write seeds = { from = 24, to = 256 }")?;
-    places.set(Quantity::Parameter(Symbol::Seed), entry.at, section.title);
+    places.set(Quantity::SEED, entry.at, section.title);
     let table = entry.section("seeds").ok_or_else(|| entry.must_be(form))?;
     table.only(&["first", "from", "to"])?;
     let asked = table.required("from", form)?.count(2, MAX_ROWS)?;

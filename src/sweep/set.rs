@@ -50,13 +50,13 @@ columns! {
         tau_95: Option<f64> = "s", "95 % quantile";
         periods_mean: Option<f64> = "", "mean of the intervals over T at their onset";
         periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded";
-        locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods";
+        locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods; null where `periods` is 0";
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
         locking_index_drive: Option<f64> = "",
             "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control";
         locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: what the slider adds";
         locking_excess_interval as "locking_index_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        phase_mean: Option<f64> = "rad", "circular mean of the phase";
+        phase_mean: Option<f64> = "rad", "circular mean of the phase; if T is tau_mean or more, over whole cycles from the first onset of each job, and null below two of them a job";
         phase_interval as "phase_mean": Option<Interval> = "rad",
             "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
         has_phase: bool = "", "whether directions are excluded: the interval of phase_mean is known, and narrower than 3/2 pi";

@@ -1,6 +1,6 @@
 //! Controls of the built program: what the drive alone explains, added to a finished sweep.
 
-use crate::program::{Folder, json};
+use crate::program::{Cell, Folder, json};
 
 const SWEEP: &str = "name = \"small\"\n[model]\nN = 10\nNs = 5\nfrequency = 29\n[axes]\nDelta = [3e-7, 1e-6]\nV0 = [5e-5, 1e-4]\n\
                      seed = { count = 3 }\n[record]\nslips = 12\n";
@@ -42,4 +42,47 @@ fn controls_run_once_for_the_other_values_and_are_no_sets_of_their_own() {
         let cells = |out: &str| folder.file(&format!("{out}/reduced/{table}.parquet")).cells;
         assert!(cells("out") == cells("whole"), "{table}");
     }
+}
+
+#[test]
+fn a_control_stays_one_whatever_a_later_sweep_asks_for() {
+    let folder = Folder::new();
+    let asking = format!("{SWEEP}control = true\n");
+    folder.write("control.toml", &asking);
+    folder.write("plain.toml", SWEEP);
+    folder.write(
+        "later.toml",
+        &asking.replace("{ count = 3 }", "{ first = 3, count = 2 }"),
+    );
+    folder.ends(0, "run control.toml --out out");
+    let excess = |sets: usize| {
+        let rows = folder.file("out/reduced/sets.parquet");
+        let controls = rows
+            .column("control")
+            .filter(|cell| **cell == Cell::Flag(true));
+        assert_eq!(controls.count(), 2);
+        assert_eq!(rows.reals("resultant_excess").len(), sets);
+    };
+    excess(4);
+    // The file as it was, without the key.
+    folder.ends(0, "run plain.toml --out out");
+    assert_eq!(
+        folder.ends(0, "show out --csv").stdout.lines().count(),
+        1 + 4
+    );
+    excess(4);
+    // Other seeds: those of the controls' first ones have left the sweep.
+    folder.ends(0, "run later.toml --out out");
+    assert_eq!(
+        folder.ends(0, "show out --csv").stdout.lines().count(),
+        1 + 4
+    );
+    excess(4);
+    // In a sweep that has them as sets they are sets.
+    folder.write("sets.toml", &asking.replace("[3e-7, 1e-6]", "[0, 1e-6]"));
+    folder.ends(0, "run sets.toml --out out");
+    assert_eq!(
+        folder.ends(0, "show out --csv").stdout.lines().count(),
+        1 + 6
+    );
 }

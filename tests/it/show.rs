@@ -165,7 +165,7 @@ fn directories_are_compared_seed_by_seed_where_all_that_varies_agrees() {
     let pairs = sets("show a b --json");
     assert_eq!(pairs.len(), 2, "without modulation, and 58 Hz");
     for pair in &pairs {
-        assert_eq!(number(pair, "seeds"), Some(4.0));
+        assert_eq!(pair["seeds"].as_u64(), Some(4), "a whole number");
         let [a, b, difference, low, high] =
             ["a", "b", "difference", "difference_low", "difference_high"]
                 .map(|end| number(pair, &format!("tau_mean_{end}")).unwrap());
@@ -174,16 +174,53 @@ fn directories_are_compared_seed_by_seed_where_all_that_varies_agrees() {
             "{pair}"
         );
     }
-    // As the table of sets says, where every seed has as many slips.
-    let alone = sets("show a --json");
-    assert!(
-        (number(&alone[0], "tau_mean").unwrap() - number(&pairs[0], "tau_mean_a").unwrap()).abs()
-            < 1e-12
-    );
+    let frequencies: Vec<_> = pairs.iter().map(|pair| number(pair, "frequency")).collect();
+    assert!(frequencies.contains(&Some(58.0)), "{frequencies:?}");
+    // As the table of sets says, also where runs end within an interval.
+    folder.write("cut.toml", &format!("{SWEEP}max_time = 0.5\n"));
+    folder.ends(0, "run cut.toml --out cut");
+    for directory in ["a", "cut"] {
+        let alone = sets(&format!("show {directory} --json"));
+        let pairs = sets(&format!("show {directory} {directory} --json"));
+        assert_eq!(alone.len(), pairs.len());
+        for key in ["tau_mean", "mean_friction", "resultant_length"] {
+            let of = |sets: &[serde_json::Value], key: &str| -> Vec<_> {
+                sets.iter().map(|set| number(set, key)).collect()
+            };
+            assert_eq!(
+                of(&alone, key),
+                of(&pairs, &format!("{key}_a")),
+                "{directory}"
+            );
+        }
+    }
     assert!(
         sets("show a a --json")
             .iter()
             .all(|pair| number(pair, "mean_friction_difference") == Some(0.0))
+    );
+}
+
+#[test]
+fn sets_of_a_zip_with_seeds_are_in_the_sweep_and_those_that_left_it_are_named() {
+    let folder = Folder::new();
+    let sweep = |velocities: &str, seeds: &str| {
+        format!(
+            "name = \"zip\"\n[model]\nN = 2\nNs = 2\n[axes]\nzip = [{{ V0 = {velocities}, seed = {seeds} }}]\n\
+             [record]\nslips = 2\ndiscard = 0\n"
+        )
+    };
+    folder.write(
+        "zip.toml",
+        &sweep("[1e-4, 2e-4, 1e-4, 3e-4]", "[3, 4, 5, 3]"),
+    );
+    let run = folder.ends(0, "run zip.toml --out out").stdout;
+    assert!(!run.contains("no longer in the sweep"), "{run}");
+    folder.write("zip.toml", &sweep("[1e-4, 2e-4]", "[7, 4]"));
+    let narrowed = folder.ends(0, "run zip.toml --out out").stdout;
+    assert!(
+        narrowed.contains("no longer in the sweep: 1 set of these: V₀ = 300 µm/s\n"),
+        "{narrowed}"
     );
 }
 
@@ -238,7 +275,9 @@ fn jobs_without_slips_are_told_with_a_command_that_shows_one() {
     folder.write("fast.toml", &fast.replace("[1e-4, 1]", "[1e-4]"));
     let narrowed = folder.ends(0, "run fast.toml --out out").stdout;
     assert!(
-        narrowed.contains(&format!("{note}\nno longer in the sweep: 1 set of these\n")),
+        narrowed.contains(&format!(
+            "{note}\nno longer in the sweep: 1 set of these: V₀ = 1 "
+        )),
         "{narrowed}"
     );
 }
