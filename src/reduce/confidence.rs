@@ -26,6 +26,12 @@ const MAX_UNSEEN: f64 = 3.0;
 /// the others where the binomial distribution (mid-P) does, to 5 %.
 const RARE: f64 = 0.5 * MAX_UNSEEN;
 
+/// Relative error of a mean.
+pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Values of which a standard deviation or a resultant length has an error: of two, both are as far from their mean.
+pub(super) const MIN_VALUES: u64 = 3;
+
 /// What a slip of a kind that none of those seen is of would take from a sum, or add to it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Unseen {
@@ -53,7 +59,8 @@ impl Estimate<1> {
         let [skew] = self.rare.map(|rare| RARE * rare / n);
         let wide = skew.abs() + libm::hypot(half, skew);
         let error = |is_skewed: bool, unseen: f64| {
-            libm::hypot(if is_skewed { wide } else { half }, MAX_UNSEEN * unseen / n)
+            let seen = if is_skewed { wide } else { half };
+            libm::hypot(seen, MAX_UNSEEN * unseen / n).max(ROUNDING * mean.abs())
         };
         Some(Interval {
             low: mean - error(skew < 0.0, unseen.below),
@@ -72,12 +79,14 @@ impl Estimate<1> {
     }
 
     /// Standard deviation (n - 1) of the values whose squared deviations from their mean these are, and its interval; `None`
-    /// for fewer than two values.
+    /// for fewer than two values, and no interval for fewer than [`MIN_VALUES`].
     pub(super) fn deviation(&self, unseen: Unseen) -> (Option<f64>, Option<Interval>) {
         let n = self.count() as f64;
         let of_sample = |square: f64| (square.max(0.0) * n / (n - 1.0)).sqrt();
         let square = self.mean().filter(|_| n > 1.0).map(|[square]| square);
-        let ends = square.and(self.about_mean(OF_SQUARES, unseen));
+        let ends = self
+            .about_mean(OF_SQUARES, unseen)
+            .filter(|_| self.count() >= MIN_VALUES);
         (
             square.map(of_sample),
             ends.map(|squares| Interval {
@@ -118,7 +127,8 @@ impl Estimate<2> {
         ))
     }
 
-    /// Of the resultant length R of unit vectors with these deviations from their mean; `None` for fewer than two.
+    /// Of the resultant length R of unit vectors with these deviations from their mean; `None` for fewer than
+    /// [`MIN_VALUES`].
     ///
     /// Of short ones: the square of the length of a mean has the mean R² + s² + s'² and the variance 4 R² s² + 2 (s⁴ +
     /// s'⁴), with the variances s² along and s'² across. The interval contains every R from which the measured square is
@@ -129,13 +139,16 @@ impl Estimate<2> {
         deviations: &Sequences<2>,
         unseen: Unseen,
     ) -> Option<Interval> {
+        if self.count() < MIN_VALUES {
+            return None;
+        }
         let ((length, along, across), t) = (self.polar()?, student(self.freedom(1.0)?));
         if length > LONG {
             let components = deviations.along(&self.heading()?).estimate();
             let Interval { low, high } = components.interval_with(unseen)?;
             return Some(Interval {
-                low: (length + low).max(0.0),
-                high: (length + high).min(1.0),
+                low: (length + low.min(-ROUNDING)).max(0.0),
+                high: (length + high.max(ROUNDING)).min(1.0),
             });
         }
         let unbiased = length * length - along - across;

@@ -6,7 +6,7 @@
 //! the excess, of pairs of a job and its control.
 
 use super::circular::unit;
-use super::confidence::Unseen;
+use super::confidence::{MIN_VALUES, ROUNDING, Unseen};
 use super::sequence::Sequences;
 use super::set::{Cycles, FinishedSet, OfSet};
 use super::tongue::Tongue;
@@ -163,6 +163,9 @@ impl Beyond {
     /// The interval is that of the jackknife over the pairs, to first order.
     fn of_pairs(seen: &OfSet, alone: &OfSet, unseen: Unseen) -> Self {
         let ends = |excess: f64| {
+            if seen.1.count().min(alone.1.count()) < MIN_VALUES {
+                return None;
+            }
             let (seen_by, alone_by) = (Influences::of(seen)?, Influences::of(alone)?);
             let pairs = seen_by.of_jobs.iter().zip(&alone_by.of_jobs);
             let unseen = Unseen {
@@ -173,8 +176,8 @@ impl Beyond {
                 .estimate()
                 .interval_with(unseen)?;
             Some(Interval {
-                low: excess + error.low,
-                high: excess + error.high,
+                low: excess + error.low.min(-ROUNDING),
+                high: excess + error.high.max(ROUNDING),
             })
         };
         Self::with(seen, alone, ends)

@@ -3,8 +3,8 @@
 //! Contract: a function of the wanted jobs and their rows alone. What is summed over the jobs of a set is summed in the order
 //! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before.
 //!
-//! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 200 more for the jobs of
-//! [`MAX_SLIPS`] slips and 40 to 80 for each of these, and as much again for those of the set at hand; where the tables
+//! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 50 more for the jobs of
+//! [`MAX_SLIPS`] slips and 48 to 96 for each of these, and as much again for those of the set at hand; where the tables
 //! hold more, the slips are read again for the next sets.
 
 use super::drive_alone::{Controls, Explained};
@@ -39,7 +39,6 @@ columns! {
         slips: Option<u64>;
         averaged_time: Option<f64>;
         mean_friction: Option<f64>;
-        attached_fraction: Option<f64>;
         slip_share: Option<f64>;
         regime: Option<Regime>;
         running_interval: Option<f64>;

@@ -315,7 +315,7 @@ mod tests {
             [(0.0, 38, 0), (1e-6, 38, 0), (2e-6, 38, 2)]
         );
         assert!((sets[1].mean_friction.unwrap() - 430.0).abs() < 1e-9);
-        assert!((sets[1].periods_mean.unwrap() - 12.0).abs() < 0.01);
+        assert_eq!(sets[1].periods, Some(12));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::SetRow;
 use super::swept::ascending;
 use crate::model::Symbol;
 use crate::sweep::{Digits, Expression, Label, label, nearest};
-use crate::table::columns::{Column, Kind, Row, Value, columns};
+use crate::table::columns::{Column, Interval, Kind, Row, Value, columns};
 use crate::table::value::floored;
 
 pub const FREQUENCY: &str = "frequency";
@@ -14,16 +14,19 @@ columns! {
     #[derive(Clone, Copy, Debug)]
     struct Derived {
         friction_coefficient: Option<f64> = "", "mean_friction over the normal force FN";
+        friction_coefficient_interval as "friction_coefficient": Option<Interval> = "", "lower end of its 95 % confidence interval";
     }
 }
 
 impl Derived {
     fn of(row: &SetRow) -> Self {
-        let parameters = &row.parameters;
+        let coefficient = |friction: f64| friction / row.parameters.normal_force;
         Self {
-            friction_coefficient: row
-                .mean_friction
-                .map(|friction| friction / parameters.normal_force),
+            friction_coefficient: row.mean_friction.map(coefficient),
+            friction_coefficient_interval: row.mean_friction_interval.map(|ends| Interval {
+                low: coefficient(ends.low),
+                high: coefficient(ends.high),
+            }),
         }
     }
 }
@@ -223,7 +226,6 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::model::selected::Selected;
-    use crate::reduce::Interval;
 
     fn rows() -> Vec<SetRow> {
         let row = |period: Option<f64>| SetRow {

@@ -6,7 +6,7 @@ use crate::table::columns::Row;
 use std::collections::HashSet;
 
 /// Column, symbol, and what it is where its meaning does not say so in a few words.
-const LABELS: [(&str, &str, &str); 31] = [
+const LABELS: [(&str, &str, &str); 28] = [
     ("Delta", "Δ", "Amplitude"),
     ("ramp_time", "ramp time", "Duration of the ramp"),
     ("eta", "η", "η = 2πΔ / (T V₀)"),
@@ -55,21 +55,6 @@ const LABELS: [(&str, &str, &str); 31] = [
     ("peak_force_mean", "⟨F⟩ at onsets", "Mean peak force"),
     ("mean_friction", "⟨Fₛ⟩", "Mean friction"),
     ("friction_coefficient", "μ", "Friction coefficient"),
-    (
-        "edge_distance_mean",
-        "edge distance",
-        "Mean slip distance of the driven edge",
-    ),
-    (
-        "least_attached_mean",
-        "least attached",
-        "Least attached contacts in a slip",
-    ),
-    (
-        "slow_front_speed_mean",
-        "slow fronts",
-        "Mean speed of slow fronts",
-    ),
 ];
 
 /// Digits that distinguish all doubles.

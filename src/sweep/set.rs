@@ -31,7 +31,7 @@ columns! {
         jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
         slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs";
-        attached_fraction: Option<f64> = "", "fraction of contacts that are attached, over the time of all jobs";
+        slip_share_interval as "slip_share": Option<Interval> = "", "lower end of its 95 % confidence interval, of jobs as units";
         slips: u64 = "", "slips of all seeds";
         intervals: u64 = "", "intervals between slips";
         effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
@@ -48,7 +48,6 @@ columns! {
         median_interval as "tau_50": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_75: Option<f64> = "s", "75 % quantile of the intervals";
         tau_95: Option<f64> = "s", "95 % quantile";
-        periods_mean: Option<f64> = "", "mean of the intervals over T at their onset";
         periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded";
         locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods; null where `periods` is 0";
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
@@ -73,17 +72,10 @@ columns! {
         drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
         drop_deviation_interval as "drop_sd": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips";
+        peak_force_interval as "peak_force_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         mean_friction: Option<f64> = "N", "shear force, over the time of all jobs";
         mean_friction_interval as "mean_friction": Option<Interval> = "N",
             "lower end of its 95 % confidence interval, of jobs as units";
-        duration_mean: Option<f64> = "s", "mean duration of slips";
-        distance_mean as "slip_distance_mean": Option<f64> = "m", "mean distance that the blocks move in a slip";
-        edge_distance_mean: Option<f64> = "m", "mean distance that the driven edge moves in a slip";
-        least_attached_mean: Option<f64> = "", "mean of the least fraction of contacts attached during a slip";
-        onset_cut_share: Option<f64> = "", "share of slips that reached the leading edge while the shear force still rose";
-        precursors_mean: Option<f64> = "", "mean precursors per slip";
-        front_speed_mean: Option<f64> = "m/s", "mean front speed of slips";
-        slow_front_speed_mean: Option<f64> = "m/s", "mean speed of slow fronts, where there were any";
     }
 }
 
@@ -201,7 +193,8 @@ mod tests {
         };
         assert_eq!(of("tau_mean"), Some(("s", Kind::Real, true)));
         assert_eq!(of("phase_mean"), Some(("rad", Kind::Real, true)));
-        assert_eq!(of("slip_share"), Some(("", Kind::Real, false)));
+        assert_eq!(of("slip_share"), Some(("", Kind::Real, true)));
+        assert_eq!(of("tau_95"), Some(("s", Kind::Real, false)));
         for (class, kind) in [
             ("has_phase", Kind::Flag),
             ("regime", Kind::Text),
@@ -226,7 +219,7 @@ mod tests {
                 .iter()
                 .filter(|statistic| statistic.has_interval)
                 .count(),
-            11
+            13
         );
     }
 }
