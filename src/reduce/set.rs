@@ -258,7 +258,10 @@ impl SetSlips {
             jobs_without_slips: jobs.without_slips,
             regime: jobs.regime,
             slip_share: slip_share.mean().map(mean),
-            slip_share_interval: slip_share.interval(),
+            slip_share_interval: slip_share.interval().map(|ends| Interval {
+                low: ends.low.max(0.0),
+                high: ends.high.min(1.0),
+            }),
             slips,
             intervals: tau.sorted.len() as u64,
             effective_slips: phases.effective(),

@@ -6,7 +6,7 @@ use crate::table::columns::Row;
 use std::collections::HashSet;
 
 /// Column, symbol, and what it is where its meaning does not say so in a few words.
-const LABELS: [(&str, &str, &str); 28] = [
+const LABELS: [(&str, &str, &str); 27] = [
     ("Delta", "Δ", "Amplitude"),
     ("ramp_time", "ramp time", "Duration of the ramp"),
     ("eta", "η", "η = 2πΔ / (T V₀)"),
@@ -20,7 +20,6 @@ const LABELS: [(&str, &str, &str); 28] = [
     ("tau_50", "median τ", ""),
     ("tau_75", "τ(75 %)", ""),
     ("tau_95", "τ(95 %)", "95 % quantile of the intervals"),
-    ("periods_mean", "⟨τ/T⟩", "Mean interval in periods"),
     ("periods", "n", "Periods per slip"),
     ("locking_index", "locking", "Locking index of τ"),
     (
