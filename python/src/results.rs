@@ -5,7 +5,7 @@ use crate::table::Table;
 use crate::watched::watched;
 use arrow_array::cast::AsArray;
 use arrow_array::{Array, ArrayRef, RecordBatch, UInt32Array, new_null_array};
-use arrow_schema::{Field, Schema, SchemaRef};
+use arrow_schema::{Field, FieldRef, Schema, SchemaRef};
 use arrow_select::concat::concat_batches;
 use arrow_select::take::take;
 use pyo3::exceptions::PyValueError;
@@ -15,6 +15,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, renew};
+use stickslip::results::controls::{CONTROL, ControlSets, SET_ID};
 use stickslip::results::layout::Layout;
 use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, SLIPS, recorded_schema};
 use stickslip::results::{Results, ResultsError};
@@ -109,6 +110,8 @@ struct Wanted {
     /// Those of the table itself, and those of the jobs.
     own: Vec<String>,
     of_jobs: Vec<String>,
+    /// Whether the column of controls is wanted.
+    has_control: bool,
 }
 
 impl Wanted {
@@ -117,12 +120,14 @@ impl Wanted {
         columns: Option<&[String]>,
         join: bool,
     ) -> PyResult<Self> {
-        let has_jobs = [SLIPS, PRECURSORS].contains(&table);
-        let jobs = if has_jobs {
-            schema::<JobRow>()
-        } else {
-            Arc::new(Schema::empty())
+        let of_jobs: Vec<FieldRef> = match table {
+            SLIPS | PRECURSORS => schema::<JobRow>().fields().to_vec(),
+            _ => Vec::new(),
         };
+        let of_control = [SLIPS, PRECURSORS, JOBS]
+            .contains(&table)
+            .then(|| Arc::new(ControlSets::field()));
+        let jobs = Schema::new(of_jobs.into_iter().chain(of_control).collect::<Vec<_>>());
         let is_own = |name: &str| own.field_with_name(name).is_ok();
         let others = || {
             jobs.fields()
@@ -135,8 +140,9 @@ impl Wanted {
             None => own
                 .fields()
                 .iter()
-                .map(|field| field.name())
-                .cloned()
+                .map(|field| field.name().as_str())
+                .chain((table == JOBS).then_some(CONTROL))
+                .map(str::to_owned)
                 .collect(),
         };
         let joined = others()
@@ -169,12 +175,15 @@ impl Wanted {
             })?;
             fields.push(field.clone());
         }
-        let (own, of_jobs) = names.into_iter().partition(|name| is_own(name));
+        let (own, others): (Vec<_>, Vec<_>) = names.into_iter().partition(|name| is_own(name));
+        let (of_control, of_jobs): (Vec<_>, Vec<_>) =
+            others.into_iter().partition(|name| name == CONTROL);
         Ok(Self {
             table,
             schema: Arc::new(Schema::new(fields)),
             own,
             of_jobs,
+            has_control: !of_control.is_empty(),
         })
     }
 
@@ -203,6 +212,13 @@ impl Wanted {
         if !self.of_jobs.is_empty() || own.is_empty() {
             own.push(JOB_ID.to_owned());
         }
+        let mut controls = None;
+        if self.has_control {
+            controls = Some(ControlSets::of(results)?);
+            if !own.iter().any(|name| name == SET_ID) {
+                own.push(SET_ID.to_owned());
+            }
+        }
         let jobs = if self.of_jobs.is_empty() {
             None
         } else {
@@ -220,8 +236,11 @@ impl Wanted {
                 .map_err(damaged)?;
             let column = |field: &Field| -> Result<ArrayRef, Error> {
                 let name = field.name();
+                let of_control = || controls.as_ref()?.column(&batch.rows);
                 match (batch.rows.column_by_name(name), &jobs, &rows) {
                     (Some(column), ..) => Ok(Arc::clone(column)),
+                    _ if name == CONTROL && self.has_control => of_control()
+                        .ok_or_else(|| damaged(format!("there is no column {SET_ID}")).into()),
                     (None, Some(jobs), Some(rows)) if !self.own.contains(name) => {
                         jobs.take(name, rows)
                     }

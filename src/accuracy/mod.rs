@@ -20,7 +20,7 @@ pub use cost::Cost;
 pub use distance::Distances;
 pub use report::{check, to_json, write};
 pub use study::{DistanceRow, Findings, MethodRow, Study};
-pub use verdict::verdict;
+pub use verdict::{shows_bias, verdict};
 
 use crate::model::{Parameters, Symbol, Value};
 use crate::solver::{Resolve, Solver};

@@ -13,6 +13,7 @@ use super::{Method, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Recording, Slip, measure};
+use crate::reduce::student_at;
 use crate::run::cpu;
 use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate};
 use crate::table::columns::columns;
@@ -26,7 +27,7 @@ const MODULATION: (f64, f64) = (1e-6, 58.0);
 const DISCARD: u64 = 5;
 /// Tolerance of the reference ensemble.
 const ENSEMBLE_TOLERANCE: f64 = 1e-10;
-/// Seeds of the reference ensemble begin here, far from those of the methods: the samples are independent.
+/// Seeds of the reference ensemble are so far from those of the methods: the samples are independent.
 const REFERENCE_SEEDS: u64 = 1_000_000;
 /// Seeds of the reference ensemble for each one of a method: more, so that its own error matters less.
 const REFERENCE_SHARE: u64 = 2;
@@ -40,6 +41,8 @@ pub struct Study {
     pub own: Solver,
     /// Slips that the sweep records of each set; none without a sweep.
     pub slips_of_sets: Vec<u64>,
+    /// Seed of the first realisation.
+    pub first_seed: u64,
     /// Realisations of each ensemble, each timed once, in turn with those of the other solvers.
     pub seeds: u64,
     /// Multiple of these realisations at the first set; those beyond them are not timed.
@@ -74,6 +77,7 @@ impl Study {
                 resolve: Resolve::Grid,
             },
             slips_of_sets: Vec::new(),
+            first_seed: 0,
             seeds: 8,
             first_set_multiple: 8,
             slips: 100,
@@ -211,16 +215,67 @@ columns! {
         reference_slips: u64 = "", "size of the reference sample";
         mean: f64 = "", "mean";
         reference_mean: f64 = "", "mean of the reference";
+        freedom: Option<f64> = "", "degrees of freedom of the bias of the mean; null for fewer than two realisations";
         deviation: f64 = "", "standard deviation";
         reference_deviation: f64 = "", "standard deviation of the reference";
         distances: Distances;
     }
 }
 
+/// Probability with which the interval of one bias holds it.
+const CONFIDENCE: f64 = 0.95;
+
 impl DistanceRow {
     /// Of the interval of the bias of the mean.
     pub fn half_width(&self) -> f64 {
         0.5 * (self.distances.mean_bias_high - self.distances.mean_bias_low)
+    }
+
+    /// Of the interval which so many biases together lie in as surely as one in its own (Bonferroni).
+    pub fn half_width_among(&self, comparisons: usize) -> f64 {
+        let freedom = self.freedom.unwrap_or(1.0);
+        let together = 1.0 - (1.0 - CONFIDENCE) / comparisons as f64;
+        self.half_width() * student_at(together, freedom) / student_at(CONFIDENCE, freedom)
+    }
+}
+
+/// The error of a difference of two means by the spread of realisations, which are independent, as slips are not.
+#[derive(Clone, Copy, Debug)]
+struct Bias {
+    variance: f64,
+    freedom: f64,
+}
+
+impl Bias {
+    /// From the values of each realisation of both; `None` for fewer than two (Welch, Biometrika 34, 28 (1947)).
+    fn of(both: &[Vec<Vec<f64>>; 2]) -> Option<Self> {
+        let variance = |jobs: &Vec<Vec<f64>>| {
+            let jobs: Vec<_> = jobs.iter().filter(|job| !job.is_empty()).collect();
+            let sum = |job: &[f64]| job.iter().sum::<f64>();
+            let count: usize = jobs.iter().map(|job| job.len()).sum();
+            let mean = jobs.iter().map(|job| sum(job)).sum::<f64>() / count as f64;
+            let squares: f64 = jobs
+                .iter()
+                .map(|job| sum(job) - mean * job.len() as f64)
+                .map(|deviation| deviation * deviation)
+                .sum();
+            let others = jobs.len() as f64 - 1.0;
+            let scale = jobs.len() as f64 / (others * count as f64 * count as f64);
+            (others > 0.0).then_some((squares * scale, others))
+        };
+        let [(one, others), (reference, others_of_reference)] =
+            [variance(&both[0])?, variance(&both[1])?];
+        let sum = one + reference;
+        let freedom =
+            sum * sum / (one * one / others + reference * reference / others_of_reference);
+        Some(Self {
+            variance: sum,
+            freedom: if freedom.is_nan() { others } else { freedom },
+        })
+    }
+
+    fn half_width(self, confidence: f64) -> f64 {
+        student_at(confidence, self.freedom) * self.variance.sqrt()
     }
 }
 
@@ -292,25 +347,33 @@ impl Study {
         let mut findings = Findings::default();
         for (set, parameters) in self.sets.iter().enumerate() {
             report(&format!("{}: first breaks", set_in_words(parameters)));
-            let mut first_breaks = Reference::new(parameters, self.breaks);
+            let first = self.first_seed;
+            let of_first = Parameters {
+                seed: first,
+                ..parameters.clone()
+            };
+            let mut first_breaks = Reference::new(&of_first, self.breaks);
             let tightest = taylor(*TOLERANCES.start());
-            simulated(parameters, tightest, &mut first_breaks)?;
+            simulated(&of_first, tightest, &mut first_breaks)?;
             let mut errors = Vec::new();
             for &solver in &self.solvers {
-                errors.push(self.break_times(parameters, solver, &first_breaks)?);
+                errors.push(self.break_times(&of_first, solver, &first_breaks)?);
             }
             report("timed ensembles");
             let mut ensembles = self.ensembles(parameters)?;
             let seeds = self.seeds * if set == 0 { self.first_set_multiple } else { 1 };
             report("reference ensemble, and realisations that are not timed");
             let reference = taylor(ENSEMBLE_TOLERANCE);
-            let others = REFERENCE_SEEDS..REFERENCE_SEEDS + REFERENCE_SHARE * seeds;
+            let others = first + REFERENCE_SEEDS;
+            let others = others..others + REFERENCE_SHARE * seeds;
             let reference = self.slips_of(parameters, reference, others)?;
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
                 if !self.is_stretch_only(parameters, solver) {
-                    ensemble
-                        .slips
-                        .extend(self.slips_of(parameters, solver, self.seeds..seeds)?);
+                    ensemble.slips.extend(self.slips_of(
+                        parameters,
+                        solver,
+                        first + self.seeds..first + seeds,
+                    )?);
                 }
             }
             if reference.is_empty() {
@@ -403,7 +466,7 @@ impl Study {
     /// Seed by seed, every solver in turn, so that whatever slows the machine down slows down all.
     fn ensembles(&self, parameters: &Parameters) -> Result<Vec<Ensemble>> {
         let mut ensembles = vec![Ensemble::default(); self.solvers.len()];
-        for seed in 0..self.seeds {
+        for seed in self.first_seed..self.first_seed + self.seeds {
             let parameters = Parameters {
                 seed,
                 ..parameters.clone()
@@ -475,9 +538,21 @@ fn distance_rows(
     key: u64,
 ) -> Vec<DistanceRow> {
     let row = |(place, (quantity, value)): (u64, Quantity)| {
-        let [sample, reference] =
-            [slips, reference].map(|slips| slips.iter().filter_map(value).collect::<Vec<_>>());
         let key = key * QUANTITIES.len() as u64 + place;
+        let of_jobs = [slips, reference].map(|slips| {
+            // A realisation begins with its slip 0.
+            let jobs = slips.chunk_by(|_, next| next.number > 0);
+            jobs.map(|job| job.iter().filter_map(value).collect::<Vec<_>>())
+                .collect::<Vec<_>>()
+        });
+        let bias = Bias::of(&of_jobs);
+        let [sample, reference] = of_jobs.map(|jobs| jobs.concat());
+        let mut distances = distances(&sample, &reference, key)?;
+        if let Some(bias) = bias {
+            let half = bias.half_width(CONFIDENCE);
+            distances.mean_bias_low = distances.mean_bias - half;
+            distances.mean_bias_high = distances.mean_bias + half;
+        }
         Some(DistanceRow {
             parameters: Selected::new(parameters.clone()),
             case: set_in_words(parameters),
@@ -489,7 +564,8 @@ fn distance_rows(
             reference_mean: mean(&reference),
             deviation: deviation(&sample),
             reference_deviation: deviation(&reference),
-            distances: distances(&sample, &reference, key)?,
+            freedom: bias.map(|bias| bias.freedom),
+            distances,
         })
     };
     (0..).zip(QUANTITIES).filter_map(row).collect()

@@ -2,18 +2,24 @@
 //! the slips that a sweep records could tell.
 //!
 //! A bias counts if it survives the number of comparisons (Bonferroni): among all of a solver that has none, one counts by
-//! chance in one study of twenty. With few slips the bootstrap is too sure of itself, and nothing counts.
+//! chance in one study of twenty. With few slips, or one realisation, nothing counts.
 
 use super::study::{DistanceRow, Findings, MethodRow, Study};
 use super::{Method, set_in_words};
-use crate::model::standard_normal_quantile;
 
-/// Probability that chance alone makes a bias count, in all comparisons together, and in the interval of each.
-const ERROR: f64 = 0.05;
 /// Least number of slips on either side with which a bias counts.
 const MIN_SLIPS: u64 = 100;
 /// A tighter setting is one whose breaks are off by less than this share.
 const TIGHTER: f64 = 0.5;
+
+/// Whether a row shows a bias among so many comparisons.
+pub fn shows_bias(row: &DistanceRow, comparisons: usize) -> bool {
+    can_tell(row) && row.distances.mean_bias.abs() > row.half_width_among(comparisons)
+}
+
+fn can_tell(row: &DistanceRow) -> bool {
+    row.freedom.is_some() && row.slips.min(row.reference_slips) >= MIN_SLIPS
+}
 
 /// The lines, the answer first.
 pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
@@ -42,15 +48,13 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
             "{subject} ({own}): not compared, as its slips would take too long"
         )];
     };
-    // In half-widths of the interval of one comparison.
-    let deviate = |error: f64| standard_normal_quantile(1.0 - 0.5 * error);
-    let counts_from = deviate(ERROR / compared.len() as f64) / deviate(ERROR);
+    let comparisons = compared.len();
     let excess =
-        |row: &DistanceRow| row.distances.mean_bias.abs() / (counts_from * row.half_width());
+        |row: &DistanceRow| row.distances.mean_bias.abs() / row.half_width_among(comparisons);
     let most = compared
         .iter()
-        .max_by(|a, b| excess(a).total_cmp(&excess(b)))
-        .filter(|row| excess(row) > 1.0);
+        .filter(|row| shows_bias(row, comparisons))
+        .max_by(|a, b| excess(a).total_cmp(&excess(b)));
     let intervals: Vec<&DistanceRow> = compared
         .iter()
         .copied()
@@ -58,10 +62,10 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         .collect();
     let shown = intervals
         .iter()
-        .map(|row| percent(row, counts_from * row.half_width()))
+        .map(|row| percent(row, row.half_width_among(comparisons)))
         .fold(0.0, f64::max);
     let finding = match most {
-        Some(_) if slips < MIN_SLIPS => {
+        _ if !compared.iter().all(|row| can_tell(row)) => {
             format!("too few slips to tell: {slips} a side; take more --seeds or --slips")
         }
         Some(row) => format!(
@@ -70,7 +74,7 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
             percent(row, row.distances.mean_bias),
             percent(row, row.half_width()),
             set_in_words(&row.parameters),
-            compared.len()
+            comparisons
         ),
         None => {
             format!(
@@ -187,6 +191,7 @@ mod tests {
             reference_slips: 2 * slips,
             mean: 0.1 + bias,
             reference_mean: 0.1,
+            freedom: Some(1e9),
             deviation: 0.01,
             reference_deviation: 0.01,
             distances: Distances {
@@ -255,7 +260,25 @@ mod tests {
                 .contains("biased: interval by +1.20 ± 1.00 % at V0")
         );
         assert!(with(1000, -1.4e-3).contains("biased: interval by -1.40"));
-        assert!(with(24, 5e-3).contains("too few slips to tell: 24 a side"));
+        for bias in [5e-3, 0.0] {
+            assert!(with(24, bias).contains("too few slips to tell: 24 a side"));
+        }
+        // Of three degrees of freedom, 2.4 half-widths are needed for five.
+        let of_few = |bias| {
+            let row = DistanceRow {
+                freedom: Some(3.0),
+                ..row("interval", 1000, bias)
+            };
+            let others = ["drop", "duration", "peak_force", "front_speed"]
+                .map(|quantity| super::tests::row(quantity, 1000, 0.0));
+            lines(1000, others.into_iter().chain([row]).collect()).remove(0)
+        };
+        assert!(
+            of_few(1.7e-3).contains("no bias found"),
+            "{}",
+            of_few(1.7e-3)
+        );
+        assert!(of_few(2.2e-3).contains("biased"), "{}", of_few(2.2e-3));
     }
 
     #[test]

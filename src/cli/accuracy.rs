@@ -4,7 +4,7 @@ use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
 use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
-use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, verdict};
+use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, shows_bias, verdict};
 use crate::model::Parameters;
 use crate::results::layout::Layout;
 use crate::run::threads::{self, Threads};
@@ -34,8 +34,8 @@ The first lines say how exact a sweep with this solver is: whether a bias was fo
 chance gives in as many comparisons; by how much breaks are off; and whether the slips that the sweep records could
 tell. Below, each setting has what a slip costs, and its bias; -> marks the solver of the sweep.
 
-By default the study takes the paper's parameters and the default solver. A sweep file or --set chooses others. Seeds
-are those of the study.
+By default the study takes the paper's parameters and the default solver. A sweep file or --set chooses others.
+Realisations begin at the first seed of these, such as --set seed=1000, and are as many as --seeds says.
 
 Examples:
   stickslip accuracy --quick                 a first look, in about a minute
@@ -97,11 +97,8 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             out = Layout::default_root(&sweep);
             out.as_mut_os_string().push("-accuracy");
         }
-        if sweep.jobs_of_grid().any(|job| job.parameters.seed != 0) {
-            output::report(
-                "the seeds of the sweep are not used: a study has its own, and --seeds says how many",
-            );
-        }
+        let seeds = sweep.jobs_of_grid().map(|job| job.parameters.seed);
+        study.first_seed = seeds.min().unwrap_or_default();
     }
     let out = arguments.out.clone().unwrap_or(out);
     if !out.is_dir() && out.symlink_metadata().is_ok() {
@@ -168,8 +165,8 @@ fn study_text(study: &Study, findings: &Findings) -> String {
     lines.push(format!(
         "\n{}; one thread\n\
          ms/slip: CPU time in the cheapest of {} realisations, * extrapolated from that of a step\n\
-         break times: median (largest) error of the first {}; interval: bias of the mean ± 95 % interval, each one of many,\n\
-         all against the same reference; accuracy.json has more quantities",
+         break times: median (largest) error of the first {}; interval: bias of the mean, or what it is below,\n\
+         with 95 % for all lines together, all against the same reference; accuracy.json has more quantities",
         accuracy::cost::processor(),
         study.seeds,
         study.breaks
@@ -221,11 +218,21 @@ fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
             or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
         },
     );
+    let intervals = findings
+        .distances
+        .iter()
+        .filter(|row| row.quantity == "interval");
+    let comparisons = intervals.count();
     add(false, "interval (%)", &|row| {
         or_none(findings.distances_of(row, "interval").map(|row| {
             let scale = 100.0 / row.reference_mean.abs();
             let bias = scale * row.distances.mean_bias;
-            format!("{bias:+.3} ± {:.3}", scale * row.half_width())
+            let half = scale * row.half_width_among(comparisons);
+            if shows_bias(row, comparisons) {
+                format!("{bias:+.3} ± {half:.3}")
+            } else {
+                format!("< {:.3}", bias.abs() + half)
+            }
         }))
     });
     format!("\n{}\n{columns}", set_in_words(set))

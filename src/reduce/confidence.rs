@@ -6,6 +6,7 @@
 //! put together by their squares (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693 (2008)).
 
 use super::sequence::{Estimate, Sequences};
+use crate::model::standard_normal_quantile;
 use crate::table::columns::Interval;
 use std::f64::consts::PI;
 
@@ -187,21 +188,26 @@ pub(crate) fn mean_of(values: &[f64]) -> (Option<f64>, Option<Interval>) {
 
 /// Student's t for a two-sided probability of [`CONFIDENCE`], at >= 1 degrees of freedom, to 1e-6.
 pub(super) fn student(freedom: f64) -> f64 {
-    // Normal quantile; beyond the limit t differs from it by less than 1e-6.
-    const NORMAL: f64 = 1.959_963_984_540_054;
+    student_at(CONFIDENCE, freedom)
+}
+
+/// The same for another probability.
+pub(crate) fn student_at(confidence: f64, freedom: f64) -> f64 {
+    // Beyond the limit t differs from the normal quantile by less than 1e-6.
     const LARGE: f64 = 3e6;
     // Newton steps from the first terms of Fisher's expansion converge from below.
-    const STEPS: u32 = 8;
+    const STEPS: u32 = 20;
+    let normal = standard_normal_quantile(0.5 + 0.5 * confidence);
     if freedom > LARGE {
-        return NORMAL;
+        return normal;
     }
     let nu = freedom.max(1.0);
     let density =
         libm::exp(libm::lgamma(0.5 * (nu + 1.0)) - libm::lgamma(0.5 * nu)) / (nu * PI).sqrt();
-    let mut t = NORMAL + 2.372_27 / nu;
+    let mut t = normal + 0.25 * (normal * normal * normal + normal) / nu;
     for _ in 0..STEPS {
         let slope = 2.0 * density * libm::pow(1.0 + t * t / nu, -0.5 * (nu + 1.0));
-        t += (CONFIDENCE
+        t += (confidence
             - 2.0 * density * nu.sqrt() * cosine_integral(libm::atan(t / nu.sqrt()), nu))
             / slope;
     }

@@ -28,6 +28,7 @@ pub use backbone::BackboneBin;
 pub use compare::compare;
 #[cfg(test)]
 pub(crate) use confidence::mean_of;
+pub(crate) use confidence::student_at;
 #[cfg(test)]
 pub(crate) use edges::{Edge, GROUPS, Sample};
 pub use edges::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};

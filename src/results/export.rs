@@ -4,6 +4,7 @@
 //! how it came to that. Every row has all swept parameters, so that no table need be joined. Nothing of the directory is
 //! changed. Memory: one part, and one row group.
 
+use crate::results::controls::{CONTROL, ControlSets, SET_ID};
 use crate::results::destination::{NewFolder, refuse_stopped};
 use crate::results::directory::Results;
 use crate::results::layout::PartName;
@@ -80,6 +81,7 @@ impl Results<'_> {
             jobs_spilled: overview.jobs_spilled,
             ..Exported::default()
         };
+        let controls = ControlSets::of(self)?;
         let names: Vec<&str> = self.tables().collect();
         let total = (names.len() * parts.len()) as u64;
         for (number, table) in names.into_iter().enumerate() {
@@ -93,7 +95,7 @@ impl Results<'_> {
             for (done, &part) in parts.iter().enumerate() {
                 refuse_stopped(stop, &to.place)?;
                 progress((number * parts.len() + done) as u64, total);
-                let copied = self.copy_part(table, part, &schema, &mut writer);
+                let copied = self.copy_part(table, part, &controls, &schema, &mut writer);
                 // A part has lost what is not there.
                 rows += copied.map_err(|error| match error.damage() {
                     Ok((path, problem)) => ResultsError::damaged(&path, problem),
@@ -123,7 +125,8 @@ impl Results<'_> {
         let swept = of_jobs.fields().iter().filter(is_new);
         let swept = swept.filter(|field| swept_keys.contains(field.name()));
         let all = columns.fields().iter().chain(swept);
-        all.map(|field| Field::clone(field)).collect()
+        let all = all.map(|field| Field::clone(field));
+        all.chain([ControlSets::field()]).collect()
     }
 
     /// Copies the rows of a part; returns their number.
@@ -131,6 +134,7 @@ impl Results<'_> {
         &self,
         table: &str,
         part: PartName,
+        controls: &ControlSets,
         schema: &SchemaRef,
         writer: &mut RowWriter,
     ) -> Result<u64, ResultsError> {
@@ -149,7 +153,7 @@ impl Results<'_> {
         let mut copied = 0;
         for batch in rows.batches() {
             let Batch { path, rows } = batch?;
-            let joined = jobs.join(&rows, schema);
+            let joined = jobs.join(&rows, controls, schema);
             writer.write(&joined.map_err(ResultsError::damage_at(&path))?)?;
             copied += rows.num_rows() as u64;
         }
@@ -180,8 +184,13 @@ impl Jobs {
         Ok(Self { rows, by_id })
     }
 
-    /// Rows with the columns of a schema: their own, and those of their jobs.
-    fn join(&self, rows: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
+    /// Rows with the columns of a schema: their own, those of their jobs, and whether they belong to controls.
+    fn join(
+        &self,
+        rows: &RecordBatch,
+        controls: &ControlSets,
+        schema: &SchemaRef,
+    ) -> Result<RecordBatch, ArrowError> {
         let job = |id: Option<&str>| id.and_then(|id| self.by_id.get(id)).copied();
         let jobs: Option<Vec<u32>> = job_ids(rows)?.iter().map(job).collect();
         let others = || ArrowError::SchemaError("it has rows of other jobs".to_owned());
@@ -191,6 +200,9 @@ impl Jobs {
             self.rows.column_by_name(field.name()),
         ) {
             (Some(column), _) => Ok(Arc::clone(column)),
+            (None, None) if field.name() == CONTROL => {
+                controls.column(rows).ok_or_else(|| missing(SET_ID))
+            }
             (None, Some(column)) => take(column, &jobs, None),
             // Programs of other versions had other columns.
             (None, None) if field.is_nullable() => {

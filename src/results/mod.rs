@@ -13,12 +13,14 @@
 //!   deaths.rs                 at what workers died
 //!   events.rs                 what happens, and its log
 //!   verify.rs                 what is damaged, and its repair
+//!   controls.rs               which rows belong to controls
 //!   export.rs                 a few large files for other tools
 //! destination.rs              files and folders outside of it, which a command writes
 //! ```
 
 pub mod claims;
 pub mod commit;
+pub mod controls;
 pub mod deaths;
 pub mod destination;
 pub mod directory;

@@ -1,6 +1,7 @@
 //! Controls of the built program: what the drive alone explains, added to a finished sweep.
 
 use crate::program::{Cell, Folder, json};
+use std::fs;
 
 const SWEEP: &str = "name = \"small\"\n[model]\nN = 10\nNs = 5\nfrequency = 29\n[axes]\nDelta = [3e-7, 1e-6]\nV0 = [5e-5, 1e-4]\n\
                      seed = { count = 3 }\n[record]\nslips = 12\n";
@@ -64,6 +65,18 @@ fn a_control_stays_one_whatever_a_later_sweep_asks_for() {
         assert_eq!(rows.reals("resultant_excess").len(), sets);
     };
     excess(4);
+    let exported = |flags: usize| {
+        folder.ends(0, "export out -o exported --format csv");
+        for table in ["jobs", "slips"] {
+            let text = fs::read_to_string(folder.path(&format!("exported/{table}.csv"))).unwrap();
+            assert!(text.lines().next().unwrap().ends_with(",control"), "{text}");
+            let of_controls = text.lines().filter(|line| line.ends_with(",true")).count();
+            let rows = if table == "jobs" { flags } else { 12 * flags };
+            assert_eq!(of_controls, rows, "{table}");
+        }
+        fs::remove_dir_all(folder.path("exported")).unwrap();
+    };
+    exported(6);
     // The file as it was, without the key.
     folder.ends(0, "run plain.toml --out out");
     assert_eq!(
