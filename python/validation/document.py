@@ -34,8 +34,8 @@ class Section:
         word = (
             "holds" if all(self.agrees)
             else "holds in part" if True in self.agrees
-            else "is undecided" if None in self.agrees
-            else "does not hold"
+            else "does not hold" if False in self.agrees
+            else "is undecided"
         )
         return {"statement": self.title, "verdict": (self.verdict or word) + self.note, "why": self.why}
 

@@ -16,6 +16,11 @@ from stickslip.statistics import Estimate
 SLOW = 3e-5
 
 
+def in_words(velocity: float) -> str:
+    """As in 5e-5 m/s."""
+    return f"{velocity:.0e} m/s".replace("e-0", "e-")
+
+
 def load_window(eta: float) -> tuple[float, float]:
     """The phases in rad between which the load exceeds all before."""
     return (minimum_phase(eta), math.asin(1 / eta)) if eta > 1 else (-math.pi, math.pi)

@@ -14,6 +14,7 @@ from .kinematics import (
     SLOW,
     beyond_drive,
     beyond_text,
+    in_words,
     load_phase,
     minimum_phase,
     nucleation_phase,
@@ -82,7 +83,7 @@ def phase(results: Path) -> Section:
     section.note = "; for slow drives the drive alone makes it so"
     section.why = (
         "onsets lie above φ_min by definition, and reach down to it; of first breaks, which are free,"
-        f" {under[0].value:.2f} lie below where T > τ_r, {under[1].value:.2f} where T < τ_r; the mean resultant is the"
+        f" a share of {under[0].value:.2f} lies below where T > τ_r, {under[1].value:.2f} where T < τ_r; the mean resultant is the"
         f" drive's to {beyond_drive(above[above['V0'] < SLOW], 'resultant').largest():.2f} up to 1e-5 m/s"
     )
     return section
@@ -166,7 +167,7 @@ def below_one(results: Path) -> Section:
     sweep = Sweep(results / "drive-alone")
     sets = sweep.sets()
     off = influence(sweep.table("slips"))
-    texts = ", ".join(f"{one.text(2)} at {velocity:g} m/s" for velocity, one in off.items())
+    texts = ", ".join(f"{one.text(2)} at {in_words(velocity)}" for velocity, one in off.items())
     # Undecided if it may be zero, but also large.
     absent = {velocity: False if one.low > 0 else one.lies(below=0.1) for velocity, one in off.items()}
     section.check(
@@ -179,7 +180,7 @@ def below_one(results: Path) -> Section:
     for velocity, mine in sets.groupby("V0"):
         section.rows.append(
             {
-                "V0 (m/s)": f"{velocity:g}",
+                "V0": in_words(velocity),
                 "R less the drive's, η < 1": beyond_text(mine[mine["eta"] < 1], "resultant"),
                 "R, η > 1": beyond_text(mine[mine["eta"] > 1], "resultant"),
                 "locking index, η > 1": beyond_text(mine[mine["eta"] > 1], "locking_index"),
@@ -189,7 +190,8 @@ def below_one(results: Path) -> Section:
     low = slips[slips["eta"] < 0.7]
     phases = jackknife(lambda rows: resultant_length(rows["phase"]), low, unit="set_id")
     section.remark(
-        "The table has the mean over sets with an interval, and the lowest and highest end of the interval of any set.",
+        "The table has the mean over sets with an interval that allows for common errors of all sets; and, after the"
+        " semicolon, the lowest and the highest end of the interval of any set.",
         "Below η = 1 not all phases can be equally probable if oscillations have no influence: those of random loads have"
         f" a resultant of η/2 at −π/2. For η < 0.7 it is {phases.text()} at {direction(low['phase']):.2f} rad, where η/2 is"
         f" {low['eta'].mean() / 2:.3f} in the mean.".replace(" -", " −"),
@@ -197,7 +199,7 @@ def below_one(results: Path) -> Section:
         "Why fast drives lock although the load never falls was not investigated.",
     )
     if any(absent.values()):
-        section.verdict = f"holds for V0 up to {max(velocity for velocity in absent if absent[velocity]):g} m/s"
+        section.verdict = f"holds for V0 up to {in_words(max(v for v in absent if absent[v]))}"
     section.why = f"the mean vector of the load phase is off the drive's by {texts}"
     return section
 
