@@ -63,10 +63,6 @@ class Estimate:
         ends = value, max(self.low, 0.0), value + self.high - self.value
         return Estimate(*(end**0.5 for end in ends), self.units)
 
-    def largest(self) -> float:
-        """The largest size that the interval holds."""
-        return max(-self.low, self.high)
-
     def text(self, digits: int = 3) -> str:
         """Value and interval with `digits` decimals."""
         # Adding zero turns a negative one into zero.

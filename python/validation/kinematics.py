@@ -14,6 +14,7 @@ from stickslip.statistics import Estimate
 
 #: Drive velocity in m/s below which drives are called slow: between two values of the sweep, 1e-5 and 5e-5.
 SLOW = 3e-5
+SOURCE = "`sweeps/fig3.toml` and `sweeps/drive-alone.toml`"
 
 
 def in_words(velocity: float) -> str:
@@ -52,6 +53,14 @@ def beyond_text(sets: pandas.DataFrame, column: str) -> str:
     """The same, and the lowest and highest end of the interval of any set."""
     low, high = sets[f"{column}_excess_low"].min(), sets[f"{column}_excess_high"].max()
     return f"{beyond_drive(sets, column).text(2)}; {low:.2f} to {high:.2f}".replace("-", "−")
+
+
+def bounds_text(sets: pandas.DataFrame, column: str) -> str:
+    """How far off what the drive alone gives sets with slow drives are at most."""
+    sets = sets[sets["V0"] < SLOW]
+    mean = beyond_drive(sets, column)
+    each = sets[[f"{column}_excess_low", f"{column}_excess_high"]].abs().max(axis=None)
+    return f"the drive's to {max(-mean.low, mean.high):.2f} in the mean over sets, to {each:.2f} in each, up to 1e-5 m/s"
 
 
 def nucleation_phase(slips: pandas.DataFrame) -> pandas.Series:

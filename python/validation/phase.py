@@ -11,9 +11,9 @@ from stickslip.tables import Sweep
 
 from .document import Section
 from .kinematics import (
-    SLOW,
-    beyond_drive,
+    SOURCE,
     beyond_text,
+    bounds_text,
     in_words,
     load_phase,
     minimum_phase,
@@ -22,15 +22,13 @@ from .kinematics import (
     under_minimum,
 )
 
-SOURCE = "`sweeps/fig3.toml` and `sweeps/drive-alone.toml`"
 #: Part of the slips below what is called the lower envelope of their phases.
 ENVELOPE = 0.02
 
 
 def phase(results: Path) -> Section:
     section = Section("5. The phase against η, above η = 1", SOURCE, ("fig3-phase", "drive-alone"))
-    sweep = Sweep(results / "fig3")
-    slips = sweep.slips().dropna(subset="phase")
+    slips = Sweep(results / "fig3").slips().dropna(subset="phase")
     slips = slips[slips["eta"] > 1].assign(eta=slips["eta"].round(6))
     slips = slips.assign(first=nucleation_phase(slips))
     high = slips[slips["eta"] > 2]
@@ -70,21 +68,16 @@ def phase(results: Path) -> Section:
         " rad".replace("-", "−"),
         top.lies(above=-0.15, below=0.15),
     )
-    is_late = high["nucleation"] > high["onset"]
-    late, early = (high["attached_before"][those] for those in (is_late, ~is_late))
     section.remark(
         "An onset is a largest load by definition, so only inertia can put it below φ_min:"
         f" a share of {under_minimum(high['phase'], high['eta'], 0.15).mean():.4f} lies more than 0.15 rad below.",
         "That onsets reach down to it, and where first breaks lie, is measured.",
-        f"Before slips whose first break comes after the onset {late.mean():.3f} of the contacts are attached, before others"
-        f" {early.mean():.3f}: the load seems to break contacts at its maximum, and a period is too short for all to"
-        " reattach.",
     )
     section.note = "; for slow drives the drive alone makes it so"
     section.why = (
         "onsets lie above φ_min by definition, and reach down to it; of first breaks, which are free,"
-        f" a share of {under[0].value:.2f} lies below where T > τ_r, {under[1].value:.2f} where T < τ_r; the mean resultant is the"
-        f" drive's to {beyond_drive(above[above['V0'] < SLOW], 'resultant').largest():.2f} up to 1e-5 m/s"
+        f" a share of {under[0].value:.2f} lies below where T > τ_r, {under[1].value:.2f} where T < τ_r; R is"
+        f" {bounds_text(above, 'resultant')}"
     )
     return section
 
@@ -120,7 +113,7 @@ def envelope(slips: pandas.DataFrame) -> tuple[str, str, str, bool | None]:
     It is that of the first breaks up to the onset, as onsets follow φ_min by definition. From η = 5, where the exact
     φ_min has the asymptotic exponent to 0.02, to η = 200, above which inertia shifts φ by as much as φ_min.
     """
-    slips = slips[(slips["eta"] > 5) & (slips["eta"] < 200)]
+    slips = slips[(slips["eta"] > 5) & (slips["eta"] < 200)].assign(eta=slips["eta"].round(6))
 
     def exponent(rows: pandas.DataFrame, column: str) -> float:
         quantiles = rows.groupby("eta")[column].quantile(ENVELOPE)
@@ -158,8 +151,7 @@ def influence(slips: pandas.DataFrame) -> dict[float, Estimate]:
         count = sums["vector", "count"]
         return ((sums["vector", "sum"].abs() ** 2 - sums["square", "sum"]) / (count * (count - 1))).mean()
 
-    squares = {velocity: jackknife(square, rows) for velocity, rows in pandas.concat(found).groupby("V0")}
-    return {velocity: one.root() for velocity, one in squares.items()}
+    return {velocity: jackknife(square, rows).root() for velocity, rows in pandas.concat(found).groupby("V0")}
 
 
 def below_one(results: Path) -> Section:

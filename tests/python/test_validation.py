@@ -79,7 +79,7 @@ def phases_against(phases_of):
     slips = pandas.DataFrame({"eta": etas.repeat(400), "set_id": numpy.arange(etas.size * 400) // 10, "tau_r": 5e-3})
     slips["T"] = numpy.where(slips["set_id"] % 2, 0.1, 2e-3)
     slips["phase"] = numpy.concatenate([phases_of(eta, generator.random(400)) for eta in etas])
-    slips = slips.assign(T_onset=slips["T"], onset=0.0, nucleation=-1e-9, attached_before=1.0)
+    slips = slips.assign(T_onset=slips["T"], onset=0.0, nucleation=-1e-9)
     sets = pandas.DataFrame({"eta": 2.0, "V0": [1e-6, 1e-4] * 30, "resultant_length_low": 0.7})
     sets = sets.assign(resultant_excess=0.01, resultant_excess_low=-0.01, resultant_excess_high=0.03)
     with pytest.MonkeyPatch.context() as patch:
