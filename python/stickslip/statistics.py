@@ -48,12 +48,20 @@ class Estimate:
         half_width = stats.t.ppf(0.5 + LEVEL / 2, units - 1) * error
         return cls(*map(float, (value, value - half_width, value + half_width)), units)
 
-    def excludes_zero(self) -> bool:
-        """Whether the interval lies on one side of zero."""
-        return self.low > 0 or self.high < 0
+    def lies(self, above: float = -numpy.inf, below: float = numpy.inf) -> bool | None:
+        """Whether it does so with its interval; None if the interval holds a limit: the data do not decide."""
+        if self.high < above or self.low > below:
+            return False
+        return True if above < self.low and self.high < below else None
 
     def scaled(self, factor: float) -> "Estimate":
         return Estimate(factor * self.value, factor * self.low, factor * self.high, self.units)
+
+    def root(self) -> "Estimate":
+        """Of an estimated square. If that is negative by chance, its upper end is as far above zero as above the estimate."""
+        value = max(self.value, 0.0)
+        ends = value, max(self.low, 0.0), value + self.high - self.value
+        return Estimate(*(end**0.5 for end in ends), self.units)
 
     def text(self, digits: int = 3) -> str:
         """Value and interval with `digits` decimals."""
@@ -85,16 +93,21 @@ def jackknife(statistic: Callable[..., float], *frames: pandas.DataFrame, unit: 
     return Estimate.from_error(statistic(*frames), (len(units) - 1) * stats.sem(left_out, ddof=1), len(units))
 
 
-def share(flags: pandas.Series, units: pandas.Series) -> Estimate:
-    """The share of rows with a flag, by the jackknife over the unit of each row."""
+def share(flags: pandas.Series, units: pandas.Series | pandas.Index) -> Estimate:
+    """The share of rows with a flag, by Wilson's interval with their effective number and Student's t.
+
+    So many independent rows would have the variance of the jackknife over the unit of each row. Where nothing varies it is
+    the number of units.
+    """
     frame = pandas.DataFrame({"flag": flags.to_numpy(dtype=float), "unit": units.to_numpy()})
-    return jackknife(lambda rows: rows["flag"].mean(), frame, unit="unit")
-
-
-def proportion(flags: pandas.Series) -> Estimate:
-    """The share of independent units with a flag, by the exact binomial interval, also where none or all have it."""
-    ends = stats.binomtest(int(flags.sum()), len(flags)).proportion_ci(LEVEL)
-    return Estimate(float(flags.mean()), float(ends.low), float(ends.high), len(flags))
+    rough = jackknife(lambda rows: rows["flag"].mean(), frame, unit="unit")
+    value, t = rough.value, stats.t.ppf(0.5 + LEVEL / 2, rough.units - 1)
+    error = (rough.high - value) / t
+    number = min(value * (1 - value) / error**2, len(flags)) if error > 0 else rough.units
+    # Wilson, J. Am. Stat. Assoc. 22, 209 (1927); Kish's effective number.
+    middle = (value + t**2 / (2 * number)) / (1 + t**2 / number)
+    half_width = t / (1 + t**2 / number) * (value * (1 - value) / number + (t / (2 * number)) ** 2) ** 0.5
+    return Estimate(value, max(middle - half_width, 0.0), min(middle + half_width, 1.0), rough.units)
 
 
 def difference(

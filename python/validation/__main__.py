@@ -47,8 +47,9 @@ def document(results: Path) -> str:
         paragraph(
             "`scripts/reproduce` writes this page from measured results; no measured number is typed by hand.",
             "Brackets hold 95 % intervals: the jackknife over seeds or parameter sets, or the bootstrap where a statistic"
-            " is not smooth ([`statistics.py`](../python/stickslip/statistics.py)).",
-            "Where the paper gives no number, the criterion is a choice.",
+            " is not smooth; of shares Wilson's ([`statistics.py`](../python/stickslip/statistics.py)).",
+            "Where the paper gives no number, the criterion is a choice that the statement, taken as true, would meet.",
+            "*Undecided* is what an interval that holds the limit leaves open.",
             "Of locking there are two questions: what is seen, and what of it lies beyond *the drive alone*, which is slips"
             " at the loads of the unmodulated slider ([definition](model.md#phase-and-locking)).",
             "*Random loads* are slips at independent loads: for η > 1 even these are bunched in φ.",

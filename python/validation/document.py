@@ -20,23 +20,31 @@ class Section:
     pictures: tuple[str, ...] = ()
     #: Rows of the table of checks: measured numbers against one sentence of the paper each; and whether each number agrees.
     checks: list[dict] = field(default_factory=list)
-    agrees: list[bool] = field(default_factory=list)
+    agrees: list[bool | None] = field(default_factory=list)
     #: Of a table: the cells of each row by the heads of their columns.
     rows: list[dict] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
-    #: Where the checks alone do not say it: "holds", "holds for ...", "holds in part", "restates ..."; and why.
-    verdict: tuple[str, str] | None = None
+    #: Where the checks alone do not say it, as in "restates ..."; what qualifies it; and why.
+    verdict: str = ""
+    note: str = ""
+    why: str = ""
 
     def summary(self) -> dict:
         """Its row of the table of verdicts."""
-        word, why = self.verdict or ("holds" if all(self.agrees) else "does not hold", "")
-        return {"statement": self.title, "verdict": word, "why": why}
+        word = (
+            "holds" if all(self.agrees)
+            else "holds in part" if True in self.agrees
+            else "does not hold" if False in self.agrees
+            else "is undecided"
+        )
+        return {"statement": self.title, "verdict": (self.verdict or word) + self.note, "why": self.why}
 
-    def check(self, claim: str, criterion: str, measured: str, *agrees: bool) -> None:
-        """`claim` is empty where the criterion says it; `agrees` are whether each measured number meets it."""
-        self.agrees += map(bool, agrees)
+    def check(self, claim: str, criterion: str, measured: str, *agrees: bool | None) -> None:
+        """`claim` is empty where the criterion says it; `agrees` are whether each number meets it, None if undecided."""
+        self.agrees += agrees
         claim = self.number() + ": ".join(filter(None, (claim, criterion)))
-        word = "yes" if all(agrees) else "in part" if any(agrees) else "**no**"
+        words = {True: "yes", False: "**no**", None: "undecided"}
+        word = "in part" if len(set(agrees)) > 1 else words[agrees[0]]
         self.checks.append({"claim: criterion": claim, "measured": measured, "agrees": word})
 
     def remark(self, *sentences: str) -> None:

@@ -10,9 +10,16 @@ import pandas
 from numpy.typing import ArrayLike
 
 from stickslip._stickslip import minimum_phase
+from stickslip.statistics import Estimate
 
-#: Drive velocity in m/s from which drives are called fast: between two values of the sweep, 1e-5 and 5e-5.
-FAST = 3e-5
+#: Drive velocity in m/s below which drives are called slow: between two values of the sweep, 1e-5 and 5e-5.
+SLOW = 3e-5
+SOURCE = "`sweeps/fig3.toml` and `sweeps/drive-alone.toml`"
+
+
+def in_words(velocity: float) -> str:
+    """As in 5e-5 m/s."""
+    return f"{velocity:.0e} m/s".replace("e-0", "e-")
 
 
 def load_window(eta: float) -> tuple[float, float]:
@@ -33,14 +40,27 @@ def load_phase(slips: pandas.DataFrame) -> pandas.Series:
     return slips["phase"] + slips["eta"] * numpy.cos(slips["phase"])
 
 
-def beyond_drive(sets: pandas.DataFrame, column: str) -> tuple[pandas.Series, pandas.Series]:
-    """Whether sets lie above, and below, what the drive alone gives, with the interval of the difference; by chance 0.025."""
-    return sets[f"{column}_excess_low"] > 0, sets[f"{column}_excess_high"] < 0
+def beyond_drive(sets: pandas.DataFrame, column: str) -> Estimate:
+    """The mean excess of sets over what the drive alone gives, with the means of the ends of their intervals.
+
+    Sets have seeds in common, so these ends hold even if all sets err alike.
+    """
+    ends = [f"{column}_excess{end}" for end in ("", "_low", "_high")]
+    return Estimate(*sets[ends].dropna().mean(), len(sets))
 
 
 def beyond_text(sets: pandas.DataFrame, column: str) -> str:
-    above, below = beyond_drive(sets, column)
-    return f"{above.sum()} above, {below.sum()} below, of {len(sets)}"
+    """The same, and the lowest and highest end of the interval of any set."""
+    low, high = sets[f"{column}_excess_low"].min(), sets[f"{column}_excess_high"].max()
+    return f"{beyond_drive(sets, column).text(2)}; {low:.2f} to {high:.2f}".replace("-", "−")
+
+
+def bounds_text(sets: pandas.DataFrame, column: str) -> str:
+    """How far off what the drive alone gives sets with slow drives are at most."""
+    sets = sets[sets["V0"] < SLOW]
+    mean = beyond_drive(sets, column)
+    each = sets[[f"{column}_excess_low", f"{column}_excess_high"]].abs().max(axis=None)
+    return f"the drive's to {max(-mean.low, mean.high):.2f} in the mean over sets, to {each:.2f} in each, up to 1e-5 m/s"
 
 
 def nucleation_phase(slips: pandas.DataFrame) -> pandas.Series:

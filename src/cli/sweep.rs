@@ -28,9 +28,9 @@ macro_rules! presets {
     };
 }
 
-const PRESETS: [Preset; 30] = presets! {
-    "choices" "contacts" "disorder" "drag" "drag-strong" "drive-alone" "energies" "eq1" "fig1d" "fig2" "fig3" "fig3-full"
-    "fig3-precise" "fig4b" "fig4d" "friction" "friction-drives" "friction-precise" "fronts" "locking-edge"
+const PRESETS: [Preset; 31] = presets! {
+    "choices" "contacts" "disorder" "drag" "drag-strong" "drive-alone" "energies" "eq1" "excess" "fig1d" "fig2" "fig3"
+    "fig3-full" "fig3-precise" "fig4b" "fig4d" "friction" "friction-drives" "friction-precise" "fronts" "locking-edge"
     "locking-map" "regimes" "size" "sliding-edge" "staircase" "startup" "stiff-drive" "stochasticity" "tongue-4"
     "velocity"
 };

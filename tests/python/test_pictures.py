@@ -13,7 +13,7 @@ import pytest
 from conftest import ROOT
 
 #: Sweeps that take less than 15 s of CPU time.
-CHEAP = ("choices", "contacts", "drag", "drag-strong", "velocity")
+CHEAP = ("contacts", "drag", "drag-strong", "velocity")
 #: Pictures of a single simulation, which test_redraw.py draws, and of timings, which differ each time.
 OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "speed-against-error.png"}
 #: Figures of one's own: what `stickslip plot` is given, as by scripts/reproduce.

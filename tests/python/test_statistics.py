@@ -25,10 +25,33 @@ def assert_95_percent(covered):
     assert abs(np.mean(covered) - 0.95) < 3 * np.sqrt(0.95 * 0.05 / len(covered)), np.mean(covered)
 
 
-def test_the_exact_binomial_interval_is_open_where_no_unit_has_the_flag():
-    none = statistics.proportion(pd.Series([False] * 105))
-    assert none.low == 0
-    assert none.high == pytest.approx(1 - 0.025 ** (1 / 105))
+@pytest.mark.parametrize("flag", [False, True])
+def test_the_interval_of_a_share_is_open_within_0_and_1_where_all_rows_agree(flag):
+    found = statistics.share(pd.Series([flag] * 105), pd.RangeIndex(105))
+    ends = stats.binomtest(105 * flag, 105).proportion_ci(0.95)
+    # The exact interval, which Wilson's nearly is.
+    assert [found.low, found.high] == pytest.approx([ends.low, ends.high], abs=0.002)
+
+
+def test_intervals_of_shares_take_in_that_rows_of_a_unit_agree():
+    generator = np.random.default_rng(5)
+    unit = pd.Series(np.repeat(np.arange(24), 10))
+    draws = (generator.random(unit.size) < np.repeat(generator.beta(1, 4, 24), 10) for _ in range(300))
+    found = [statistics.share(pd.Series(flags), unit) for flags in draws]
+    assert all(0 <= one.low < one.high <= 1 for one in found)
+    assert_95_percent([covers(one, 0.2) for one in found])
+
+
+def test_an_estimate_lies_between_limits_if_its_interval_does_and_is_undecided_if_that_holds_one():
+    one = statistics.Estimate(0.5, 0.4, 0.6, 9)
+    assert [one.lies(above=limit) for limit in (0.3, 0.5, 0.7)] == [True, None, False]
+    assert [one.lies(below=limit) for limit in (0.3, 0.5, 0.7)] == [False, None, True]
+    assert [one.lies(above=0.3, below=limit) for limit in (0.35, 0.5, 0.7)] == [False, None, True]
+
+
+def test_the_root_of_a_square_that_is_negative_by_chance_keeps_its_error():
+    root = statistics.Estimate(-0.01, -0.05, 0.03, 9).root()
+    assert [root.value, root.low, root.high] == pytest.approx([0, 0, 0.2])
 
 
 def test_the_difference_of_means_is_that_of_the_paired_t_test():
