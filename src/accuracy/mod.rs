@@ -2,24 +2,23 @@
 //!
 //! ```text
 //! breaks.rs     before chaos: break times, contact by contact
-//! distance.rs   after chaos: distances of distributions and biases, with intervals
+//! bias.rs       after chaos: biases of mean and standard deviation, with intervals
 //! study.rs      every solver at every set of parameters, timed on one thread
 //! cost.rs       what a computation costs
 //! verdict.rs    what that says of a sweep's solver
 //! report.rs     tables as Parquet and JSON, figures
 //! ```
 
+pub mod bias;
 pub mod breaks;
 pub mod cost;
-pub mod distance;
 mod report;
 mod study;
 mod verdict;
 
 pub use cost::Cost;
-pub use distance::Distances;
 pub use report::{check, to_json, write};
-pub use study::{DistanceRow, Findings, MethodRow, Study};
+pub use study::{BiasRow, Findings, MethodRow, Study};
 pub use verdict::{shows_bias, verdict};
 
 use crate::model::{Parameters, Symbol, Value};

@@ -1,6 +1,5 @@
 //! What a command of accuracy leaves behind: everything as JSON, and figures.
 
-use super::distance::Distances;
 use super::study::{Findings, MethodRow, Study};
 use super::{cost, other_settings, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
@@ -29,7 +28,7 @@ pub fn to_json(study: &Study, findings: &Findings) -> Value {
         "breaks": study.breaks,
         "verdict": verdict(study, findings),
         "methods": findings.methods.iter().map(arrow::json).collect::<Value>(),
-        "distances": findings.distances.iter().map(arrow::json).collect::<Value>(),
+        "biases": findings.biases.iter().map(arrow::json).collect::<Value>(),
     })
 }
 
@@ -89,12 +88,11 @@ pub fn write(
 }
 
 /// The figure of the sets that are this one without modulation: cost against the error of break times, and against
-/// distances of distributions from those of the reference, in units of the distance that chance alone stays under.
+/// biases of means, in units of the bias that chance alone stays under.
 fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Picture> {
     const WORK: &str = "CPU time per slip (s)";
-    const NOTE: &str = "W₁: first Wasserstein distance between a method's distribution and that of the reference, over what \
-                        equal distributions stay under in 95 of 100 samples; bars: 95 %. \
-                        Errors of break times: median, bars up to the largest.";
+    const NOTE: &str = "Biases: mean of a method's slips less that of the reference, over what equal means stay under in 95 of 100 \
+                        samples; bars: 95 %. Errors of break times: median, bars up to the largest.";
     const EXTRAPOLATED: &str = " * Cost extrapolated from that of a step.";
     let breaks = points(&findings.methods, set, |row| {
         let (error, largest) = (row.break_times.median?, row.break_times.largest?);
@@ -108,17 +106,13 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     }];
     for (quantity, name) in [("interval", "τ"), ("front_speed", "front speed")] {
         let points = points(&findings.methods, set, |row| {
-            let Distances {
-                w1,
-                w1_low,
-                w1_high,
-                w1_floor,
-                ..
-            } = findings.distances_of(row, quantity)?.distances;
-            Some((w1 / w1_floor, (w1_low / w1_floor, w1_high / w1_floor)))
+            let bias = findings.bias_of(row, quantity)?.bias;
+            let by_chance = bias.half_width()?;
+            let of_chance = bias.of_mean.abs() / by_chance;
+            Some((of_chance, ((of_chance - 1.0).max(0.0), of_chance + 1.0)))
         });
         panels.push(ErrorPanel {
-            label: format!("W₁ of {name} / chance level"),
+            label: format!("Bias of {name} / chance level"),
             by_chance: Some(1.0),
             points,
         });
@@ -203,9 +197,9 @@ fn points(
 #[cfg(test)]
 mod tests {
     use super::super::Method;
+    use super::super::bias::{Bias, Sample};
     use super::super::breaks::BreakErrors;
-    use super::super::distance::distances as measured;
-    use super::super::study::DistanceRow;
+    use super::super::study::BiasRow;
     use super::*;
     use crate::model::selected::Selected;
     use crate::solver::Solver;
@@ -242,7 +236,7 @@ mod tests {
             break_times: BreakErrors::default(),
             ..method.clone()
         };
-        let distance = DistanceRow {
+        let bias = BiasRow {
             parameters: Selected::new(parameters),
             case: "defaults".to_owned(),
             solver,
@@ -251,14 +245,16 @@ mod tests {
             reference_slips: 3,
             mean: 0.11,
             reference_mean: 0.11,
-            freedom: None,
             deviation: 0.01,
             reference_deviation: 0.01,
-            distances: measured(&[0.1, 0.11, 0.12], &[0.1, 0.11, 0.13], 0).unwrap(),
+            bias: Bias::of(
+                &Sample::of(&[vec![0.1], vec![0.11, 0.12]]).unwrap(),
+                &Sample::of(&[vec![0.1, 0.11], vec![0.13]]).unwrap(),
+            ),
         };
         Findings {
             methods: vec![method, untested],
-            distances: vec![distance],
+            biases: vec![bias],
         }
     }
 
@@ -297,7 +293,7 @@ mod tests {
             (&json!(1e-7), &Value::Null)
         );
         assert_eq!(json["methods"][1]["median_break_error"], Value::Null);
-        assert_eq!(json["distances"][0]["quantity"], "interval");
+        assert_eq!(json["biases"][0]["quantity"], "interval");
         check(folder.path()).expect("over an earlier study");
         for file in &files {
             let bytes = std::fs::read(file).unwrap();
@@ -346,6 +342,6 @@ mod tests {
             }
         };
         described("methods", MethodRow::columns());
-        described("distances", DistanceRow::columns());
+        described("biases", BiasRow::columns());
     }
 }

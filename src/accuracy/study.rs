@@ -6,14 +6,13 @@
 //! enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its slips: it is
 //! timed over a short stretch, and its cost per slip follows from the steps in one.
 
+use super::bias::{Bias, Sample};
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cost::Cost;
-use super::distance::{Distances, deviation, distances, mean};
 use super::{Method, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Recording, Slip, measure};
-use crate::reduce::student_at;
 use crate::run::cpu;
 use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate};
 use crate::table::columns::columns;
@@ -204,9 +203,9 @@ const QUANTITIES: [Quantity; 6] = [
 ];
 
 columns! {
-    /// A distribution of one solver at one set of parameters against that of the reference ensemble.
+    /// A quantity of the slips of one solver at one set of parameters, beside that of the reference ensemble.
     #[derive(Clone, Debug, PartialEq)]
-    pub struct DistanceRow {
+    pub struct BiasRow {
         parameters: Selected<DriveAlone>;
         case: String = "", "the drive, and what else differs from the defaults";
         solver: Method;
@@ -215,67 +214,9 @@ columns! {
         reference_slips: u64 = "", "size of the reference sample";
         mean: f64 = "", "mean";
         reference_mean: f64 = "", "mean of the reference";
-        freedom: Option<f64> = "", "degrees of freedom of the bias of the mean; null for fewer than two realisations";
         deviation: f64 = "", "standard deviation";
         reference_deviation: f64 = "", "standard deviation of the reference";
-        distances: Distances;
-    }
-}
-
-/// Probability with which the interval of one bias holds it.
-const CONFIDENCE: f64 = 0.95;
-
-impl DistanceRow {
-    /// Of the interval of the bias of the mean.
-    pub fn half_width(&self) -> f64 {
-        0.5 * (self.distances.mean_bias_high - self.distances.mean_bias_low)
-    }
-
-    /// Of the interval which so many biases together lie in as surely as one in its own (Bonferroni).
-    pub fn half_width_among(&self, comparisons: usize) -> f64 {
-        let freedom = self.freedom.unwrap_or(1.0);
-        let together = 1.0 - (1.0 - CONFIDENCE) / comparisons as f64;
-        self.half_width() * student_at(together, freedom) / student_at(CONFIDENCE, freedom)
-    }
-}
-
-/// The error of a difference of two means by the spread of realisations, which are independent, as slips are not.
-#[derive(Clone, Copy, Debug)]
-struct Bias {
-    variance: f64,
-    freedom: f64,
-}
-
-impl Bias {
-    /// From the values of each realisation of both; `None` for fewer than two (Welch, Biometrika 34, 28 (1947)).
-    fn of(both: &[Vec<Vec<f64>>; 2]) -> Option<Self> {
-        let variance = |jobs: &Vec<Vec<f64>>| {
-            let jobs: Vec<_> = jobs.iter().filter(|job| !job.is_empty()).collect();
-            let sum = |job: &[f64]| job.iter().sum::<f64>();
-            let count: usize = jobs.iter().map(|job| job.len()).sum();
-            let mean = jobs.iter().map(|job| sum(job)).sum::<f64>() / count as f64;
-            let squares: f64 = jobs
-                .iter()
-                .map(|job| sum(job) - mean * job.len() as f64)
-                .map(|deviation| deviation * deviation)
-                .sum();
-            let others = jobs.len() as f64 - 1.0;
-            let scale = jobs.len() as f64 / (others * count as f64 * count as f64);
-            (others > 0.0).then_some((squares * scale, others))
-        };
-        let [(one, others), (reference, others_of_reference)] =
-            [variance(&both[0])?, variance(&both[1])?];
-        let sum = one + reference;
-        let freedom =
-            sum * sum / (one * one / others + reference * reference / others_of_reference);
-        Some(Self {
-            variance: sum,
-            freedom: if freedom.is_nan() { others } else { freedom },
-        })
-    }
-
-    fn half_width(self, confidence: f64) -> f64 {
-        student_at(confidence, self.freedom) * self.variance.sqrt()
+        bias: Bias;
     }
 }
 
@@ -283,13 +224,13 @@ impl Bias {
 pub struct Findings {
     /// Set by set, solver by solver.
     pub methods: Vec<MethodRow>,
-    pub distances: Vec<DistanceRow>,
+    pub biases: Vec<BiasRow>,
 }
 
 impl Findings {
-    /// How far a distribution is from the reference, for the solver and set of a row.
-    pub fn distances_of(&self, row: &MethodRow, quantity: &str) -> Option<&DistanceRow> {
-        self.distances.iter().find(|other| {
+    /// The bias of a quantity, for the solver and set of a row.
+    pub fn bias_of(&self, row: &MethodRow, quantity: &str) -> Option<&BiasRow> {
+        self.biases.iter().find(|other| {
             other.quantity == quantity
                 && other.parameters == row.parameters
                 && other.solver == row.solver
@@ -382,12 +323,8 @@ impl Study {
                     "{case}: no slips; the study compares slips, so choose parameters at which the slider does not just slide"
                 );
             }
-            let mean_interval = mean(
-                &reference
-                    .iter()
-                    .filter_map(|slip| slip.interval)
-                    .collect::<Vec<_>>(),
-            );
+            let intervals: Vec<f64> = reference.iter().filter_map(|slip| slip.interval).collect();
+            let mean_interval = intervals.iter().sum::<f64>() / intervals.len() as f64;
             let pairs: Vec<(Solver, &Ensemble)> =
                 self.solvers.iter().copied().zip(&ensembles).collect();
             for (&(solver, ensemble), break_times) in pairs.iter().zip(errors) {
@@ -400,15 +337,10 @@ impl Study {
                     break_times,
                 });
             }
-            let compared =
-                pairs
-                    .into_par_iter()
-                    .enumerate()
-                    .flat_map_iter(|(row, (solver, ensemble))| {
-                        let key = set * self.solvers.len() + row;
-                        distance_rows(parameters, solver, &ensemble.slips, &reference, key as u64)
-                    });
-            findings.distances.extend(compared.collect::<Vec<_>>());
+            for (solver, ensemble) in pairs {
+                let biases = bias_rows(parameters, solver, &ensemble.slips, &reference);
+                findings.biases.extend(biases);
+            }
         }
         Ok(findings)
     }
@@ -529,46 +461,36 @@ fn in_words(parameters: &Parameters, solver: Solver) -> String {
     )
 }
 
-/// The distributions of one ensemble against those of the reference, of all quantities that there are.
-fn distance_rows(
+/// The slips of one ensemble beside those of the reference, by all quantities that there are.
+fn bias_rows(
     parameters: &Parameters,
     solver: Solver,
     slips: &[Slip],
     reference: &[Slip],
-    key: u64,
-) -> Vec<DistanceRow> {
-    let row = |(place, (quantity, value)): (u64, Quantity)| {
-        let key = key * QUANTITIES.len() as u64 + place;
-        let of_jobs = [slips, reference].map(|slips| {
-            // A realisation begins with its slip 0.
-            let jobs = slips.chunk_by(|_, next| next.number > 0);
-            jobs.map(|job| job.iter().filter_map(value).collect::<Vec<_>>())
-                .collect::<Vec<_>>()
-        });
-        let bias = Bias::of(&of_jobs);
-        let [sample, reference] = of_jobs.map(|jobs| jobs.concat());
-        let mut distances = distances(&sample, &reference, key)?;
-        if let Some(bias) = bias {
-            let half = bias.half_width(CONFIDENCE);
-            distances.mean_bias_low = distances.mean_bias - half;
-            distances.mean_bias_high = distances.mean_bias + half;
-        }
-        Some(DistanceRow {
+) -> Vec<BiasRow> {
+    let sample = |slips: &[Slip], value: fn(&Slip) -> Option<f64>| {
+        // A realisation begins with its slip 0.
+        let realisations = slips.chunk_by(|_, next| next.number > 0);
+        let values = realisations.map(|slips| slips.iter().filter_map(value).collect());
+        Sample::of(&values.collect::<Vec<_>>())
+    };
+    let row = |(quantity, value): Quantity| {
+        let (found, reference) = (sample(slips, value)?, sample(reference, value)?);
+        Some(BiasRow {
             parameters: Selected::new(parameters.clone()),
             case: set_in_words(parameters),
             solver: solver.into(),
             quantity: quantity.to_owned(),
-            slips: sample.len() as u64,
-            reference_slips: reference.len() as u64,
-            mean: mean(&sample),
-            reference_mean: mean(&reference),
-            deviation: deviation(&sample),
-            reference_deviation: deviation(&reference),
-            freedom: bias.map(|bias| bias.freedom),
-            distances,
+            slips: found.count as u64,
+            reference_slips: reference.count as u64,
+            mean: found.mean,
+            reference_mean: reference.mean,
+            deviation: found.deviation,
+            reference_deviation: reference.deviation,
+            bias: Bias::of(&found, &reference),
         })
     };
-    (0..).zip(QUANTITIES).filter_map(row).collect()
+    QUANTITIES.into_iter().filter_map(row).collect()
 }
 
 #[cfg(test)]
@@ -608,8 +530,8 @@ mod tests {
             }
         }
         // All quantities of all solvers, but no phase where there is no modulation.
-        assert_eq!(findings.distances.len(), 3 * 5 + 3 * 6);
-        for row in &findings.distances {
+        assert_eq!(findings.biases.len(), 3 * 5 + 3 * 6);
+        for row in &findings.biases {
             let seeds = if row.parameters.modulation_period.is_none() {
                 3
             } else {
@@ -637,7 +559,7 @@ mod tests {
             ..Study::quick()
         };
         let findings = study.run(&mut |_| {}).unwrap();
-        assert!(findings.distances.is_empty(), "{:?}", findings.distances);
+        assert!(findings.biases.is_empty(), "{:?}", findings.biases);
         for row in &findings.methods {
             assert_eq!(row.cost.timed_slips, 0);
             assert!(

@@ -4,7 +4,7 @@
 //! A bias counts if it survives the number of comparisons (Bonferroni): among all of a solver that has none, one counts by
 //! chance in one study of twenty. With few slips, or one realisation, nothing counts.
 
-use super::study::{DistanceRow, Findings, MethodRow, Study};
+use super::study::{BiasRow, Findings, MethodRow, Study};
 use super::{Method, set_in_words};
 
 /// Least number of slips on either side with which a bias counts.
@@ -13,19 +13,20 @@ const MIN_SLIPS: u64 = 100;
 const TIGHTER: f64 = 0.5;
 
 /// Whether a row shows a bias among so many comparisons.
-pub fn shows_bias(row: &DistanceRow, comparisons: usize) -> bool {
-    can_tell(row) && row.distances.mean_bias.abs() > row.half_width_among(comparisons)
+pub fn shows_bias(row: &BiasRow, comparisons: usize) -> bool {
+    let by_chance = row.bias.half_width_among(comparisons);
+    can_tell(row) && by_chance.is_some_and(|by_chance| row.bias.of_mean.abs() > by_chance)
 }
 
-fn can_tell(row: &DistanceRow) -> bool {
-    row.freedom.is_some() && row.slips.min(row.reference_slips) >= MIN_SLIPS
+fn can_tell(row: &BiasRow) -> bool {
+    row.bias.freedom.is_some() && row.slips.min(row.reference_slips) >= MIN_SLIPS
 }
 
 /// The lines, the answer first.
 pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
     let own = Method::from(study.own);
-    let compared: Vec<&DistanceRow> = findings
-        .distances
+    let compared: Vec<&BiasRow> = findings
+        .biases
         .iter()
         .filter(|row| row.solver == own)
         .collect();
@@ -49,20 +50,20 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         )];
     };
     let comparisons = compared.len();
-    let excess =
-        |row: &DistanceRow| row.distances.mean_bias.abs() / row.half_width_among(comparisons);
+    let by_chance = |row: &BiasRow| row.bias.half_width_among(comparisons).unwrap_or(f64::NAN);
+    let excess = |row: &BiasRow| row.bias.of_mean.abs() / by_chance(row);
     let most = compared
         .iter()
         .filter(|row| shows_bias(row, comparisons))
         .max_by(|a, b| excess(a).total_cmp(&excess(b)));
-    let intervals: Vec<&DistanceRow> = compared
+    let intervals: Vec<&BiasRow> = compared
         .iter()
         .copied()
         .filter(|row| row.quantity == "interval")
         .collect();
     let shown = intervals
         .iter()
-        .map(|row| percent(row, row.half_width_among(comparisons)))
+        .map(|row| percent(row, by_chance(row)))
         .fold(0.0, f64::max);
     let finding = match most {
         _ if !compared.iter().all(|row| can_tell(row)) => {
@@ -71,8 +72,8 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         Some(row) => format!(
             "biased: {} by {:+.2} ± {:.2} % at {}, more than chance among {} comparisons",
             row.quantity,
-            percent(row, row.distances.mean_bias),
-            percent(row, row.half_width()),
+            percent(row, row.bias.of_mean),
+            percent(row, half_width(row)),
             set_in_words(&row.parameters),
             comparisons
         ),
@@ -89,8 +90,13 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
     lines
 }
 
+/// Half of the interval of a bias; no number for fewer than two realisations.
+fn half_width(row: &BiasRow) -> f64 {
+    row.bias.half_width().unwrap_or(f64::NAN)
+}
+
 /// A value in percent of the mean of the reference.
-fn percent(row: &DistanceRow, value: f64) -> f64 {
+fn percent(row: &BiasRow, value: f64) -> f64 {
     100.0 * value / row.reference_mean.abs()
 }
 
@@ -107,7 +113,7 @@ fn break_errors(rows: &[&MethodRow]) -> Option<String> {
 }
 
 /// The statistical error of the mean interval in the sets of a sweep, and whether the solver could add to it.
-fn statistical_error(study: &Study, intervals: &[&DistanceRow], is_biased: bool) -> Option<String> {
+fn statistical_error(study: &Study, intervals: &[&BiasRow], is_biased: bool) -> Option<String> {
     // The error of a difference of two means, scaled to the slips of the sweep: neighbours are correlated in both.
     let errors = study
         .slips_of_sets
@@ -117,14 +123,13 @@ fn statistical_error(study: &Study, intervals: &[&DistanceRow], is_biased: bool)
         .filter_map(|(&own, set)| {
             let row = intervals.iter().find(|row| *row.parameters == *set)?;
             let of_difference = 1.0 / row.slips as f64 + 1.0 / row.reference_slips as f64;
-            let scaled = row.half_width() * (1.0 / (own as f64 * of_difference)).sqrt();
-            Some(percent(row, scaled))
+            let scaled = half_width(row) * (1.0 / (own as f64 * of_difference)).sqrt();
+            Some(percent(row, scaled)).filter(|error| error.is_finite())
         });
     let errors: Vec<f64> = errors.collect();
     let least = errors.iter().copied().reduce(f64::min)?;
     let largest = errors.iter().copied().reduce(f64::max)?;
-    let excluded_from =
-        |row: &&DistanceRow| percent(row, row.distances.mean_bias.abs() + row.half_width());
+    let excluded_from = |row: &&BiasRow| percent(row, row.bias.of_mean.abs() + half_width(row));
     let conclusion = if is_biased {
         ""
     } else if intervals.iter().all(|row| excluded_from(row) <= largest) {
@@ -168,21 +173,22 @@ fn tighter(findings: &Findings, rows: &[&MethodRow]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::bias::Bias;
     use super::super::breaks::BreakErrors;
     use super::super::cost::Cost;
-    use super::super::distance::Distances;
     use super::*;
     use crate::model::Parameters;
     use crate::model::selected::Selected;
     use crate::solver::{Resolve, Solver};
+    use crate::table::columns::Interval;
 
     const GRID: Solver = Solver::EventDriven {
         tolerance: 1e-3,
         resolve: Resolve::Grid,
     };
 
-    fn row(quantity: &str, slips: u64, bias: f64) -> DistanceRow {
-        DistanceRow {
+    fn row(quantity: &str, slips: u64, bias: f64) -> BiasRow {
+        BiasRow {
             parameters: Selected::new(Parameters::default()),
             case: String::new(),
             solver: GRID.into(),
@@ -191,14 +197,16 @@ mod tests {
             reference_slips: 2 * slips,
             mean: 0.1 + bias,
             reference_mean: 0.1,
-            freedom: Some(1e9),
             deviation: 0.01,
             reference_deviation: 0.01,
-            distances: Distances {
-                mean_bias: bias,
-                mean_bias_low: bias - 1e-3,
-                mean_bias_high: bias + 1e-3,
-                ..Distances::default()
+            bias: Bias {
+                of_mean: bias,
+                interval_of_mean: Some(Interval {
+                    low: bias - 1e-3,
+                    high: bias + 1e-3,
+                }),
+                freedom: Some(1e9),
+                ..Bias::default()
             },
         }
     }
@@ -221,7 +229,7 @@ mod tests {
         }
     }
 
-    fn lines(slips_of_set: u64, distances: Vec<DistanceRow>) -> Vec<String> {
+    fn lines(slips_of_set: u64, biases: Vec<BiasRow>) -> Vec<String> {
         let tighter = Solver::EventDriven {
             tolerance: 1e-5,
             resolve: Resolve::Grid,
@@ -233,7 +241,7 @@ mod tests {
             ..Study::quick()
         };
         let methods = vec![method(GRID, 2e-7, 1e-3), method(tighter, 1e-9, 1.6e-3)];
-        verdict(&study, &Findings { methods, distances })
+        verdict(&study, &Findings { methods, biases })
     }
 
     #[test]
@@ -265,10 +273,8 @@ mod tests {
         }
         // Of three degrees of freedom, 2.4 half-widths are needed for five.
         let of_few = |bias| {
-            let row = DistanceRow {
-                freedom: Some(3.0),
-                ..row("interval", 1000, bias)
-            };
+            let mut row = row("interval", 1000, bias);
+            row.bias.freedom = Some(3.0);
             let others = ["drop", "duration", "peak_force", "front_speed"]
                 .map(|quantity| super::tests::row(quantity, 1000, 0.0));
             lines(1000, others.into_iter().chain([row]).collect()).remove(0)

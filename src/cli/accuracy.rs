@@ -24,8 +24,8 @@ const MAX_COUNT: u64 = 1_000_000;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Before trajectories diverge, the first break times are compared with those at the tightest tolerance. After that,
-the distributions of slips are compared with a reference ensemble: their distances and the biases of their means,
-with bootstrap intervals. The event-driven solver counts as two methods, on the grid and in Taylor steps.
+mean and standard deviation of the slips are compared with those of a reference ensemble, with intervals by the spread
+of realisations. The event-driven solver counts as two methods, on the grid and in Taylor steps.
 
 The cost is the CPU time of one thread in the cheapest realisation. Realisations of all solvers are timed in turn; keep
 the machine free meanwhile. --threads is about what is not timed.
@@ -219,20 +219,20 @@ fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
         },
     );
     let intervals = findings
-        .distances
+        .biases
         .iter()
         .filter(|row| row.quantity == "interval");
     let comparisons = intervals.count();
     add(false, "interval (%)", &|row| {
-        or_none(findings.distances_of(row, "interval").map(|row| {
+        or_none(findings.bias_of(row, "interval").and_then(|row| {
             let scale = 100.0 / row.reference_mean.abs();
-            let bias = scale * row.distances.mean_bias;
-            let half = scale * row.half_width_among(comparisons);
-            if shows_bias(row, comparisons) {
+            let bias = scale * row.bias.of_mean;
+            let half = scale * row.bias.half_width_among(comparisons)?;
+            Some(if shows_bias(row, comparisons) {
                 format!("{bias:+.3} ± {half:.3}")
             } else {
                 format!("< {:.3}", bias.abs() + half)
-            }
+            })
         }))
     });
     format!("\n{}\n{columns}", set_in_words(set))

@@ -47,7 +47,7 @@ fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
         );
     }
     // The same seed without modulation: the bias of a solver is against other seeds, and has an interval.
-    for row in printed["distances"].as_array().unwrap() {
+    for row in printed["biases"].as_array().unwrap() {
         let [low, bias, high] =
             ["mean_bias_low", "mean_bias", "mean_bias_high"].map(|key| row[key].as_f64().unwrap());
         assert!(low <= bias && bias <= high, "{row}");
@@ -125,7 +125,7 @@ fn other_seeds_are_those_of_the_sweep_and_give_other_slips() {
             printed["first_seed"].as_u64(),
             Some(if seed.is_empty() { 0 } else { 70 })
         );
-        let rows = printed["distances"].as_array().unwrap();
+        let rows = printed["biases"].as_array().unwrap();
         rows.iter()
             .map(|row| row["mean"].as_f64().unwrap())
             .collect()
