@@ -42,7 +42,7 @@ impl Kind {
     pub fn of_name(file: &Path) -> Option<Self> {
         match file.extension()?.to_str()? {
             "parquet" => Some(Self::PARQUET),
-            "json" => Some(Self::new("an accuracy.json", [b"{\"b", b"\"mean_bias\":"])),
+            "json" => Some(Self::new("an accuracy.json", [b"{\"b", b""])),
             "svg" => Some(Self::new("an SVG", [b"<", b"<svg"])),
             "png" => Some(Self::new("a PNG", [b"\x89PNG\r\n\x1a\n", b""])),
             "pdf" => Some(Self::new("a PDF", [b"%PDF-", b""])),
