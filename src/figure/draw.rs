@@ -28,18 +28,17 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
-        let [map, staircase] = [map::map, own::staircase].map(|map| map(&sets, look));
+        let map = map::map(&sets, look);
         // More values than colours would be a net of lines, which a map shows better; a single set would be a dot.
         let is_net = || {
             swept(&sets)
                 .get(1)
                 .is_some_and(|second| second.distinct.len() > INKS.len())
         };
-        if sets.len() > 1 && staircase.is_none() && !(map.is_some() && is_net()) {
+        if sets.len() > 1 && !(map.is_some() && is_net()) {
             pictures.extend(own::overview(&sets, look));
         }
         pictures.extend(map);
-        pictures.extend(staircase);
     }
     if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
         pictures.extend(edges::edges(&read(layout)?, look));

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! draw.rs -> a file for each standing figure: its data, its panels; `None` where the data do not fit
-//! own.rs  -> sets against a column: the overview of a sweep, the staircase, and any column against any other
+//! own.rs  -> sets against a column: the overview of a sweep, and any column against any other
 //! map.rs  -> sets over two parameters
 //!            sets.rs                 in what sets differ, and the grid on which they lie
 //!            panel.rs                panels as data: axes, layers between them

@@ -7,13 +7,12 @@ use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Ends, Layer, Panel, Place};
 use super::picture::{Dot, Ink, Picture, Stroke};
-use super::sets::period_column;
 use super::style::{
-    BAR_WIDTH, BLACK, GREY, GRID, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, dot, drive_alone,
+    BAR_WIDTH, BLACK, GREY, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, dot, drive_alone,
 };
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{FREQUENCY, SetRow, Swept, Values, ascending, differing, is_same, swept};
+use crate::reduce::{FREQUENCY, SetRow, Swept, Values, ascending, is_same, swept};
 use crate::sweep::Label;
 use clap::Args;
 use std::collections::BTreeMap;
@@ -28,13 +27,6 @@ const QUANTITIES: [&str; 5] = [
 ];
 /// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
 const REDUCTION: Ends = (0.2, 0.3);
-/// The median interval in periods, which makes a staircase of this many periods or more and of so few amplitudes.
-const RATIO: &str = "tau_50 / T";
-const MIN_PERIODS: usize = 24;
-const MAX_AMPLITUDES: usize = 3;
-/// Ratio of the largest to the least from which it is drawn on a logarithmic axis, and whole numbers that have a line.
-const WIDE_RATIOS: f64 = 6.0;
-const MAX_LEVELS: u32 = 10;
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 400.0;
 /// Panels in a row, and in all.
@@ -245,52 +237,6 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     .ok()
 }
 
-/// Draws the staircase of sets that differ in the modulation alone, with 24 periods or more and at most 3 amplitudes: the
-/// interval in periods, on whole numbers where slips keep to it, and the locking index; `None` for others.
-pub(super) fn staircase(rows: &[SetRow], look: &Look) -> Option<Picture> {
-    let is_of_modulation = |symbol: &Symbol| matches!(symbol, Symbol::Delta | Symbol::T);
-    let asked = |column| Asked::of(rows, "y", column).ok();
-    let [x, ratio, index, colour] = [
-        asked(period_column(rows))?,
-        asked(RATIO)?,
-        asked("locking_index")?,
-        asked("Delta")?,
-    ];
-    let amplitudes = colour
-        .column
-        .distinct
-        .iter()
-        .filter(|amplitude| **amplitude > 0.0)
-        .count();
-    if !differing(&rows.iter()).iter().all(is_of_modulation)
-        || x.column.distinct.len() < MIN_PERIODS
-        || amplitudes > MAX_AMPLITUDES
-    {
-        return None;
-    }
-    let (least, largest) = bounds(ratio.distinct())?;
-    let mut ratio = Asked {
-        label: Some("Slip interval τ / T, median"),
-        is_log: largest > WIDE_RATIOS * least,
-        ..ratio
-    };
-    let quartiles = |row: &SetRow| {
-        let period = row.parameters.modulation_period?;
-        Some((row.tau_25? / period, row.tau_75? / period))
-    };
-    ratio.column.values.intervals = rows.iter().map(quartiles).collect();
-    let swept = swept(rows);
-    let chart = Chart {
-        rows,
-        swept: &swept,
-        x,
-        ys: vec![ratio, index],
-        colour: Some(colour),
-        panels: None,
-    };
-    chart.draw("staircase", look).ok()
-}
-
 /// The parameter that a column shows.
 fn parameter(column: &str) -> Option<Symbol> {
     if ["eta", FREQUENCY].contains(&column) {
@@ -381,11 +327,6 @@ impl<'a> Chart<'a> {
         let lines = self.lines(&sets);
         let mut cells: Vec<Panel<'_>> = Vec::new();
         for (y, axis) in ys.iter().zip(y_axes) {
-            let height = if y.name() == RATIO {
-                1.5 * height
-            } else {
-                height
-            };
             for (title, members) in &groups {
                 let layers =
                     self.layers(y, &x_axis, hues.as_ref(), radius, [members, &free], &lines);
@@ -490,13 +431,6 @@ impl<'a> Chart<'a> {
         let place = |set: &usize| x.number(*set).zip(y.number(*set));
         let drive = |set: &usize| x.number(*set).zip(y.drive.as_ref()?.numbers[*set]);
         let level = |set: &usize| {
-            if y.name() == RATIO {
-                let tau = self.rows[*set].tau_50?;
-                let ratios = x_axis
-                    .evenly_placed(200)
-                    .map(|place| (place, tau / x.period(place)));
-                return Some(Layer::Curve(ratios.collect(), REFERENCE));
-            }
             let ink = if hues.is_some() { ink(set) } else { GREY };
             Some(Layer::Level(y.number(*set)?, Stroke { ink, ..REFERENCE }))
         };
@@ -504,9 +438,6 @@ impl<'a> Chart<'a> {
         layers.extend(self.reduction(y).map(|ends| Layer::Stripe(ends, STRIPE)));
         if y.name() == "slip_share" {
             layers.extend(Regime::MIN_SHARES.map(|share| Layer::Level(share, REFERENCE)));
-        }
-        if y.name() == RATIO {
-            layers.extend((1..=MAX_LEVELS).map(|n| Layer::Level(f64::from(n), GRID)));
         }
         layers.extend(free.iter().filter_map(level));
         for line in lines {
@@ -623,9 +554,6 @@ impl<'a> Chart<'a> {
                 Mark::Line(REFERENCE),
                 format!("mixed above {mixed}, sliding above {sliding}"),
             ));
-        }
-        if self.ys.iter().any(|y| y.name() == RATIO) {
-            entries.push(entry(Mark::Line(GRID), "τ = nT; bars: 25 to 75 % of slips"));
         }
         let has_drive = self.ys.iter().any(|y| y.drive.is_some());
         let alone = if has_lines {
@@ -1301,38 +1229,6 @@ pub(super) mod tests {
                 && svg.contains("Share of time")
         );
         assert!(!svg.contains("not shown"));
-    }
-
-    #[test]
-    fn many_periods_and_few_amplitudes_make_a_staircase() {
-        let steps = |amplitude: f64, count: u32| -> Vec<SetRow> {
-            (1..=count)
-                .map(|step| {
-                    set(
-                        amplitude,
-                        0.01 * f64::from(step),
-                        (12.0 / f64::from(step)).ceil(),
-                    )
-                })
-                .collect()
-        };
-        let mut sets = steps(1e-6, 24);
-        let svg = staircase(&sets, &Look::default()).unwrap().svg();
-        assert!(svg.contains(">Period of the modulation T (ms)<") && svg.contains(">Δ = 1 µm<"));
-        assert!(!svg.contains("by the drive alone"));
-        for set in &mut sets {
-            set.locking_index_drive = Some(0.4);
-        }
-        let with = staircase(&sets, &Look::default()).unwrap().svg();
-        assert!(with.contains(">by the drive alone<"));
-        // A mark of few dashes, and a curve of many.
-        assert!(with.matches("<path").count() - svg.matches("<path").count() > 40);
-        sets.push(set(0.0, 0.11, 1.0));
-        let svg = staircase(&sets, &Look::default()).unwrap().svg();
-        assert!(svg.contains(">Δ = 0<") && !with.contains(">Δ = 0<"));
-        assert!(staircase(&steps(1e-6, 23), &Look::default()).is_none());
-        let amplitudes = (1..=4).flat_map(|amplitude| steps(1e-7 * f64::from(amplitude), 24));
-        assert!(staircase(&amplitudes.collect::<Vec<_>>(), &Look::default()).is_none());
     }
 
     #[test]

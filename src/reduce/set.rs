@@ -9,7 +9,6 @@ use super::tongue::Tongue;
 use super::top_of_phases;
 use crate::model::Parameters;
 use crate::model::selected::Selected;
-use crate::model::theory::{finite_resultant, random_load_mean};
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
 pub use crate::sweep::SetRow;
@@ -226,10 +225,6 @@ impl SetSlips {
         let (locking, phases) = (of_intervals.1, of_phases.1);
 
         let phase_interval = phases.direction_interval(top);
-        let expected = (phases.count() > 0).then(|| {
-            let [real, imaginary] = random_load_mean(eta);
-            finite_resultant(real.hypot(imaginary), phases.count())
-        });
         let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| tau.quantile(share));
         let square = |of: &Estimate<1>| {
             let [mean] = of.mean().unwrap_or_default();
@@ -288,7 +283,6 @@ impl SetSlips {
             has_phase: phase_interval.is_some_and(|Interval { low, high }| high - low < WHOLE_TURN),
             resultant_length: phases.resultant_length(),
             length_interval: phases.length_interval(&of_phases.0, unseen(&Tongue::of_phases)),
-            expected_resultant: expected,
             drop_mean: drops.mean().map(mean),
             drop_interval: drops.interval_with(unseen(&|tongue| tongue.of_mean(step(&drops)))),
             drop_deviation,

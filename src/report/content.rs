@@ -25,10 +25,9 @@ const MAX_PARTS: usize = 4_000;
 /// Runs that are listed: the last ones.
 const MAX_RUNS: usize = 50;
 /// Names of figures that are shown, in order.
-const STANDING: [&str; 8] = [
+const STANDING: [&str; 7] = [
     "overview",
     "locking-map",
-    "staircase",
     "regime-map",
     "edges",
     "phi-eta",

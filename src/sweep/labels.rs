@@ -6,7 +6,7 @@ use crate::table::columns::Row;
 use std::collections::HashSet;
 
 /// Column, symbol, and what it is where its meaning does not say so in a few words.
-const LABELS: [(&str, &str, &str); 27] = [
+const LABELS: [(&str, &str, &str); 26] = [
     ("Delta", "Δ", "Amplitude"),
     ("ramp_time", "ramp time", "Duration of the ramp"),
     ("eta", "η", "η = 2πΔ / (T V₀)"),
@@ -43,11 +43,6 @@ const LABELS: [(&str, &str, &str); 27] = [
         "resultant_excess",
         "R, excess",
         "Resultant length beyond the drive's",
-    ),
-    (
-        "expected_resultant",
-        "R, random loads",
-        "Resultant length at random loads",
     ),
     ("drop_mean", "⟨ΔF⟩", ""),
     ("drop_sd", "σ(ΔF)", "S.d. of the stress drop"),

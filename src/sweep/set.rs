@@ -65,8 +65,6 @@ columns! {
             "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control";
         resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds";
         resultant_excess_interval as "resultant_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        expected_resultant: Option<f64> = "",
-            "mean resultant length of as many independent slips at random loads that exceed all before; null without modulation";
         drop_mean: Option<f64> = "N", "mean stress drop";
         drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
@@ -134,14 +132,12 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
     };
     let statistic = |column: &Column| {
         // The ends of an interval have names of their own. What is never missing counts jobs or slips, but for flags;
-        // parameters, and what is expected whatever happens, tell nothing of a set.
+        // parameters tell nothing of a set.
         let Cow::Borrowed(key) = column.name else {
             return None;
         };
         let is_measured = column.nullable || column.kind == Kind::Flag;
-        let is_given = Symbol::from_key(key).is_some()
-            || key.starts_with("expected_")
-            || ["control", "frequency"].contains(&key);
+        let is_given = Symbol::from_key(key).is_some() || ["control", "frequency"].contains(&key);
         let Column { unit, kind, .. } = *column;
         (is_measured && !is_given).then_some(Statistic {
             key,
@@ -202,16 +198,7 @@ mod tests {
         ] {
             assert_eq!(of(class), Some(("", kind, false)), "{class}");
         }
-        for other in [
-            "set_id",
-            "V0",
-            "T",
-            "eta",
-            "jobs",
-            "slips",
-            "tau_mean_low",
-            "expected_resultant",
-        ] {
+        for other in ["set_id", "V0", "T", "eta", "jobs", "slips", "tau_mean_low"] {
             assert_eq!(of(other), None, "{other}");
         }
         assert_eq!(

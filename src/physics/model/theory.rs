@@ -48,43 +48,6 @@ pub fn minimum_phase_asymptote(eta: f64) -> f64 {
     -2.0 * (PI / eta).sqrt()
 }
 
-/// Mean of exp(iφ), as its real and imaginary part, of slips that come at a random load among those that exceed all before:
-/// the null model of locking. The load φ + η cos φ grows with the rate 1 - η sin φ, which so is the density of φ: for
-/// η >= 1 from φ_min to `Φ_max`, where the load exceeds its preceding maximum, and else on the whole circle.
-pub fn random_load_mean(eta: f64) -> [f64; 2] {
-    let Some((low, high)) = minimum_phase(eta).zip(load_maximum_phase(eta)) else {
-        return [0.0, -0.5 * eta];
-    };
-    let between = |integral: &dyn Fn(f64) -> f64| integral(high) - integral(low);
-    let load = between(&|phase| phase + eta * libm::cos(phase));
-    let real = between(&|phase| libm::sin(phase) * (1.0 - 0.5 * eta * libm::sin(phase)));
-    let imaginary =
-        between(&|phase| -libm::cos(phase) - 0.25 * eta * (2.0 * phase - libm::sin(2.0 * phase)));
-    [real / load, imaginary / load]
-}
-
-/// Mean resultant length of `count` independent directions, of which the mean of many has this length: it is longer, as chance
-/// has no direction. That of a vector with a normal error, the same in both directions (Rice, Bell Syst. Tech. J. 24, 46 (1945)).
-pub fn finite_resultant(length: f64, count: u64) -> f64 {
-    /// Where the next term of the expansion is 1/16 of its inverse: some 1e-4 of the difference.
-    const LARGE: f64 = 500.0;
-    const ANGLES: u32 = 128;
-    let variance = (1.0 - length * length).max(0.0) / (2.0 * count as f64);
-    let half = length * length / (4.0 * variance);
-    if half > LARGE || variance == 0.0 {
-        return length + variance / (2.0 * length);
-    }
-    // exp(-half) times the modified Bessel functions I0 and I1.
-    let (mut zeroth, mut first) = (0.0, 0.0);
-    for index in 0..ANGLES {
-        let cosine = libm::cos(TAU * f64::from(index) / f64::from(ANGLES));
-        let weight = libm::exp(half * (cosine - 1.0)) / f64::from(ANGLES);
-        zeroth += weight;
-        first += weight * cosine;
-    }
-    (0.5 * PI * variance).sqrt() * ((1.0 + 2.0 * half) * zeroth + 2.0 * half * first)
-}
-
 /// Total strength `N N_s f_s` of the interface, in N.
 pub fn total_strength(parameters: &Parameters) -> f64 {
     (parameters.blocks * parameters.contacts_per_block) as f64 * parameters.mean_threshold
@@ -111,58 +74,6 @@ pub fn typical_interval(parameters: &Parameters) -> f64 {
 mod tests {
     use super::super::equation::StiffnessMatrix;
     use super::*;
-
-    #[test]
-    fn slips_at_random_loads_have_the_mean_of_their_density() {
-        // Known: 0.581, 0.816 and 0.918.
-        for eta in [0.3, 0.9, 1.18, 2.4, 4.9, 60.0] {
-            let (low, high) = minimum_phase(eta)
-                .zip(load_maximum_phase(eta))
-                .unwrap_or((-PI, PI));
-            let steps = 100_000;
-            let (mut weight, mut sum) = (0.0, [0.0; 2]);
-            for step in 0..steps {
-                let phase = low + (f64::from(step) + 0.5) / f64::from(steps) * (high - low);
-                let density = 1.0 - eta * libm::sin(phase);
-                weight += density;
-                sum = [
-                    sum[0] + density * libm::cos(phase),
-                    sum[1] + density * libm::sin(phase),
-                ];
-            }
-            let [real, imaginary] = random_load_mean(eta);
-            let apart = (real - sum[0] / weight).hypot(imaginary - sum[1] / weight);
-            assert!(apart < 1e-6, "{eta}: {apart:e}");
-        }
-        let length = |eta| {
-            let [real, imaginary] = random_load_mean(eta);
-            real.hypot(imaginary)
-        };
-        for (eta, known) in [(1.18, 0.581), (2.4, 0.816), (4.9, 0.918)] {
-            assert!((length(eta) - known).abs() < 1e-3, "{}", length(eta));
-        }
-    }
-
-    #[test]
-    fn few_directions_have_a_longer_resultant_than_many() {
-        // Without a direction, sqrt(pi/4n).
-        assert!((finite_resultant(0.0, 100) - 0.088_623).abs() < 1e-6);
-        // Known: n = 10, 15, 30 at eta = 0.2.
-        for (count, excess) in [(10, 0.19), (15, 0.14), (30, 0.08)] {
-            assert!(
-                (finite_resultant(0.1, count) - 0.1 - excess).abs() < 0.006,
-                "{count}"
-            );
-        }
-        assert_eq!(
-            (finite_resultant(1.0, 7), finite_resultant(0.5, u64::MAX)),
-            (1.0, 0.5)
-        );
-        // The two forms meet.
-        let [below, above] =
-            [2999, 3001].map(|count: u64| count as f64 * (finite_resultant(0.5, count) - 0.5));
-        assert!((below / above - 1.0).abs() < 2e-3, "{below} {above}");
-    }
 
     #[test]
     fn the_eta_of_a_period_that_an_eta_gave_is_that_eta() {
