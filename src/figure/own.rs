@@ -172,7 +172,9 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
         .is_some()
         .then(|| asked("colour", &colour))
         .transpose()?;
-    let name = format!("{}-{}", y.name(), x.name());
+    // Formulas have letters that no file name should have.
+    let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let name = format!("{}-{}", y.name(), x.name()).replace(|letter| !is_plain(letter), "-");
     let panels = panels.map(|panels| panels.column.values);
     Chart {
         rows,
