@@ -415,7 +415,7 @@ impl Study {
 
     fn recording(&self) -> Recording {
         Recording {
-            slips: self.slips,
+            slips: Some(self.slips),
             discard: DISCARD,
             ..Recording::default()
         }
