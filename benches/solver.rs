@@ -29,7 +29,7 @@ fn run(parameters: &Parameters, solver: Solver, end_time: f64) -> u64 {
     let mut observer = SlipObserver::new(
         parameters,
         &Recording {
-            slips: u64::MAX,
+            slips: Some(u64::MAX),
             ..Recording::default()
         },
     );

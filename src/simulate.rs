@@ -37,14 +37,16 @@ pub enum RequestError {
     TooManySamples { sample: f64, time: f64 },
 }
 
-/// The text of a sweep with one point. Without a number of slips it records 20, or with a longest time all until then.
+/// The text of a sweep with one point. Without a number of slips it records 20, or with a time all until then.
 pub fn sweep_text(changes: &[Change]) -> String {
     let is_given = |key: &str| changes.iter().any(|change| change.key == key);
-    let slips = match (is_given("slips"), is_given("max_time")) {
-        (true, _) => "",
+    let slips = if is_given("slips") || is_given("time") {
+        ""
+    } else if is_given("max_time") {
         // With a time alone, slips do not end the job.
-        (false, true) => "slips = 10000000\n",
-        (false, false) => "slips = 20\n",
+        "slips = 10000000\n"
+    } else {
+        "slips = 20\n"
     };
     let of = |section: &str| {
         let own = changes.iter().filter(|change| change.section == section);
@@ -115,9 +117,7 @@ impl Request {
         } else {
             usize::from(self.trace)
         };
-        let slips = recording.slips as f64 + recording.discard as f64;
-        let time =
-            (slips * typical_interval(parameters)).min(recording.max_time.unwrap_or(f64::INFINITY));
+        let time = recording.expected_time(typical_interval(parameters));
         if time / sample * cells as f64 > MAX_SAMPLES {
             return Err(RequestError::TooManySamples { sample, time });
         }

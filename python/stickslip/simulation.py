@@ -75,7 +75,7 @@ def simulate(
     """Simulates one realisation, given by keys or by a sweep with one job; the same bits as `stickslip simulate`.
 
     `trace`, `map`, `profile` and `contacts` record more than slips; `sample` is the time between samples, in s.
-    Without `slips` it records 20, or with `max_time` alone all until then. Ctrl-C ends it. Other threads of Python run meanwhile.
+    Without `slips` it records 20, or with `time` or `max_time` alone all until then. Ctrl-C ends it. Other threads of Python run meanwhile.
 
     Raises `SweepError` for a key or a value that cannot be, and `SimulationError` if it cannot continue.
 

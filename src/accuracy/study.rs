@@ -347,7 +347,7 @@ impl Study {
 
     fn recording(&self) -> Recording {
         Recording {
-            slips: self.slips,
+            slips: Some(self.slips),
             discard: DISCARD,
             ..Recording::default()
         }

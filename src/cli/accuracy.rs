@@ -6,10 +6,12 @@ use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
 use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, shows_bias, verdict};
 use crate::model::Parameters;
+use crate::model::theory::typical_interval;
 use crate::results::layout::Layout;
 use crate::run::threads::{self, Threads};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
+use crate::table::value::floored;
 use anyhow::{Context, Result};
 use clap::{Args, value_parser};
 use std::num::NonZeroUsize;
@@ -87,13 +89,11 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             &changes,
         )?;
         output::warn(&sweep.warnings());
-        let (sets, jobs): (Vec<_>, Vec<u64>) = sets_of(&sweep)?.into_iter().unzip();
+        let (sets, slips): (Vec<_>, Vec<f64>) = sets_of(&sweep)?.into_iter().unzip();
         study = study.at(sets, sweep.solver());
         if has_file {
-            study.slips_of_sets = jobs
-                .iter()
-                .map(|jobs| jobs * sweep.recording().slips)
-                .collect();
+            let whole = |slips: f64| floored(slips.round()) as u64;
+            study.slips_of_sets = slips.into_iter().map(whole).collect();
             out = Layout::default_root(&sweep);
             out.as_mut_os_string().push("-accuracy");
         }
@@ -129,17 +129,20 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// The sets of a sweep, with seed 0, and the number of jobs of each.
-fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, u64)>> {
-    let mut sets: Vec<(Parameters, u64)> = Vec::new();
+/// The sets of a sweep, with seed 0, and the slips that the jobs of each are expected to record.
+fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, f64)>> {
+    let mut sets: Vec<(Parameters, f64)> = Vec::new();
     for job in sweep.jobs_of_grid() {
+        let slips = sweep
+            .recording()
+            .expected_slips(typical_interval(&job.parameters));
         let set = Parameters {
             seed: 0,
             ..job.parameters
         };
         match sets.iter_mut().find(|(known, _)| *known == set) {
-            Some((_, jobs)) => *jobs += 1,
-            None => sets.push((set, 1)),
+            Some((_, sum)) => *sum += slips,
+            None => sets.push((set, slips)),
         }
         if sets.len() > MAX_SETS {
             let problem = format!(

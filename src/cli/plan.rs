@@ -11,6 +11,7 @@ use crate::run::{Overview, status};
 use crate::sweep::{Bounds, Extension, Plan, Sweep};
 use crate::table::shown::{serialize_path, shown, shown_bytes};
 use crate::table::storage::{Disk, Storage};
+use crate::table::value::floored;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
@@ -122,7 +123,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let threads = threads::or_all_cores(threads.count);
     let wall_time = totals.cost / threads as f64;
     let thread_memory = totals.memory + totals.memory_of_slips;
-    let slips = totals.jobs.saturating_mul(sweep.recording().slips);
+    let slips = floored(totals.slips.round());
     // What all rounds of a sweep that decides for itself may add up to; the other numbers are those of the first.
     let at_most = sweep.bounds();
     let directory = root.map_or(Ok(None), |root| Directory::of(&sweep, root))?;

@@ -484,27 +484,17 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
             "{jobs} of {sets} ended as no further slip came: they slide, or give_up_after is too short{command}"
         ));
     }
-    let recording = sweep.recording();
-    let is_cut = |row: &&SetRow| {
-        row.slips
-            < row
-                .finished_jobs
-                .saturating_sub(row.jobs_without_slips)
-                .saturating_mul(recording.slips)
-    };
-    let cut: Vec<&SetRow> = rows.iter().filter(is_cut).collect();
-    if let Some(time) = recording.max_time.filter(|_| !cut.is_empty()) {
-        let (sets, slips) = (
-            output::count(cut.len() as u64, "set"),
-            cut.iter().map(|row| row.slips).sum::<u64>(),
-        );
-        let wanted = cut
-            .iter()
-            .map(|row| row.finished_jobs)
-            .sum::<u64>()
-            .saturating_mul(recording.slips);
+    let cut: Vec<&SetRow> = rows.iter().filter(|row| row.jobs_cut > 0).collect();
+    if !cut.is_empty() {
+        let off = cut.iter().filter_map(|row| row.tau_off).reduce(f64::min);
+        let off = off.map_or_else(String::new, |off| {
+            format!(", by up to about {:.1} %", -100.0 * off)
+        });
         notes.push(format!(
-            "{sets} with jobs that ended at max_time = {time} s: {slips} of {wanted} slips; a longer one, here, runs them again"
+            "{} of {} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` in place \
+             of max_time ends jobs with a slip",
+            output::count(cut.iter().map(|row| row.jobs_cut).sum(), "job"),
+            output::count(cut.len() as u64, "set"),
         ));
     }
     let has_few_cycles = |row: &&SetRow| {

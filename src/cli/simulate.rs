@@ -51,7 +51,7 @@ struct JobFlags {
     /// Slips to record after start-up [default: that of the file; without one 20, unless --time is given]
     #[arg(long, allow_negative_numbers = true, value_name = "N")]
     slips: Option<String>,
-    /// Model time at which the job ends even without its slips, in s
+    /// Model time at which the job ends even without its slips, in s: `max_time` of [record], where `time` waits for a slip
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     time: Option<String>,
     /// Method [default: event-driven]

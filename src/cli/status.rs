@@ -73,6 +73,14 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             ),
             ("time left", left),
         ];
+        if status.cut.jobs > 0 {
+            let each = status.cut.slips as f64 / status.cut.jobs as f64;
+            let off = format!(
+                "{}, with {each:.1} slips each: tau_mean is too short by about cv^2/{each:.1}, as stickslip show says",
+                status.cut.jobs
+            );
+            pairs.push(("cut by max_time", off));
+        }
         pairs.extend(
             status
                 .rounds

@@ -11,7 +11,7 @@ mod gather;
 mod histogram;
 #[cfg(test)]
 mod pool;
-mod product_limit;
+mod quantile;
 mod reduced;
 mod reduction;
 mod rounds;
@@ -36,7 +36,7 @@ pub use gather::reduce_chosen;
 pub use histogram::HistogramBin;
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
-pub use product_limit::quantile;
+pub use quantile::quantile;
 pub use reduced::{Renewed, advise, read_reduced, read_sets, renew};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};

@@ -28,11 +28,6 @@ pub(super) struct Sequences<const D: usize> {
 }
 
 impl<const D: usize> Sequences<D> {
-    /// From all values, and where jobs begin.
-    pub(super) const fn new(values: Vec<[f64; D]>, starts: Vec<usize>) -> Self {
-        Self { values, starts }
-    }
-
     /// From the values of each job.
     pub(super) fn of<Job: IntoIterator<Item = [f64; D]>>(
         jobs: impl IntoIterator<Item = Job>,

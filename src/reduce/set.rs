@@ -3,7 +3,7 @@
 use super::circular::unit;
 use super::confidence::Unseen;
 use super::gather::JobFacts;
-use super::product_limit::{ProductLimit, quantile};
+use super::quantile::at_rank;
 use super::sequence::{Estimate, Sequences};
 use super::tongue::Tongue;
 use super::top_of_phases;
@@ -39,7 +39,9 @@ pub(super) struct SetJobs {
     pub without_slips: u64,
     /// What the jobs are on average over time, by their seeds.
     pub averages: BTreeMap<u64, JobAverages>,
-    /// Seeds of jobs that ended within an interval, and what was seen of it, in s.
+    /// Jobs that `max_time` ended.
+    pub cut: u64,
+    /// Seeds of jobs that gave up after a slip, and the time since it, in s.
     pub running: Vec<(u64, f64)>,
     /// How the slider moved in the jobs; mixed if they differ.
     pub regime: Option<Regime>,
@@ -64,6 +66,7 @@ impl SetJobs {
         self.finished += 1;
         self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
         self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
+        self.cut += u64::from(job.outcome == JobOutcome::TimeLimit);
         if let (Some(time), Some(friction), Some(slip_share)) =
             (job.averaged_time, job.mean_friction, job.slip_share)
         {
@@ -76,8 +79,12 @@ impl SetJobs {
                 },
             );
         }
+        // Earlier versions have one of jobs that `max_time` ended, too.
+        let running = job
+            .running_interval
+            .filter(|_| job.outcome == JobOutcome::NoSlips);
         self.running
-            .extend(job.running_interval.map(|interval| (seed, interval)));
+            .extend(running.map(|interval| (seed, interval)));
         self.regime = match (self.regime, job.regime) {
             (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
             (regime, other) => other.or(regime),
@@ -109,7 +116,7 @@ struct SlipStats {
     phase: f64,
     /// In N.
     peak_force: f64,
-    /// Stress drop, in N; missing of a slip that is still to come when its job ends.
+    /// Stress drop, in N.
     drop: f64,
 }
 
@@ -128,23 +135,6 @@ impl SlipStats {
             peak_force: slip.peak_force,
             drop: slip.drop,
         }
-    }
-
-    /// Of a slip that would have come after its job ended: what its interval is at least.
-    fn to_come(interval: f64, period: Option<f64>) -> Self {
-        let periods = period.map_or(f64::NAN, |period| interval / period);
-        Self {
-            onset: f64::NAN,
-            interval,
-            periods,
-            phase: f64::NAN,
-            peak_force: f64::NAN,
-            drop: f64::NAN,
-        }
-    }
-
-    const fn is_to_come(&self) -> bool {
-        self.drop.is_nan()
     }
 }
 
@@ -184,23 +174,20 @@ impl SetSlips {
         (!nearest.is_empty()).then(|| nearest.iter().sum::<f64>() / nearest.len() as f64)
     }
 
-    pub(super) fn finish(mut self, jobs: SetJobs) -> FinishedSet {
+    pub(super) fn finish(self, jobs: SetJobs) -> FinishedSet {
         let slips = self.jobs.values().map(|job| job.len() as u64).sum();
-        for &(seed, interval) in &jobs.running {
-            let to_come = SlipStats::to_come(interval, jobs.parameters.modulation_period);
-            self.jobs.entry(seed).or_default().push(to_come);
-        }
         let by_job: Vec<&[SlipStats]> = self.jobs.values().map(Vec::as_slice).collect();
         let eta = jobs.parameters.eta();
         let top = top_of_phases(eta);
-        let tau = Intervals::new(&by_job, |slip| slip.interval);
-        let over_period = Intervals::new(&by_job, |slip| slip.periods);
-        let intervals = tau.estimate(|slip| [slip.interval]);
-        let drops = estimate(&by_job, |slip| non_nan(slip.drop).map(|drop| [drop]));
+        let running = jobs.running.len();
+        let tau = Intervals::new(&by_job, |slip| slip.interval, running);
+        let over_period = Intervals::new(&by_job, |slip| slip.periods, running);
+        let intervals = tau.estimate(|interval| [interval]);
+        let drops = estimate(&by_job, |slip| Some([slip.drop]));
         let whole = |periods: f64| floored(periods.round()) as u64;
         let periods = over_period.quantile(0.5).map(whole);
         let mean = |[mean]: [f64; 1]| mean;
-        let periods_mean = over_period.estimate(|slip| [slip.periods]).mean().map(mean);
+        let periods_mean = over_period.estimate(|periods| [periods]).mean().map(mean);
         let tongue = Tongue::of(&over_period.sorted, periods);
         let unseen = |of: &dyn Fn(&Tongue) -> Unseen| tongue.as_ref().map(of).unwrap_or_default();
         // What a period more changes.
@@ -210,9 +197,7 @@ impl SetSlips {
         };
         // The whole turns go first: they would cost the sine its digits.
         let of_intervals = sequences(&by_job, |slip| {
-            non_nan(slip.periods)
-                .filter(|_| !slip.is_to_come())
-                .map(|periods| unit(TAU * periods.fract()))
+            non_nan(slip.periods).map(|periods| unit(TAU * periods.fract()))
         })
         .centred();
         let tau_mean = intervals.mean().map(mean);
@@ -232,15 +217,24 @@ impl SetSlips {
         };
         let (tau_square, drop_square) = (square(&intervals), square(&drops));
         let (tau_deviation, tau_deviation_interval) = tau
-            .estimate(|slip| tau_square(slip.interval))
+            .estimate(tau_square)
             .deviation(unseen(&|tongue| tongue.of_squares(step(&intervals))));
         let (drop_deviation, drop_deviation_interval) =
-            estimate(&by_job, |slip| non_nan(slip.drop).map(&drop_square))
+            estimate(&by_job, |slip| Some(drop_square(slip.drop)))
                 .deviation(unseen(&|tongue| tongue.of_squares(step(&drops))));
+        let waited = jobs.running.iter().map(|(_, interval)| interval);
+        let at_least = tau.sorted.iter().chain(waited).sum::<f64>();
+        let tau_bound = (running > 0).then(|| at_least / (tau.sorted.len() + running) as f64);
+        let tau_off =
+            tau_deviation
+                .zip(tau_mean)
+                .filter(|_| jobs.cut > 0)
+                .map(|(deviation, mean)| {
+                    let variation = deviation / mean;
+                    -variation * variation * jobs.cut as f64 / tau.sorted.len() as f64
+                });
         let friction = jobs.over_time(|job| job.friction);
-        let peak_forces = estimate(&by_job, |slip| {
-            non_nan(slip.peak_force).map(|force| [force])
-        });
+        let peak_forces = estimate(&by_job, |slip| Some([slip.peak_force]));
         let slip_share = jobs.over_time(|job| job.slip_share);
         let can_lock = periods != Some(0);
         let row = SetRow {
@@ -251,6 +245,7 @@ impl SetSlips {
             finished_jobs: jobs.finished,
             failed_jobs: jobs.failed,
             jobs_without_slips: jobs.without_slips,
+            jobs_cut: jobs.cut,
             regime: jobs.regime,
             slip_share: slip_share.mean().map(mean),
             slip_share_interval: slip_share.interval().map(|ends| Interval {
@@ -264,7 +259,8 @@ impl SetSlips {
             tau_mean,
             tau_interval: intervals
                 .interval_with(unseen(&|tongue| tongue.of_mean(step(&intervals)))),
-            tau_bound: tau.bound(),
+            tau_bound,
+            tau_off,
             tau_deviation,
             tau_deviation_interval,
             tau_05,
@@ -366,74 +362,50 @@ fn estimate<const D: usize>(
 
 /// Intervals between slips, in some unit.
 struct Intervals<'a> {
+    jobs: &'a [&'a [SlipStats]],
     length: fn(&SlipStats) -> f64,
-    of_jobs: Vec<&'a SlipStats>,
-    starts: Vec<usize>,
-    /// Those that have ended.
     sorted: Vec<f64>,
-    /// If some still ran.
-    limit: Option<ProductLimit>,
+    /// Those that still ran when their jobs gave up: all that is known of them is that they are long.
+    running: usize,
 }
 
 impl<'a> Intervals<'a> {
-    fn new(jobs: &[&'a [SlipStats]], length: fn(&SlipStats) -> f64) -> Self {
-        let (mut of_jobs, mut starts): (Vec<&SlipStats>, _) = (Vec::new(), Vec::new());
-        for job in jobs {
-            starts.push(of_jobs.len());
-            of_jobs.extend(job.iter().filter(|slip| !length(slip).is_nan()));
-        }
-        let ended = of_jobs.iter().filter(|slip| !slip.is_to_come());
-        let mut sorted: Vec<f64> = ended.map(|slip| length(slip)).collect();
+    fn new(jobs: &'a [&'a [SlipStats]], length: fn(&SlipStats) -> f64, running: usize) -> Self {
+        let all = jobs.iter().copied().flatten().map(length);
+        let mut sorted: Vec<f64> = all.filter_map(non_nan).collect();
         sorted.sort_by(f64::total_cmp);
-        let all = of_jobs
-            .iter()
-            .map(|slip| (length(slip), !slip.is_to_come()));
-        let limit = (sorted.len() < of_jobs.len()).then(|| ProductLimit::new(all));
         Self {
+            jobs,
             length,
-            of_jobs,
-            starts,
             sorted,
-            limit,
+            running,
         }
     }
 
-    /// The mean of a value over them; none if the longest still ran.
-    fn estimate<const D: usize>(&self, value: impl Fn(&SlipStats) -> [f64; D]) -> Estimate<D> {
-        let values = self.of_jobs.iter().map(|slip| value(slip)).collect();
-        let values = match &self.limit {
-            None => values,
-            Some(limit) if limit.has_mean() => limit.pseudo_values(values),
-            Some(_) => return Estimate::default(),
-        };
-        Sequences::new(values, self.starts.clone()).estimate()
+    /// The mean of a value over them; not known if a job gave up.
+    fn estimate<const D: usize>(&self, value: impl Fn(f64) -> [f64; D]) -> Estimate<D> {
+        if self.running > 0 {
+            return Estimate::default();
+        }
+        estimate(self.jobs, |slip| non_nan((self.length)(slip)).map(&value))
     }
 
+    /// Of all, those that still ran being the longest; none if it is one of them.
     fn quantile(&self, share: f64) -> Option<f64> {
-        match &self.limit {
-            None => quantile(&self.sorted, share),
-            Some(limit) => limit.quantile(share),
-        }
+        let last = (self.sorted.len() + self.running).checked_sub(1)?;
+        at_rank(&self.sorted, share.clamp(0.0, 1.0) * last as f64)
     }
 
     fn median_interval(&self) -> Option<Interval> {
         let median = self.quantile(0.5)?;
         let shares = self
-            .estimate(|slip| [f64::from(u8::from((self.length)(slip) <= median))])
+            .estimate(|length| [f64::from(u8::from(length <= median))])
             .shares_about_median()?;
         let [low, high] = shares.map(|share| self.quantile(share));
         Some(Interval {
             low: low?,
             high: high?,
         })
-    }
-
-    /// What the mean is at least, where it is not known.
-    fn bound(&self) -> Option<f64> {
-        self.limit
-            .as_ref()
-            .filter(|limit| !limit.has_mean())
-            .map(ProductLimit::least_mean)
     }
 }
 
@@ -656,49 +628,58 @@ pub(super) mod tests {
         jobs(0.0, 1.0).parameters
     }
 
-    #[test]
-    fn intervals_that_still_ran_count_as_longer_than_what_was_seen_and_leave_a_bound_if_they_are_the_longest()
-     {
-        let of = |running: &[(u64, f64)]| {
-            let mut set = SetJobs {
-                parameters: jobs_without_modulation(),
-                ..SetJobs::default()
-            };
-            for &(seed, interval) in running {
-                set.push(
-                    seed,
-                    &facts(JobOutcome::TimeLimit, 1.0, 430.0, Some(interval)),
-                );
-            }
-            let slips = [0.1, 0.3, 0.5].map(|interval| slip(Some(interval), None));
-            reduced(set, slips)
+    /// Three slips of a set of jobs that ended otherwise, each with what the job had waited.
+    fn ended(outcome: JobOutcome, waited: &[f64]) -> SetRow {
+        let mut set = SetJobs {
+            parameters: jobs_without_modulation(),
+            ..SetJobs::default()
         };
-        let close = |value: Option<f64>, expected: f64| {
-            assert!((value.unwrap() - expected).abs() < 1e-12, "{value:?}");
-        };
-        let whole = of(&[]);
-        close(whole.tau_mean, 0.3);
-        assert_eq!((whole.tau_bound, whole.slips), (None, 3));
-        // What ran for 0.2 s stands for 0.3 and 0.5 s, in its own job or in one without slips.
-        for seed in [0, 7] {
-            let row = of(&[(seed, 0.2)]);
-            close(row.tau_mean, 0.1 / 4.0 + 0.375 * 0.8);
-            assert_eq!((row.slips, row.intervals, row.tau_bound), (3, 3, None));
-            assert!(row.tau_interval.unwrap().high > whole.tau_mean.unwrap());
-            assert_eq!(row.tau_50, Some(0.3));
-            close(row.drop_mean, whole.drop_mean.unwrap());
+        for (seed, &interval) in (0..).zip(waited) {
+            set.push(seed, &facts(outcome, 1.0, 430.0, Some(interval)));
         }
-        let given_up = of(&[(0, 2.0)]);
+        let slips = [0.1, 0.3, 0.5].map(|interval| slip(Some(interval), None));
+        reduced(set, slips)
+    }
+
+    fn assert_close(value: Option<f64>, expected: f64) {
+        assert!((value.unwrap() - expected).abs() < 1e-12, "{value:?}");
+    }
+
+    #[test]
+    fn where_a_job_gave_up_the_mean_has_a_bound_alone_and_what_still_ran_is_the_longest() {
+        let row = ended(JobOutcome::NoSlips, &[2.0]);
         assert_eq!(
-            (
-                given_up.tau_mean,
-                given_up.tau_interval,
-                given_up.tau_deviation
-            ),
+            (row.tau_mean, row.tau_interval, row.tau_deviation),
             (None, None, None)
         );
-        close(given_up.tau_bound, (0.1 + 0.3 + 0.5 + 2.0) / 4.0);
-        assert_eq!((given_up.tau_50, given_up.tau_95), (Some(0.3), None));
+        assert_close(row.tau_bound, (0.1 + 0.3 + 0.5 + 2.0) / 4.0);
+        assert_close(row.tau_50, 0.4);
+        assert_eq!((row.tau_95, row.median_interval), (None, None));
+        assert_eq!((row.slips, row.intervals, row.tau_off), (3, 3, None));
+        assert_close(
+            row.drop_mean,
+            ended(JobOutcome::Done, &[]).drop_mean.unwrap(),
+        );
+        // Half of the intervals still ran.
+        let half = ended(JobOutcome::NoSlips, &[2.0; 3]);
+        assert_eq!((half.tau_25, half.tau_50), (Some(0.35), None));
+    }
+
+    #[test]
+    fn a_cut_interval_counts_for_nothing_and_the_set_says_how_much_is_missing() {
+        // What earlier versions saw of it is in their tables.
+        let row = ended(JobOutcome::TimeLimit, &[0.2, 0.2]);
+        let whole = ended(JobOutcome::Done, &[]);
+        assert_eq!(
+            (row.tau_mean, row.tau_interval, row.tau_50),
+            (whole.tau_mean, whole.tau_interval, whole.tau_50)
+        );
+        assert_eq!(
+            (row.jobs_cut, row.tau_bound, whole.tau_off),
+            (2, None, None)
+        );
+        // Of three intervals with cv = 0.2/0.3, two jobs lost one each.
+        assert_close(row.tau_off, -(0.04 / 0.09) * 2.0 / 3.0);
     }
 
     proptest! {

@@ -112,12 +112,17 @@ pub(super) struct Census {
     /// By regime; those without a finished job under an empty name.
     regimes: BTreeMap<&'static str, u64>,
     pub slips: u64,
+    jobs_cut: u64,
+    /// The largest share of a mean interval that is missing for them.
+    tau_off: Option<f64>,
 }
 
 columns! {
     struct Counted {
         regime: Option<Regime>;
         slips: u64;
+        jobs_cut: u64;
+        tau_off as "tau_mean_off": Option<f64>;
         is_control as "control": bool;
     }
 }
@@ -133,6 +138,12 @@ impl Census {
             for set in batch?.into_iter().filter(|set| !set.is_control) {
                 census.sets += 1;
                 census.slips += set.slips;
+                census.jobs_cut += set.jobs_cut;
+                census.tau_off = census
+                    .tau_off
+                    .into_iter()
+                    .chain(set.tau_off)
+                    .reduce(f64::min);
                 *census
                     .regimes
                     .entry(set.regime.map_or("", Regime::word))

@@ -156,7 +156,10 @@ impl<'a> Results<'a> {
         differences.extend(found.sweep().differences(sweep));
         let mut way_out = "choose another directory with --out, or undo the change".to_owned();
         let [before, now] = [found.sweep(), sweep].map(|sweep| sweep.recording().slips);
-        if differences.len() == 1 && now > before {
+        if let (Some(before), Some(now)) = (before, now)
+            && differences.len() == 1
+            && now > before
+        {
             way_out = format!(
                 "for more slips add seeds here and keep slips = {before}, or choose another directory with --out; both cost the \
                  same, as no job can go on where it ended"

@@ -14,7 +14,7 @@ use arrow_schema::SchemaRef;
 words! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum JobOutcome {
-        /// It recorded all its slips.
+        /// It recorded its last slip: of `slips`, or at `time`.
         Done = "done",
         TimeLimit = "time limit",
         /// It gave up, since no slip came within `give_up_after`.
@@ -140,7 +140,7 @@ columns! {
     /// What a job measured as a whole, or why it failed.
     #[derive(Clone, Debug, PartialEq)]
     pub struct JobRecord {
-        outcome: JobOutcome = "", "`done`; `time limit`: `max_time` came before the last slip; `no slips`: none came within `give_up_after`; or `failed`";
+        outcome: JobOutcome = "", "`done`; `time limit`: `max_time` came before the end of the last slip; `no slips`: none came within `give_up_after`; or `failed`";
         reason: Option<String> = "", "why it failed; null unless failed";
         slips: Option<u64> = "", "slips recorded; null if failed, as all that follows";
         precursors: Option<u64> = "", "their precursors";
@@ -154,7 +154,7 @@ columns! {
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, by that share";
         simulated_time: Option<f64> = "s", "model time reached";
         running_interval: Option<f64> = "s",
-            "what the interval is at least that had not ended when the job did; null if it ended with its last slip, or before one";
+            "time since the last onset of a job that gave up: its interval is at least as long; null of others, and without a slip";
         steps: Option<u64> = "", "steps of the solver";
         leaps: Option<u64> = "", "of these, leaps over quiet time";
         grid_steps: Option<u64> = "", "of these, steps of the grid; 0 if motion was resolved in Taylor steps";

@@ -4,10 +4,12 @@ use crate::results::deaths::Marked;
 use crate::results::events::RunEvent;
 use crate::results::pending::{Again, Overview, Pending, Retry};
 use crate::results::rounds::RoundsSoFar;
+use crate::results::tables::{JOBS, JobOutcome};
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
 use crate::run::reasons::Reasons;
-use crate::sweep::Outline;
+use crate::sweep::{Extension, Outline};
+use crate::table::columns::columns;
 use serde::Serialize;
 use std::time::SystemTime;
 
@@ -29,6 +31,7 @@ pub struct Status {
     /// The first failed jobs, and all by reason.
     pub failures: Vec<Failure>,
     pub failure_reasons: Reasons,
+    pub cut: Cut,
     /// Parts that are not done and at which workers died.
     pub marked: Vec<Marked>,
     /// How far the rounds are, of a sweep that decides for itself.
@@ -51,6 +54,40 @@ pub struct Failure {
     pub reason: String,
     /// The command that does the same, to look at it alone.
     pub command: String,
+}
+
+columns! {
+    struct Ended {
+        outcome: JobOutcome;
+        slips: Option<u64>;
+    }
+}
+
+/// Jobs that `max_time` ended within an interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Cut {
+    pub jobs: u64,
+    /// Slips that they recorded.
+    pub slips: u64,
+}
+
+impl Cut {
+    fn read(results: &Results<'_>) -> Result<Self, ResultsError> {
+        let mut cut = Self::default();
+        let has_time = |extension: &Extension| extension.sweep.recording().max_time.is_some();
+        if !results.extensions().iter().any(has_time) {
+            return Ok(cut);
+        }
+        for batch in results.dataset(JOBS)?.rows::<Ended>() {
+            for job in batch? {
+                if job.outcome == JobOutcome::TimeLimit {
+                    cut.jobs += 1;
+                    cut.slips += job.slips.unwrap_or(0);
+                }
+            }
+        }
+        Ok(cut)
+    }
 }
 
 /// Of the jobs of parts that are done, those that the sweep which was asked for last does not have.
@@ -123,6 +160,7 @@ pub fn status_with(results: &Results<'_>, max_failures: u64) -> Result<Status, R
             .map(|(pace, threads)| overview.predicted_cost_missing * pace / threads.max(1) as f64),
         failures,
         failure_reasons,
+        cut: Cut::read(results)?,
         marked: pending.marked(),
         rounds: results.rounds_so_far(),
     })

@@ -128,6 +128,17 @@ pub(super) fn whole(
             "where: drops every point; relax it, or extend the axes",
         ));
     };
+    let Recording { time, max_time, .. } = sweep.recording;
+    if let (Some(time), Some(max_time)) = (time, max_time)
+        && max_time <= time
+    {
+        let problem = format!(
+            "time = {}: no job gets there, as max_time = {} ends it before; leave one of them out",
+            Shortest(time),
+            Shortest(max_time)
+        );
+        return Err(file.source.refuse(file.place_of("record"), problem));
+    }
     if sweep.recording.energies
         && matches!(
             sweep.solver,
@@ -197,6 +208,19 @@ impl Sweep {
                 seeds.start()
             )
         });
+        let discard = self.recording.discard;
+        let start_up = points
+            .iter()
+            .map(|point| discard as f64 * typical_interval(&point.parameters))
+            .fold(0.0, f64::max);
+        let early = self.recording.time.filter(|time| *time < start_up);
+        let early = early.map(|time| {
+            format!(
+                "time = {} s: start-up of {discard} slips takes up to some {start_up:.3} s, and a job records one slip after it",
+                Shortest(time)
+            )
+        });
+        let odd = odd.into_iter().chain(early);
         fast.into_iter().chain(odd).chain(few).collect()
     }
 }
@@ -271,14 +295,13 @@ const RESOLUTION: f64 = 1e-3;
 /// A drive so slow that the doubles which hold the time of a job do not resolve its slips.
 fn too_slow(point: &Point, recording: &Recording) -> Option<(Quantity, String)> {
     let parameters = &point.parameters;
-    let slips = recording.slips as f64 + recording.discard as f64;
-    let time = slips * typical_interval(parameters);
+    let time = recording.expected_time(typical_interval(parameters));
     let longest = RESOLUTION * parameters.wave_crossing_time() / f64::EPSILON;
-    if time.min(recording.max_time.unwrap_or(f64::INFINITY)) <= longest {
+    if time <= longest {
         return None;
     }
     let problem = format!(
-        "V0 = {}: {slips} slips take {time:.1e} s, a time that is known to {:.0e} s, too coarse for fronts that cross the \
+        "V0 = {}: a job takes {time:.1e} s, a time that is known to {:.0e} s, too coarse for fronts that cross the \
          slider in {:.0e} s; write V0 = {:.2e} or more, fewer slips, or a max_time",
         Shortest(parameters.drive_velocity),
         time * f64::EPSILON,

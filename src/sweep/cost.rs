@@ -96,7 +96,6 @@ impl Motion {
         let (velocity, reach) = (parameters.drive_velocity, parameters.contact_reach());
         let contacts = (parameters.blocks * parameters.contacts_per_block) as f64;
         let longest = recording.max_time.unwrap_or(f64::INFINITY);
-        let slips = recording.slips as f64 + recording.discard as f64;
         // A slip takes half a swing on the springs and the time in which damping slows it.
         let (mass, damping) = (
             parameters.slider_mass,
@@ -119,11 +118,11 @@ impl Motion {
         let slides = velocity > critical || follows && period < 2.0 * duration + delay;
         if slides || follows {
             let time = if slides {
-                recording.give_up_time(parameters)
+                recording.give_up_time(parameters).min(longest)
             } else {
-                0.5 * slips * period
+                recording.expected_time(0.5 * period)
             };
-            let (time, fastest) = (time.min(longest), velocity.max(4.0 * amplitude / period));
+            let fastest = velocity.max(4.0 * amplitude / period);
             let breaks = contacts * (1.0 + time / (delay + reach / fastest));
             return Self {
                 time,
@@ -132,7 +131,7 @@ impl Motion {
                 steps_of_periods: 0.0,
             };
         }
-        let time = (slips * interval).min(longest);
+        let time = recording.expected_time(interval);
         let (slips, periods) = (time / interval, time / period);
         // In a slip each contact breaks, and again as often as it attaches again on the way.
         let breaks =
@@ -182,7 +181,7 @@ mod tests {
         let parameters = Parameters::default();
         let cost = |slips, max_time| {
             let recording = Recording {
-                slips,
+                slips: Some(slips),
                 discard: 0,
                 max_time,
                 ..Recording::default()
@@ -196,6 +195,25 @@ mod tests {
         let of_slips = |slips| cost(slips, None) - JOB_OVERHEAD;
         assert!((of_slips(20) / of_slips(10) - 2.0).abs() < 1e-9);
         assert!((cost(1_000_000, Some(2.0)) - JOB_OVERHEAD - 2e6 * 108e-9).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_job_that_ends_at_a_time_costs_one_interval_more() {
+        let parameters = Parameters::default();
+        let cost = |slips, time, max_time| {
+            let recording = Recording {
+                slips,
+                time,
+                max_time,
+                ..Recording::default()
+            };
+            predicted_cost(&parameters, &recording, Solver::default())
+        };
+        let interval = typical_interval(&parameters);
+        let of_time = cost(None, Some(3.0), None);
+        let cut = cost(Some(1_000_000), None, Some(3.0 + interval));
+        assert!((of_time / cut - 1.0).abs() < 1e-12, "{of_time} {cut}");
+        assert!(cost(Some(2), Some(3.0), None) < of_time);
     }
 
     /// Measured on one core of a server in 2026, of 15 slips after 5, in ms.
@@ -241,7 +259,7 @@ mod tests {
                     .unwrap();
             }
             let recording = Recording {
-                slips: 15,
+                slips: Some(15),
                 ..Recording::default()
             };
             let predicted = 1e3 * predicted_cost(&parameters, &recording, solver);

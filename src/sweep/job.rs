@@ -56,7 +56,7 @@ impl Sweep {
             .filter(|(symbol, value)| *value != defaults.get(*symbol) && *value != Value::Null);
         words.extend(parameters.map(|(symbol, value)| format!("--set {}={value}", symbol.key())));
         // Its default is another there.
-        words.push(format!("--slips {}", self.recording.slips));
+        words.extend(self.recording.slips.map(|slips| format!("--slips {slips}")));
         // A single job has no control.
         let defaults = Recording {
             slips: self.recording.slips,

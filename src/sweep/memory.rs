@@ -17,9 +17,10 @@ const CERTAIN: f64 = 0.7;
 /// Smaller jobs are not asked whether they fit: of such memory, the program itself takes as much.
 pub const LARGE: f64 = 64e6;
 
-/// What a job takes, rather more than less: slips as many as are wanted, as far as its longest time allows.
+/// What a job takes, rather more than less.
 pub fn predicted_memory(parameters: &Parameters, recording: &Recording) -> f64 {
-    of_interface(parameters) + OF_A_SLIP * most_slips(parameters, recording)
+    let slips = recording.expected_slips(typical_interval(parameters));
+    of_interface(parameters) + OF_A_SLIP * slips
 }
 
 /// What a large job takes at least; nothing of a smaller one.
@@ -35,13 +36,6 @@ pub fn certain_memory(parameters: &Parameters) -> f64 {
 fn of_interface(parameters: &Parameters) -> f64 {
     let blocks = parameters.blocks as f64;
     blocks * (OF_A_BLOCK + OF_A_CONTACT * parameters.contacts_per_block as f64)
-}
-
-pub(super) fn most_slips(parameters: &Parameters, recording: &Recording) -> f64 {
-    let in_time = recording
-        .max_time
-        .map_or(f64::INFINITY, |time| time / typical_interval(parameters));
-    in_time.min(recording.slips as f64)
 }
 
 #[cfg(test)]
@@ -79,7 +73,8 @@ mod tests {
         let parameters = Parameters::default();
         let predicted = |max_time| {
             let recording = Recording {
-                slips: 1_000_000,
+                slips: Some(1_000_000),
+                discard: 0,
                 max_time,
                 ..Recording::default()
             };

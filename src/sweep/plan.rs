@@ -8,8 +8,9 @@
 
 use super::grid::Sweep;
 use super::job::Job;
-use super::memory::{OF_A_SLIP, most_slips, predicted_memory};
+use super::memory::{OF_A_SLIP, predicted_memory};
 use super::rounds::{Round, contains};
+use crate::model::theory::typical_interval;
 use std::ops::{Deref, Range, RangeInclusive};
 
 /// Predicted CPU time of a part, in s, where neither few nor many parts ask for another: little is lost with one.
@@ -86,6 +87,8 @@ impl Deref for Part {
 pub struct Totals {
     pub jobs: u64,
     pub parts: u64,
+    /// Slips that the jobs are expected to record.
+    pub slips: f64,
     /// Predicted CPU time, in s.
     pub cost: f64,
     /// Most memory that a job is predicted to take, in bytes, and the slips of the jobs of a part.
@@ -259,11 +262,13 @@ impl<'a> Plan<'a> {
             let slips = part
                 .jobs
                 .iter()
-                .map(|job| most_slips(&job.parameters, recording));
-            let memory_of_slips = OF_A_SLIP * slips.sum::<f64>();
+                .map(|job| recording.expected_slips(typical_interval(&job.parameters)));
+            let slips: f64 = slips.sum();
+            let memory_of_slips = OF_A_SLIP * slips;
             Totals {
                 jobs: totals.jobs + part.job_count as u64,
                 parts: totals.parts + 1,
+                slips: totals.slips + slips,
                 cost: totals.cost + part.cost,
                 memory: totals.memory.max(part.memory),
                 memory_of_slips: totals.memory_of_slips.max(memory_of_slips),

@@ -271,6 +271,9 @@ fn read_conditions(
 fn read_recording(record: &Section<'_>) -> Result<Recording, Refused> {
     let keys = RecordingKey::ALL.map(RecordingKey::key);
     let mut recording = Recording::default();
+    if record.entry("time").is_some() && record.entry("slips").is_none() {
+        recording.slips = None;
+    }
     all(record.entries().iter().map(|entry| {
         let key =
             RecordingKey::from_key(entry.key).ok_or_else(|| entry.unknown(record.title, &keys))?;

@@ -29,6 +29,7 @@ columns! {
         failed_jobs: u64 = "", "jobs that failed";
         is_control as "control": bool = "", "whether its jobs were run as a control alone (`control = true`), and not for themselves";
         jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
+        jobs_cut: u64 = "", "of the jobs run to an end, those that `max_time` ended: of their last interval nothing counts";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
         slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs";
         slip_share_interval as "slip_share": Option<Interval> = "", "lower end of its 95 % confidence interval, of jobs as units";
@@ -39,7 +40,9 @@ columns! {
         tau_mean: Option<f64> = "s", "mean interval";
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_bound as "tau_mean_bound": Option<f64> = "s",
-            "what tau_mean is at least, if it is null since the longest interval had not ended when its job did";
+            "what tau_mean is at least, if it is null since a job gave up; the time since its last slip counts as an interval";
+        tau_off as "tau_mean_off": Option<f64> = "",
+            "about how much of tau_mean is missing where `max_time` cut intervals: -(tau_sd/tau_mean)^2 over the intervals of such a job; null if it cut none";
         tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals";
         tau_deviation_interval as "tau_sd": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_05: Option<f64> = "s", "5 % quantile of the intervals";

@@ -229,7 +229,7 @@ impl Run {
         wanted: usize,
     ) -> Result<Self, String> {
         let recording = Recording {
-            slips: u64::MAX,
+            slips: Some(u64::MAX),
             discard: 0,
             ..Recording::default()
         };

@@ -9,7 +9,7 @@ use stickslip::solver::Solver;
 /// Slips of four seeds.
 fn slips(parameters: &Parameters, slips: u64, drop_size: Option<f64>) -> Vec<Slip> {
     let recording = Recording {
-        slips,
+        slips: Some(slips),
         drop_size,
         ..Recording::default()
     };

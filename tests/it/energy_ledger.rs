@@ -112,7 +112,7 @@ fn a_ledger_takes_taylor_steps_and_none_is_kept_along_the_grid() {
 #[test]
 fn the_work_of_the_drive_over_many_slips_goes_into_damping_and_broken_contacts() {
     let recording = Recording {
-        slips: 30,
+        slips: Some(30),
         discard: 3,
         energies: true,
         ..Recording::default()
@@ -152,7 +152,7 @@ fn the_work_of_the_drive_over_many_slips_goes_into_damping_and_broken_contacts()
     let measured = measure(
         &Parameters::default(),
         &Recording {
-            slips: 2,
+            slips: Some(2),
             ..Recording::default()
         },
         Solver::default(),

@@ -149,7 +149,7 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
     };
     for parameters in [Parameters::default(), modulated(), slow] {
         let recording = Recording {
-            slips: 8,
+            slips: Some(8),
             discard: 0,
             drop_size: Some(20.0),
             ..Recording::default()

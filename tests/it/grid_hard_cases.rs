@@ -218,7 +218,7 @@ struct Outcome {
 
 fn run(parameters: &Parameters, solver: Solver, end_time: f64) -> Outcome {
     let recording = Recording {
-        slips: u64::MAX,
+        slips: Some(u64::MAX),
         discard: 0,
         ..Recording::default()
     };
@@ -426,7 +426,7 @@ fn a_run_on_the_grid_answers_an_interrupt_within_a_second() {
                     interrupt: Some(&interrupt),
                 };
                 let recording = Recording {
-                    slips: u64::MAX,
+                    slips: Some(u64::MAX),
                     ..Recording::default()
                 };
                 let error = simulate(

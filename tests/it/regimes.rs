@@ -66,7 +66,7 @@ fn stick_slip_is_told_from_intervals_made_of_one_long_slip() {
         let job = measured(
             parameters,
             Recording {
-                slips: 20,
+                slips: Some(20),
                 ..Recording::default()
             },
         );
@@ -109,7 +109,7 @@ fn slips_of_a_few_blocks_let_go_of_most_contacts() {
             ..Parameters::default()
         },
         Recording {
-            slips: 200,
+            slips: Some(200),
             ..Recording::default()
         },
     );
@@ -129,7 +129,7 @@ fn onsets_that_are_cut_off_are_flagged() {
         let job = measured(
             parameters,
             Recording {
-                slips: 60,
+                slips: Some(60),
                 ..Recording::default()
             },
         );
@@ -143,7 +143,7 @@ fn onsets_that_are_cut_off_are_flagged() {
 /// The first slips and every event, from one run.
 fn logged(parameters: &Parameters, solver: Solver) -> (Vec<Slip>, ContactLog, f64) {
     let recording = Recording {
-        slips: 2,
+        slips: Some(2),
         discard: 0,
         ..Recording::default()
     };
@@ -221,7 +221,7 @@ fn one_block_is_its_own_mean() {
         ..Parameters::default()
     };
     let recording = Recording {
-        slips: 1,
+        slips: Some(1),
         discard: 0,
         max_time: Some(0.3),
         ..Recording::default()

@@ -30,7 +30,7 @@ fn sweep(seeds: u32) -> String {
 }
 
 /// What a page holds.
-fn unpacked(page: &str) -> Value {
+pub fn unpacked(page: &str) -> Value {
     let data = page
         .split_once("id=\"data\">")
         .unwrap()
@@ -42,7 +42,7 @@ fn unpacked(page: &str) -> Value {
     serde_json::from_reader(GzDecoder::new(packed.as_slice())).unwrap()
 }
 
-fn page(folder: &Folder, name: &str) -> String {
+pub fn page(folder: &Folder, name: &str) -> String {
     fs::read_to_string(folder.path(name)).unwrap()
 }
 

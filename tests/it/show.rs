@@ -1,6 +1,7 @@
 //! The result of a sweep as `show` and the end of `run` tell it.
 
 use crate::program::{Folder, json};
+use crate::report::{page, unpacked};
 
 const SWEEP: &str = "name = \"small\"\n[model]\nN = 10\nNs = 5\n[axes]\nDelta = [0, 1e-6]\nfrequency = [29, 58]\n\
                      seed = { count = 4 }\n[record]\nslips = 8\n";
@@ -222,6 +223,56 @@ fn sets_of_a_zip_with_seeds_are_in_the_sweep_and_those_that_left_it_are_named() 
         narrowed.contains("no longer in the sweep: 1 set of these: V₀ = 300 µm/s\n"),
         "{narrowed}"
     );
+}
+
+#[test]
+fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_and_report() {
+    let folder = Folder::new();
+    folder.write(
+        "cut.toml",
+        "name = \"cut\"\n[model]\nN = 5\nNs = 5\n[axes]\nseed = { count = 6 }\n[record]\nslips = 400\nmax_time = 0.4\n",
+    );
+    let run = folder.ends(0, "run cut.toml --out out").stdout;
+    let set = &json(&folder.ends(0, "show out --json").stdout)["sets"][0];
+    let number = |column: &str| set[column].as_f64().unwrap();
+    let variation = number("tau_sd") / number("tau_mean");
+    let off = -variation * variation * 6.0 / number("intervals");
+    assert_eq!(number("jobs_cut"), 6.0);
+    assert!((number("tau_mean_off") / off - 1.0).abs() < 1e-12);
+    let percent = format!("by up to about {:.1} %", -100.0 * off);
+    let note = format!(
+        "6 jobs of 1 set cut by max_time within an interval, which counts for nothing: tau_mean is too short, {percent}"
+    );
+    assert!(run.contains(&note), "{run}");
+    let each = format!("{:.1}", number("slips") / 6.0);
+    let status = folder.ends(0, "status out").stdout;
+    assert!(
+        status.contains(&format!(
+            "6, with {each} slips each: tau_mean is too short by about cv^2/{each}"
+        )),
+        "{status}"
+    );
+    let status = json(&folder.ends(0, "status out --json").stdout);
+    assert_eq!(
+        (&status["cut"]["jobs"], status["cut"]["slips"].as_f64()),
+        (&6.into(), Some(number("slips")))
+    );
+    folder.ends(0, "report out");
+    let census = &unpacked(&page(&folder, "out/report.html"))["census"];
+    let shown = census["tau_off"].as_f64().unwrap();
+    assert_eq!(census["jobs_cut"], 6);
+    assert!((shown / off - 1.0).abs() < 1e-12);
+    // Those that end at a time are whole.
+    folder.ends(
+        0,
+        "run cut.toml --set max_time=9 --set slips=4 --set time=0.4 --out whole",
+    );
+    let set = &json(&folder.ends(0, "show whole --json").stdout)["sets"][0];
+    assert_eq!(
+        (set["jobs_cut"].as_u64(), set["tau_mean_off"].as_f64()),
+        (Some(0), None)
+    );
+    assert!(!folder.ends(0, "status whole").stdout.contains("cut by"));
 }
 
 #[test]

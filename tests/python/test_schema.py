@@ -16,6 +16,8 @@ GOOD = [
     'name = "a"\n[axes.sobol]\npoints = 8\nseed = 3\nV0 = { log = [1e-5, 1e-4] }\nKd = { linear = [1e7, 4e7] }\n',
     'name = "a"\n[[axes.sobol]]\npoints = 8\nV0 = { log = [1e-5, 1e-4] }\n[[axes.sobol]]\npoints = 3\nK = { log = [1e7, 1e8] }\n',
     'name = "a"\n[record]\nslips = 7\nprecursors = true\ndrop_size = 0.5\n[solver]\nmethod = "fixed-step"\ndt = 1e-6\n',
+    'name = "a"\n[record]\ntime = 5\n',
+    'name = "a"\n[record]\ntime = 5\nslips = 30\nmax_time = 9.5\n',
     'name = "a"\n[solver]\nresolve = "taylor"\ntolerance = 1e-9\n',
     'name = "a"\n[precision]\nof = ["tau_mean", "drop_mean"]\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',
     'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n'
@@ -40,6 +42,8 @@ BAD = [
     'name = "a"\n[record]\nslips = 0',
     'name = "a"\n[record]\nprecursors = 1',
     'name = "a"\n[record]\nmax_time = -1',
+    'name = "a"\n[record]\ntime = 0',
+    'name = "a"\n[record]\ntime = "5 s"',
     'name = "a"\n[solver]\ntolerance = 1',
     'name = "a"\n[solver]\nmethod = "euler"',
     'name = "a"\n[precision]\nof = "tau_25"\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',

@@ -15,7 +15,7 @@ pub struct Measurements {
     pub ruptures: u64,
     /// Averages over time; `None` if no cycle was whole.
     pub averages: Option<Averages>,
-    /// What the interval that had not ended when the job did is at least, in s; `None` if there is none.
+    /// Time since the last onset when the job gave up, in s; `None` if it did not, or before a slip.
     pub running_interval: Option<f64>,
     /// Whether it ended since no slip came for too long.
     pub has_given_up: bool,

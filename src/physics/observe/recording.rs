@@ -11,7 +11,10 @@ fields! {
     /// What a job records: how many slips, from where, and which tables.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Recording by RecordingKey {
-        Slips("slips") slips: u64 = 40, "", HELD, "Slips to record after start-up; then the job ends";
+        Slips("slips") slips: Option<u64> = Some(40), "", HELD,
+            "Slips to record after start-up; then the job ends. With `time` alone there is no such end";
+        Time("time") time: Option<f64> = None, "s", POSITIVE and "time < max_time",
+            "Model time, counted as onsets are; the first recorded slip with its onset then or later is the last";
         Discard("discard") discard: u64 = 5, "", COUNT_OR_ZERO, "Slips of start-up, not recorded";
         MaxTime("max_time") max_time: Option<f64> = None, "s", POSITIVE,
             "Model time at which a job ends even without its slips; its outcome is then `time limit`, and a longer one in the same directory runs it again";
@@ -47,6 +50,28 @@ impl Recording {
         distance / parameters.drive_velocity
     }
 
+    /// Model time at which a job ends that has slips at this interval, in s: with the last of `slips`, one interval after
+    /// `time`, or at `max_time`.
+    pub fn expected_time(&self, interval: f64) -> f64 {
+        let slips = self.slips.map_or(f64::INFINITY, |slips| slips as f64);
+        ((slips + self.discard as f64) * interval).min(self.time_limit(interval))
+    }
+
+    /// The slips that it then records.
+    pub fn expected_slips(&self, interval: f64) -> f64 {
+        let slips = self.slips.map_or(f64::INFINITY, |slips| slips as f64);
+        let in_time = self.time_limit(interval) / interval - self.discard as f64;
+        in_time.max(0.0).min(slips)
+    }
+
+    /// When it ends in any case; infinite if slips alone end it.
+    fn time_limit(&self, interval: f64) -> f64 {
+        let start_up = self.discard as f64 * interval;
+        let of_time = self.time.map(|time| time.max(start_up) + interval);
+        let ends = [of_time, self.max_time];
+        ends.into_iter().flatten().fold(f64::INFINITY, f64::min)
+    }
+
     /// Names of the columns of slips that are not recorded.
     pub fn left_out(&self) -> Vec<Cow<'static, str>> {
         let energies = (!self.energies).then(Energies::columns);
@@ -64,6 +89,29 @@ impl Recording {
 mod tests {
     use super::*;
     use crate::observe::{Precursor, Slip};
+
+    #[test]
+    fn a_job_is_expected_to_end_with_its_slips_one_interval_after_its_time_or_at_the_longest_time()
+    {
+        let expected = |slips, time, max_time| {
+            let recording = Recording {
+                slips,
+                time,
+                max_time,
+                discard: 5,
+                ..Recording::default()
+            };
+            (recording.expected_slips(0.5), recording.expected_time(0.5))
+        };
+        assert_eq!(expected(Some(40), None, None), (40.0, 22.5));
+        assert_eq!(expected(None, Some(10.0), None), (16.0, 10.5));
+        assert_eq!(expected(Some(3), Some(10.0), None), (3.0, 4.0));
+        assert_eq!(expected(Some(40), None, Some(10.0)), (15.0, 10.0));
+        assert_eq!(expected(None, Some(8.0), Some(10.0)), (12.0, 8.5));
+        // The first slip past start-up is recorded in any case.
+        assert_eq!(expected(None, Some(0.1), None), (1.0, 3.0));
+        assert_eq!(expected(Some(40), None, Some(1.0)), (0.0, 1.0));
+    }
 
     #[test]
     fn slips_and_precursors_take_as_much_memory_as_is_said() {

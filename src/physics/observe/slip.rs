@@ -313,25 +313,20 @@ impl SlipObserver {
         })
     }
 
-    /// What the interval is at least, in s, within which the job ends here, past start-up or as it gives up. The onset of the
-    /// next slip may already have passed, at the largest shear force since the last one; if the job gives up, it has not.
+    /// Time since the last onset, in s, of a job that gives up: what its interval is at least.
     pub fn running_interval(&self) -> Option<f64> {
-        let is_past_start_up = self.slips_seen >= self.recording.discard;
-        let is_whole = self.slips.len() as u64 >= self.recording.slips;
-        let peak = self
-            .rupture
-            .as_ref()
-            .and_then(|active| active.onset)
-            .unwrap_or(self.since_slip);
-        let end = if self.has_given_up {
-            self.now.time
-        } else {
-            peak.time
+        let last = self.last_onset.filter(|_| self.has_given_up)?;
+        Some(self.now.time - last)
+    }
+
+    /// Whether the last slip that was asked for is recorded.
+    fn is_complete(&self) -> bool {
+        let Some(last) = self.slips.last() else {
+            return false;
         };
-        let last = self
-            .last_onset
-            .filter(|_| self.has_given_up || is_past_start_up && !is_whole)?;
-        Some(end - last)
+        let Recording { slips, time, .. } = self.recording;
+        slips.is_some_and(|slips| self.slips.len() as u64 >= slips)
+            || time.is_some_and(|time| last.onset >= time)
     }
 
     /// The present instant with all that is counted, after sliding since the last slip; from the last event on at its rate.
@@ -586,6 +581,6 @@ impl Observer for SlipObserver {
     }
 
     fn is_satisfied(&self) -> bool {
-        self.slips.len() as u64 >= self.recording.slips || self.has_given_up
+        self.is_complete() || self.has_given_up
     }
 }

@@ -357,6 +357,30 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
             &["max_time = -1", "finite number > 0, in s"],
         ),
         (
+            "name = \"a\"\n[record]\ntime = 0",
+            3,
+            &["time = 0", "finite number > 0, in s"],
+        ),
+        (
+            "name = \"a\"\n[record]\ntime = inf",
+            3,
+            &["time = inf", "finite number > 0, in s"],
+        ),
+        (
+            "name = \"a\"\n[record]\ntime = \"5 s\"",
+            3,
+            &["time = \"5 s\"", "finite number > 0, in s"],
+        ),
+        (
+            "name = \"a\"\n[record]\ntime = 3\nmax_time = 3",
+            2,
+            &[
+                "time = 3: no job gets there",
+                "max_time = 3",
+                "leave one of them out",
+            ],
+        ),
+        (
             "name = \"a\"\n[record]\nprecursors = 1",
             3,
             &["precursors = 1", "true or false"],

@@ -47,6 +47,27 @@ fn a_file_with_a_name_alone_is_one_job_of_the_defaults() {
 }
 
 #[test]
+fn a_time_alone_leaves_the_number_of_slips_open() {
+    let ends = |record: &str| {
+        let recording = *sweep(&format!("[record]\n{record}")).recording();
+        (recording.slips, recording.time)
+    };
+    assert_eq!(ends(""), (Some(40), None));
+    assert_eq!(ends("time = 5"), (None, Some(5.0)));
+    assert_eq!(ends("time = 5\nslips = 9"), (Some(9), Some(5.0)));
+    assert_eq!(ends("max_time = 5"), (Some(40), None));
+    let command = |record: &str| {
+        let sweep = sweep(&format!("[record]\n{record}"));
+        sweep.command(&sweep.jobs().next().unwrap())
+    };
+    assert_eq!(command("time = 5"), "stickslip simulate --record time=5");
+    assert_eq!(
+        command("time = 5\nslips = 40"),
+        "stickslip simulate --slips 40 --record time=5"
+    );
+}
+
+#[test]
 fn all_sections_are_read() {
     let sweep = sweep(
         "[model]\nN = 0x14\nK = 2e8\nbreak_on = \"tension\"\nDelta = 1e-6\nT = 1\n\
@@ -63,7 +84,7 @@ fn all_sections_are_read() {
     let recording = sweep.recording();
     assert_eq!(
         (recording.slips, recording.discard, recording.max_time),
-        (7, 0, Some(2.0))
+        (Some(7), 0, Some(2.0))
     );
     assert_eq!(
         (

@@ -232,7 +232,7 @@ impl HardCase {
     ) -> Result<(Summary, Option<f64>), String> {
         let parameters = parameters.map_err(|error| format!("{REFUSED}: {error}"))?;
         let recording = Recording {
-            slips: self.slips,
+            slips: Some(self.slips),
             discard: 0,
             ..Recording::default()
         };

@@ -178,7 +178,7 @@ fn where_a_cycle_gains_less_than_the_tolerance_onsets_are_right_to_a_few_cycles(
     };
     let onsets = |solver| -> Vec<f64> {
         let recording = Recording {
-            slips: 100,
+            slips: Some(100),
             discard: 0,
             ..Recording::default()
         };
@@ -242,7 +242,7 @@ fn no_leap_hides_an_onset_that_is_larger_than_what_comes_before_later_contacts_b
         (1e-3, Resolve::Grid),
     ] {
         let recording = Recording {
-            slips: 40,
+            slips: Some(40),
             discard: 0,
             ..Recording::default()
         };
