@@ -16,10 +16,6 @@ const CONFIDENCE: f64 = 0.95;
 /// Above this resultant length, chance is mostly that of the vectors along their mean.
 const LONG: f64 = 0.5;
 
-/// Of the degrees of freedom of slips in a few jobs, those that the variance of a standard deviation has: squares have
-/// heavy tails. Measured, as all coverage: docs/coverage.md.
-const OF_SQUARES: f64 = 0.25;
-
 /// Events of which none is seen in 5 of 100 repetitions: -ln 0.05.
 const MAX_UNSEEN: f64 = 3.0;
 
@@ -29,6 +25,9 @@ const RARE: f64 = 0.5 * MAX_UNSEEN;
 
 /// Relative error of a mean.
 pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Length of a mean of unit vectors that rounding leaves where they cancel.
+const CANCELLED: f64 = 1e-9;
 
 /// Values of which a standard deviation or a resultant length has an error: of two, both are as far from their mean.
 pub(super) const MIN_VALUES: u64 = 3;
@@ -49,13 +48,18 @@ const fn about(mean: f64, half: f64) -> Interval {
 
 impl Estimate<1> {
     /// Half of the interval of the mean by Student's t; `None` for fewer than two values.
-    fn half(&self, share_of_freedom: f64) -> Option<f64> {
-        Some(student(self.freedom(share_of_freedom)?) * self.variance(&[1.0]).sqrt())
+    fn half(&self) -> Option<f64> {
+        Some(student(self.freedom()?) * self.variance(&[1.0]).sqrt())
     }
 
-    /// The interval of the mean; `None` for fewer than two values.
-    fn about_mean(&self, share_of_freedom: f64, unseen: Unseen) -> Option<Interval> {
-        let ([mean], half) = (self.mean()?, self.half(share_of_freedom)?);
+    /// Of the mean; `None` for fewer than two values.
+    pub(super) fn interval(&self) -> Option<Interval> {
+        self.interval_with(Unseen::default())
+    }
+
+    /// The same where slips may be missing.
+    pub(super) fn interval_with(&self, unseen: Unseen) -> Option<Interval> {
+        let ([mean], half) = (self.mean()?, self.half()?);
         let n = self.count() as f64;
         let [skew] = self.rare.map(|rare| RARE * rare / n);
         let wide = skew.abs() + libm::hypot(half, skew);
@@ -69,16 +73,6 @@ impl Estimate<1> {
         })
     }
 
-    /// Of the mean; `None` for fewer than two values.
-    pub(super) fn interval(&self) -> Option<Interval> {
-        self.interval_with(Unseen::default())
-    }
-
-    /// The same where slips may be missing.
-    pub(super) fn interval_with(&self, unseen: Unseen) -> Option<Interval> {
-        self.about_mean(1.0, unseen)
-    }
-
     /// Standard deviation (n - 1) of the values whose squared deviations from their mean these are, and its interval; `None`
     /// for fewer than two values, and no interval for fewer than [`MIN_VALUES`].
     pub(super) fn deviation(&self, unseen: Unseen) -> (Option<f64>, Option<Interval>) {
@@ -86,7 +80,7 @@ impl Estimate<1> {
         let of_sample = |square: f64| (square.max(0.0) * n / (n - 1.0)).sqrt();
         let square = self.mean().filter(|_| n > 1.0).map(|[square]| square);
         let ends = self
-            .about_mean(OF_SQUARES, unseen)
+            .interval_with(unseen)
             .filter(|_| self.count() >= MIN_VALUES);
         (
             square.map(of_sample),
@@ -98,10 +92,10 @@ impl Estimate<1> {
     }
 
     /// Shares of the values between whose quantiles the median lies, if these are the values' indicators of not exceeding it
-    /// (Woodruff, J. Am. Stat. Assoc. 47, 635 (1952)). The variance of independent indicators is known, so that a few jobs
-    /// cost no degrees of freedom.
+    /// (Woodruff, J. Am. Stat. Assoc. 47, 635 (1952)).
     pub(super) fn shares_about_median(&self) -> Option<[f64; 2]> {
-        let half = self.half(f64::INFINITY)?;
+        // A value more or less is the least that a share can be off.
+        let half = self.half()?.max(1.0 / self.count() as f64);
         Some([0.5 - half, 0.5 + half])
     }
 }
@@ -143,7 +137,7 @@ impl Estimate<2> {
         if self.count() < MIN_VALUES {
             return None;
         }
-        let ((length, along, across), t) = (self.polar()?, student(self.freedom(1.0)?));
+        let ((length, along, across), t) = (self.polar()?, student(self.freedom()?));
         if length > LONG {
             let components = deviations.along(&self.heading()?).estimate();
             let Interval { low, high } = components.interval_with(unseen)?;
@@ -169,7 +163,7 @@ impl Estimate<2> {
     /// short resultants, too (Fieller's interval).
     pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
         let (direction, (length, _, across)) = (self.direction(top)?, self.polar()?);
-        let sine = student(self.freedom(1.0)?) * across.sqrt();
+        let sine = (student(self.freedom()?) * across.sqrt()).max(CANCELLED);
         let half = if sine < length {
             libm::asin(sine / length)
         } else {

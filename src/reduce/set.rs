@@ -254,8 +254,6 @@ impl SetSlips {
             }),
             slips,
             intervals: tau.sorted.len() as u64,
-            effective_slips: phases.effective(),
-            effective_intervals: intervals.effective(),
             tau_mean,
             tau_interval: intervals
                 .interval_with(unseen(&|tongue| tongue.of_mean(step(&intervals)))),
@@ -778,9 +776,6 @@ pub(super) mod tests {
             })
         };
         let row = reduced(jobs(1e-6, 0.01), (0..20).flat_map(of_job));
-        for effective in [row.effective_slips, row.effective_intervals] {
-            assert!((effective.unwrap() - 20.0).abs() < 2.0, "{effective:?}");
-        }
         let (mean, interval) = (row.phase_mean.unwrap(), row.phase_interval.unwrap());
         assert!(interval.low < mean && mean < interval.high);
         assert!(row.tau_interval.unwrap().low < row.tau_mean.unwrap());

@@ -35,8 +35,6 @@ columns! {
         slip_share_interval as "slip_share": Option<Interval> = "", "lower end of its 95 % confidence interval, of jobs as units";
         slips: u64 = "", "slips of all seeds";
         intervals: u64 = "", "intervals between slips";
-        effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
-        effective_intervals: Option<f64> = "", "the same of intervals";
         tau_mean: Option<f64> = "s", "mean interval";
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_bound as "tau_mean_bound": Option<f64> = "s",
@@ -162,7 +160,7 @@ impl Statistic {
     /// values and bounds change with their number, and angles have no order.
     pub fn can_cross(self) -> bool {
         const OTHERS: &[&str] = &["tau_05", "tau_25", "tau_50", "tau_75", "tau_95"];
-        let is_of_sample = ["effective_", "tau_mean_"]
+        let is_of_sample = ["tau_mean_"]
             .iter()
             .any(|begin| self.key.starts_with(begin));
         self.kind == Kind::Real && !self.is_angle() && !is_of_sample && !OTHERS.contains(&self.key)

@@ -49,7 +49,7 @@ BAD = [
     'name = "a"\n[precision]\nof = "tau_25"\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',
     'name = "a"\n[precision]\nof = "tau_mean"\nseeds = { from = 4, to = 64 }\n',
     'name = "a"\n[precision]\nof = "tau_mean"\nrelative = 0.1\nabsolute = 1\nseeds = { from = 4, to = 64 }\n',
-    'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n[refine]\naxis = "V0"\nby = "effective_slips"\nthreshold = 0.1\nto = 0.1\nseeds = { from = 24, to = 48 }\njobs = 99\n',
+    'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n[refine]\naxis = "V0"\nby = "tau_mean_bound"\nthreshold = 0.1\nto = 0.1\nseeds = { from = 24, to = 48 }\njobs = 99\n',
 ]
 
 
