@@ -484,7 +484,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
             "{jobs} of {sets} ended as no further slip came: they slide, or give_up_after is too short{command}"
         ));
     }
-    let cut: Vec<&SetRow> = rows.iter().filter(|row| row.jobs_cut > 0).collect();
+    let cut: Vec<&SetRow> = rows.iter().filter(|row| row.jobs_cut > Some(0)).collect();
     if !cut.is_empty() {
         let off = cut.iter().filter_map(|row| row.tau_off).reduce(f64::min);
         let off = off.map_or_else(String::new, |off| {
@@ -493,7 +493,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         notes.push(format!(
             "{} of {} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` in place \
              of max_time ends jobs with a slip",
-            output::count(cut.iter().map(|row| row.jobs_cut).sum(), "job"),
+            output::count(cut.iter().filter_map(|row| row.jobs_cut).sum(), "job"),
             output::count(cut.len() as u64, "set"),
         ));
     }

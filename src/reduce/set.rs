@@ -245,7 +245,7 @@ impl SetSlips {
             finished_jobs: jobs.finished,
             failed_jobs: jobs.failed,
             jobs_without_slips: jobs.without_slips,
-            jobs_cut: jobs.cut,
+            jobs_cut: Some(jobs.cut),
             regime: jobs.regime,
             slip_share: slip_share.mean().map(mean),
             slip_share_interval: slip_share.interval().map(|ends| Interval {
@@ -674,7 +674,7 @@ pub(super) mod tests {
         );
         assert_eq!(
             (row.jobs_cut, row.tau_bound, whole.tau_off),
-            (2, None, None)
+            (Some(2), None, None)
         );
         // Of three intervals with cv = 0.2/0.3, two jobs lost one each.
         assert_close(row.tau_off, -(0.04 / 0.09) * 2.0 / 3.0);

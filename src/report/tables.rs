@@ -121,7 +121,7 @@ columns! {
     struct Counted {
         regime: Option<Regime>;
         slips: u64;
-        jobs_cut: u64;
+        jobs_cut: Option<u64>;
         tau_off as "tau_mean_off": Option<f64>;
         is_control as "control": bool;
     }
@@ -138,7 +138,7 @@ impl Census {
             for set in batch?.into_iter().filter(|set| !set.is_control) {
                 census.sets += 1;
                 census.slips += set.slips;
-                census.jobs_cut += set.jobs_cut;
+                census.jobs_cut += set.jobs_cut.unwrap_or(0);
                 census.tau_off = census
                     .tau_off
                     .into_iter()

@@ -193,15 +193,15 @@ mod tests {
         let default = Identity::new(Solver::default(), &Recording::default());
         assert_eq!(
             default.job(&Parameters::default()),
-            "bab35d576d47772b9e873ad5feec74a9"
+            "e9a963559e0ee48b531cae83da795678"
         );
         assert_eq!(
             identity().job(&modulated),
-            "c1c5713d6c70a765d8aecf2654bff0c4"
+            "7a8ff4203e733126a2b4e1fc1ddbfce1"
         );
         assert_eq!(
             identity().set(&modulated),
-            "65055c1b1d57b93a6d5536d6da740b90"
+            "e041bd24ab83b579af7fbcd11ab10411"
         );
     }
 
@@ -218,10 +218,10 @@ mod tests {
         assert_eq!(
             (MODEL_VERSION, defaults.join(" ").as_str()),
             (
-                5,
+                6,
                 "N=70 Ns=20 M=11.5 K=1e8 Kd=4e7 ki=5e6 fs=1.37 dfs=0.0069 tau_r=0.005 gamma=6462 \
                 V0=1e-4 Delta=0 T=none T_to=none Delta_to=none ramp_time=0 FN=4000 L=0.15 break_on=magnitude seed=0 \
-                solver.method=event-driven solver.tolerance=0.001 solver.resolve=auto record.slips=40 record.discard=5 \
+                solver.method=event-driven solver.tolerance=0.001 solver.resolve=auto record.slips=40 record.time=none record.discard=5 \
                 record.max_time=none record.max_events=1000000000 record.precursor_size=none record.precursors=false \
                 record.drop_size=none record.energies=false record.control=false record.give_up_after=none"
             )

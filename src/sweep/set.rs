@@ -29,7 +29,7 @@ columns! {
         failed_jobs: u64 = "", "jobs that failed";
         is_control as "control": bool = "", "whether its jobs were run as a control alone (`control = true`), and not for themselves";
         jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
-        jobs_cut: u64 = "", "of the jobs run to an end, those that `max_time` ended: of their last interval nothing counts";
+        jobs_cut: Option<u64> = "", "of the jobs run to an end, those that `max_time` ended: of their last interval nothing counts; null in reduced data of earlier versions";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
         slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs";
         slip_share_interval as "slip_share": Option<Interval> = "", "lower end of its 95 % confidence interval, of jobs as units";
@@ -138,7 +138,8 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
             return None;
         };
         let is_measured = column.nullable || column.kind == Kind::Flag;
-        let is_given = Symbol::from_key(key).is_some() || ["control", "frequency"].contains(&key);
+        let is_given =
+            Symbol::from_key(key).is_some() || ["control", "frequency", "jobs_cut"].contains(&key);
         let Column { unit, kind, .. } = *column;
         (is_measured && !is_given).then_some(Statistic {
             key,

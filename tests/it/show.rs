@@ -233,7 +233,8 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
         "name = \"cut\"\n[model]\nN = 5\nNs = 5\n[axes]\nseed = { count = 6 }\n[record]\nslips = 400\nmax_time = 0.4\n",
     );
     let run = folder.ends(0, "run cut.toml --out out").stdout;
-    let set = &json(&folder.ends(0, "show out --json").stdout)["sets"][0];
+    let columns = "--json --columns tau_mean,tau_sd,intervals,slips,jobs_cut,tau_mean_off";
+    let set = &json(&folder.ends(0, &format!("show out {columns}")).stdout)["sets"][0];
     let number = |column: &str| set[column].as_f64().unwrap();
     let variation = number("tau_sd") / number("tau_mean");
     let off = -variation * variation * 6.0 / number("intervals");
@@ -267,7 +268,7 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
         0,
         "run cut.toml --set max_time=9 --set slips=4 --set time=0.4 --out whole",
     );
-    let set = &json(&folder.ends(0, "show whole --json").stdout)["sets"][0];
+    let set = &json(&folder.ends(0, &format!("show whole {columns}")).stdout)["sets"][0];
     assert_eq!(
         (set["jobs_cut"].as_u64(), set["tau_mean_off"].as_f64()),
         (Some(0), None)

@@ -304,11 +304,11 @@ fn the_mean_interval_has_no_bias_by_where_jobs_end_at_a_time_as_it_has_where_the
     });
     let at_time = mean(Recording {
         slips: None,
-        time: Some(0.4),
+        time: Some(0.22),
         ..Recording::default()
     });
     let cut = mean(Recording {
-        max_time: Some(0.4),
+        max_time: Some(0.22),
         ..Recording::default()
     });
     // Those of the same seeds share most of their intervals: the difference is known to 0.5 %.
