@@ -99,3 +99,58 @@ fn a_control_stays_one_whatever_a_later_sweep_asks_for() {
         1 + 6
     );
 }
+
+#[test]
+fn a_modulation_slower_than_slips_has_phases_over_whole_cycles_and_no_locking_index() {
+    let folder = Folder::new();
+    folder.write(
+        "slow.toml",
+        "name = \"slow\"\n[model]\nN = 5\nNs = 4\nDelta = 1e-6\n[axes]\nT = [0.3, 40]\nseed = { count = 2 }\n\
+         [record]\nslips = 40\ncontrol = true\n",
+    );
+    let run = folder.ends(0, "run slow.toml --out out").stdout;
+    let note = "1 set without a phase: the jobs hold less than two cycles of the modulation";
+    assert!(run.contains(note), "{run}");
+    let sets = folder.file("out/reduced/sets.parquet");
+    assert_eq!(
+        sets.counts("periods"),
+        [0, 0],
+        "slips follow faster than cycles"
+    );
+    for column in [
+        "locking_index",
+        "locking_index_drive",
+        "locking_index_excess",
+    ] {
+        assert!(sets.reals(column).is_empty(), "{column}");
+    }
+    for column in ["resultant_length", "resultant_drive", "resultant_excess"] {
+        assert_eq!(sets.reals(column).len(), 1, "{column}");
+    }
+    // By hand: of each job, the slips within whole cycles from its first one.
+    let slips = folder.table("out", "slips");
+    let real = |cell: &Cell| match cell {
+        Cell::Real(bits) => f64::from_bits(*bits),
+        _ => f64::NAN,
+    };
+    let column = |name: &str| slips.column(name).map(real).collect::<Vec<f64>>();
+    let (periods, onsets, phases) = (column("T"), column("onset"), column("phase"));
+    let seeds = slips.counts("seed");
+    let (mut count, mut sum) = (0.0, [0.0, 0.0]);
+    for seed in [0, 1] {
+        let job: Vec<usize> = (0..seeds.len())
+            .filter(|&row| seeds[row] == seed && periods[row] == 0.3)
+            .collect();
+        let [first, last] = [job[0], job[job.len() - 1]].map(|row| onsets[row]);
+        let cycles = ((last - first) / 0.3).floor();
+        assert!(cycles >= 2.0 && job.len() == 40, "{cycles} cycles");
+        for row in job {
+            if onsets[row] < first + 0.3 * cycles {
+                count += 1.0;
+                sum = [sum[0] + phases[row].cos(), sum[1] + phases[row].sin()];
+            }
+        }
+    }
+    let expected = sum[0].hypot(sum[1]) / count;
+    assert!((sets.reals("resultant_length")[0] - expected).abs() < 1e-12);
+}

@@ -60,9 +60,15 @@ fn directories_of_released_versions_are_shown_drawn_reported_and_exported() {
                 - 1
         };
         assert_eq!((rows("jobs.csv"), rows("slips.csv")), (3, 13));
-        // Reduced by this version.
+        // Reduced by this version, whose intervals and phases have its own definitions.
         fs::remove_dir_all(folder.path("r/reduced")).unwrap();
-        assert_eq!(show(), as_written);
+        let means = |text: &str| -> Vec<Vec<String>> {
+            let cells = text.lines().map(|line| line.split(',').take(3));
+            cells
+                .map(|cells| cells.map(str::to_owned).collect())
+                .collect()
+        };
+        assert_eq!(means(&show()), means(&as_written));
         count += 1;
     }
     assert!(count > 0);
