@@ -6,8 +6,9 @@
 
 use super::circular::unit;
 use super::gather::{Gathering, JobOfSet, MAX_SLIPS, each_job};
-use super::sequence::{Sequences, add};
+use super::sequence::Sequences;
 use super::set::SetRow;
+use super::sum::Sum;
 use super::values::{FREQUENCY, Values};
 use crate::model::{Parameters, Symbol};
 use crate::results::tables::{JOBS, JobOfSlip, JobOutcome, SLIPS};
@@ -25,35 +26,6 @@ columns! {
 
 /// What is compared: columns of the sets.
 const STATISTICS: [&str; 3] = ["tau_mean", "mean_friction", "resultant_length"];
-
-/// A sum of vectors, or of numbers as such, and of their weights.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sum {
-    vector: [f64; 2],
-    weight: f64,
-}
-
-impl Sum {
-    fn push(&mut self, vector: [f64; 2], weight: f64) {
-        add(&mut self.vector, &vector);
-        self.weight += weight;
-    }
-
-    /// What each of these adds to the length of their mean, times their number.
-    fn added(all: &[Self]) -> Vec<f64> {
-        let mut total = Self::default();
-        for sum in all {
-            total.push(sum.vector, sum.weight);
-        }
-        let length = libm::hypot(total.vector[0], total.vector[1]);
-        let [x, y] = total.vector.map(|part| part / length);
-        let of_one = |sum: &Self| {
-            let along = x * sum.vector[0] + y * sum.vector[1];
-            all.len() as f64 * (along - length / total.weight * sum.weight) / total.weight
-        };
-        all.iter().map(of_one).collect()
-    }
-}
 
 /// The jobs of a set.
 struct Set {

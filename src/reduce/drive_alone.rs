@@ -9,6 +9,7 @@ use super::circular::unit;
 use super::confidence::{MIN_VALUES, ROUNDING, Unseen};
 use super::sequence::Sequences;
 use super::set::{Cycles, FinishedSet, OfSet};
+use super::sum::Sum;
 use super::tongue::Tongue;
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
@@ -145,34 +146,40 @@ impl Beyond {
         passages: &BTreeMap<u64, Vec<[f64; 2]>>,
     ) -> Self {
         let [x, y] = seen.1.mean().unwrap_or_default();
-        let vector = |&[from_x, from_y]: &[f64; 2]| [from_x + x, from_y + y];
-        let pairs: Vec<_> = seeds
-            .iter()
-            .zip(seen.0.jobs())
-            .filter_map(|(seed, job)| Some((job.iter().map(vector), passages.get(seed)?)))
-            .collect();
-        if pairs.is_empty() {
-            let alone = Sequences::of(passages.values().map(|job| job.iter().copied())).centred();
-            return Self::of_independent(seen, &alone, unseen);
+        let mut pairs: [Vec<Sum>; 2] = Default::default();
+        for (seed, deviations) in seeds.iter().zip(seen.0.jobs()) {
+            let Some(passage) = passages.get(seed) else {
+                continue;
+            };
+            let [mut seen, mut alone] = [Sum::default(); 2];
+            deviations
+                .iter()
+                .for_each(|[from_x, from_y]| seen.push([from_x + x, from_y + y], 1.0));
+            passage.iter().for_each(|&vector| alone.push(vector, 1.0));
+            pairs[0].push(seen);
+            pairs[1].push(alone);
         }
-        let seen = Sequences::of(pairs.iter().map(|(job, _)| job.clone())).centred();
-        let alone = Sequences::of(pairs.iter().map(|(_, job)| job.iter().copied())).centred();
-        Self::of_pairs(&seen, &alone, unseen)
+        if pairs[0].is_empty() {
+            let alone = Sequences::of(passages.values().map(|job| job.iter().copied())).centred();
+            Self::of_independent(seen, &alone, unseen)
+        } else {
+            Self::of_pairs(&pairs, unseen)
+        }
     }
 
-    /// The interval is that of the jackknife over the pairs, to first order.
-    fn of_pairs(seen: &OfSet, alone: &OfSet, unseen: Unseen) -> Self {
+    /// Of sums of jobs and of their controls.
+    fn of_pairs([seen, alone]: &[Vec<Sum>; 2], unseen: Unseen) -> Self {
         let ends = |excess: f64| {
-            if seen.1.count().min(alone.1.count()) < MIN_VALUES {
+            let slips = [seen, alone].map(|sums| Sum::of_all(sums).weight);
+            if slips[0].min(slips[1]) < MIN_VALUES as f64 {
                 return None;
             }
-            let (seen_by, alone_by) = (Influences::of(seen)?, Influences::of(alone)?);
-            let pairs = seen_by.of_jobs.iter().zip(&alone_by.of_jobs);
+            let added = Sum::added(seen).into_iter().zip(Sum::added(alone));
             let unseen = Unseen {
-                below: unseen.below * seen_by.of_vector,
+                below: unseen.below * seen.len() as f64 / slips[0],
                 above: 0.0,
             };
-            let error = Sequences::independent(pairs.map(|(seen, alone)| [seen - alone]).collect())
+            let error = Sequences::independent(added.map(|(seen, alone)| [seen - alone]).collect())
                 .estimate()
                 .interval_with(unseen)?;
             Some(Interval {
@@ -180,6 +187,7 @@ impl Beyond {
                 high: excess + error.high.max(ROUNDING),
             })
         };
+        let [seen, alone] = [seen, alone].map(|sums| Sum::of_all(sums).length());
         Self::with(seen, alone, ends)
     }
 
@@ -193,41 +201,16 @@ impl Beyond {
                 high: excess + libm::hypot(own.high - seen, alone - of_drive.low),
             })
         };
-        Self::with(seen, alone, ends)
+        Self::with(seen.1.resultant_length(), alone.1.resultant_length(), ends)
     }
 
-    fn with(seen: &OfSet, alone: &OfSet, ends: impl Fn(f64) -> Option<Interval>) -> Self {
-        let alone = alone.1.resultant_length();
-        let excess = seen
-            .1
-            .resultant_length()
-            .zip(alone)
-            .map(|(seen, alone)| seen - alone);
+    fn with(seen: Option<f64>, alone: Option<f64>, ends: impl Fn(f64) -> Option<Interval>) -> Self {
+        let excess = seen.zip(alone).map(|(seen, alone)| seen - alone);
         Self {
             alone,
             excess,
             interval: excess.and_then(ends),
         }
-    }
-}
-
-/// What jobs add to a resultant length, to first order; all together add nothing.
-struct Influences {
-    /// Times the number of jobs.
-    of_jobs: Vec<f64>,
-    /// The same of a vector that shortens the sum by 1.
-    of_vector: f64,
-}
-
-impl Influences {
-    fn of((deviations, mean): &OfSet) -> Option<Self> {
-        let along = deviations.along(&mean.heading()?);
-        let of_vector = along.jobs().count() as f64 / mean.count() as f64;
-        let of_job = |job: &[[f64; 1]]| of_vector * job.iter().map(|[part]| part).sum::<f64>();
-        Some(Self {
-            of_jobs: along.jobs().map(of_job).collect(),
-            of_vector,
-        })
     }
 }
 
@@ -425,8 +408,13 @@ mod tests {
                 seen.push(job(0.3));
                 alone.push(job(0.6));
             }
-            let [seen, alone] = [seen, alone].map(|jobs| Sequences::of(jobs).centred());
-            let found = Beyond::of_pairs(&seen, &alone, Unseen::default());
+            let sum = |vectors: &Vec<[f64; 2]>| {
+                let mut sum = Sum::default();
+                vectors.iter().for_each(|&vector| sum.push(vector, 1.0));
+                sum
+            };
+            let pairs = [seen, alone].map(|jobs| jobs.iter().map(sum).collect());
+            let found = Beyond::of_pairs(&pairs, Unseen::default());
             let length = |spread: f64| libm::exp(-0.5 * (0.09 + spread * spread));
             let excess = length(0.3) - length(0.6);
             found

@@ -18,6 +18,7 @@ mod rounds;
 mod sample;
 mod sequence;
 mod set;
+mod sum;
 mod swept;
 mod tongue;
 mod values;
