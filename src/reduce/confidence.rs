@@ -39,10 +39,9 @@ pub(super) struct Unseen {
     pub(super) above: f64,
 }
 
-const fn about(mean: f64, half: f64) -> Interval {
-    Interval {
-        low: mean - half,
-        high: mean + half,
+impl Unseen {
+    pub(super) const fn below(below: f64) -> Self {
+        Self { below, above: 0.0 }
     }
 }
 
@@ -122,8 +121,8 @@ impl Estimate<2> {
         ))
     }
 
-    /// Of the resultant length R of unit vectors with these deviations from their mean; `None` for fewer than
-    /// [`MIN_VALUES`].
+    /// Of the resultant length R of unit vectors with these deviations from their mean, of which vectors may be missing that
+    /// each take `unseen` from the sum; `None` for fewer than [`MIN_VALUES`].
     ///
     /// Of short ones: the square of the length of a mean has the mean R² + s² + s'² and the variance 4 R² s² + 2 (s⁴ +
     /// s'⁴), with the variances s² along and s'² across. The interval contains every R from which the measured square is
@@ -132,7 +131,7 @@ impl Estimate<2> {
     pub(super) fn length_interval(
         &self,
         deviations: &Sequences<2>,
-        unseen: Unseen,
+        unseen: f64,
     ) -> Option<Interval> {
         if self.count() < MIN_VALUES {
             return None;
@@ -140,7 +139,7 @@ impl Estimate<2> {
         let ((length, along, across), t) = (self.polar()?, student(self.freedom()?));
         if length > LONG {
             let components = deviations.along(&self.heading()?).estimate();
-            let Interval { low, high } = components.interval_with(unseen)?;
+            let Interval { low, high } = components.interval_with(Unseen::below(unseen))?;
             return Some(Interval {
                 low: (length + low.min(-ROUNDING)).max(0.0),
                 high: (length + high.max(ROUNDING)).min(1.0),
@@ -169,7 +168,10 @@ impl Estimate<2> {
         } else {
             PI
         };
-        Some(about(direction, half))
+        Some(Interval {
+            low: direction - half,
+            high: direction + half,
+        })
     }
 }
 
@@ -329,9 +331,7 @@ pub(super) mod tests {
                 Sequences::of(sample.iter().map(|job| job.iter().map(|&angle| [angle]))).estimate();
             let holds = |interval: Interval, truth| interval.low <= truth && truth <= interval.high;
             held[0] += f64::from(u8::from(holds(
-                vectors
-                    .length_interval(&deviations, Unseen::default())
-                    .unwrap(),
+                vectors.length_interval(&deviations, 0.0).unwrap(),
                 resultant,
             )));
             // No direction is near the seam a turn away.

@@ -10,7 +10,7 @@ use super::confidence::{MIN_VALUES, ROUNDING, Unseen};
 use super::sequence::Sequences;
 use super::set::{Cycles, FinishedSet, OfSet};
 use super::sum::Sum;
-use super::tongue::Tongue;
+use super::tongue::{OF_INTERVALS, OF_PHASES};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;
@@ -85,13 +85,9 @@ impl Explained {
         let Some(passages) = &self.passages else {
             return;
         };
-        let unseen = |of: fn(&Tongue) -> Unseen| set.tongue.as_ref().map(of).unwrap_or_default();
+        let unseen = |loss: f64| if set.tongue.is_some() { loss } else { 0.0 };
         let phases = phases_of(passages, set.cycles);
-        let phases = Beyond::of(
-            (&set.seeds, &set.phases),
-            unseen(Tongue::of_phases),
-            &phases,
-        );
+        let phases = Beyond::of((&set.seeds, &set.phases), unseen(OF_PHASES), &phases);
         set.row.resultant_drive = phases.alone;
         set.row.resultant_excess = phases.excess;
         set.row.resultant_excess_interval = phases.interval;
@@ -103,7 +99,7 @@ impl Explained {
             .map(|(&seed, job)| (seed, job.periods.clone()));
         let locking = Beyond::of(
             (&set.seeds, &set.locking),
-            unseen(Tongue::of_intervals),
+            unseen(OF_INTERVALS),
             &periods.collect(),
         );
         set.row.locking_index_drive = locking.alone;
@@ -142,7 +138,7 @@ impl Beyond {
     /// Of the jobs with these seeds and the passages of the same seeds, or of all if there are no such pairs.
     fn of(
         (seeds, seen): (&[u64], &OfSet),
-        unseen: Unseen,
+        unseen: f64,
         passages: &BTreeMap<u64, Vec<[f64; 2]>>,
     ) -> Self {
         let [x, y] = seen.1.mean().unwrap_or_default();
@@ -168,17 +164,14 @@ impl Beyond {
     }
 
     /// Of sums of jobs and of their controls.
-    fn of_pairs([seen, alone]: &[Vec<Sum>; 2], unseen: Unseen) -> Self {
+    fn of_pairs([seen, alone]: &[Vec<Sum>; 2], unseen: f64) -> Self {
         let ends = |excess: f64| {
             let slips = [seen, alone].map(|sums| Sum::of_all(sums).weight);
             if slips[0].min(slips[1]) < MIN_VALUES as f64 {
                 return None;
             }
             let added = Sum::added(seen).into_iter().zip(Sum::added(alone));
-            let unseen = Unseen {
-                below: unseen.below * seen.len() as f64 / slips[0],
-                above: 0.0,
-            };
+            let unseen = Unseen::below(unseen * seen.len() as f64 / slips[0]);
             let error = Sequences::independent(added.map(|(seen, alone)| [seen - alone]).collect())
                 .estimate()
                 .interval_with(unseen)?;
@@ -191,10 +184,10 @@ impl Beyond {
         Self::with(seen, alone, ends)
     }
 
-    fn of_independent(seen: &OfSet, alone: &OfSet, unseen: Unseen) -> Self {
+    fn of_independent(seen: &OfSet, alone: &OfSet, unseen: f64) -> Self {
         let ends = |excess: f64| {
             let own = seen.1.length_interval(&seen.0, unseen)?;
-            let of_drive = alone.1.length_interval(&alone.0, Unseen::default())?;
+            let of_drive = alone.1.length_interval(&alone.0, 0.0)?;
             let (seen, alone) = (seen.1.resultant_length()?, alone.1.resultant_length()?);
             Some(Interval {
                 low: excess - libm::hypot(seen - own.low, of_drive.high - alone),
@@ -350,7 +343,7 @@ mod tests {
         let onsets = [vec![0.1, 0.25, 0.37, 0.52], vec![0.13, 0.24, 0.41, 0.5]];
         let row = explained(1e-6, &onsets, &seeds, &seen);
         let (vectors, mean) = Sequences::of(seen).centred();
-        let own = mean.length_interval(&vectors, Unseen::default()).unwrap();
+        let own = mean.length_interval(&vectors, 0.0).unwrap();
         let excess = row.resultant_excess.unwrap();
         let seen = mean.resultant_length().unwrap();
         assert!((excess - (seen - row.resultant_drive.unwrap())).abs() < 1e-15);
@@ -414,7 +407,7 @@ mod tests {
                 sum
             };
             let pairs = [seen, alone].map(|jobs| jobs.iter().map(sum).collect());
-            let found = Beyond::of_pairs(&pairs, Unseen::default());
+            let found = Beyond::of_pairs(&pairs, 0.0);
             let length = |spread: f64| libm::exp(-0.5 * (0.09 + spread * spread));
             let excess = length(0.3) - length(0.6);
             found

@@ -31,10 +31,7 @@ impl<const D: usize> Sequences<D> {
 
     /// Jobs of one value each: independent values.
     pub(super) fn independent(values: Vec<[f64; D]>) -> Self {
-        Self {
-            starts: (0..values.len()).collect(),
-            values,
-        }
+        Self::of(values.into_iter().map(|value| [value]))
     }
 
     pub(super) fn jobs(&self) -> impl Iterator<Item = &[[f64; D]]> {

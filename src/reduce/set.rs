@@ -5,7 +5,7 @@ use super::confidence::Unseen;
 use super::gather::JobFacts;
 use super::quantile::at_rank;
 use super::sequence::{Estimate, Sequences};
-use super::tongue::Tongue;
+use super::tongue::{OF_INTERVALS, OF_PHASES, Tongue};
 use super::top_of_phases;
 use crate::model::Parameters;
 use crate::model::selected::Selected;
@@ -190,6 +190,7 @@ impl SetSlips {
         let periods_mean = over_period.estimate(|periods| [periods]).mean().map(mean);
         let tongue = Tongue::of(&over_period.sorted, periods);
         let unseen = |of: &dyn Fn(&Tongue) -> Unseen| tongue.as_ref().map(of).unwrap_or_default();
+        let missing = |loss: f64| if tongue.is_some() { loss } else { 0.0 };
         // What a period more changes.
         let step = |of: &Estimate<1>| {
             let ([mean], periods) = of.mean().zip(periods_mean).unwrap_or(([0.0], 1.0));
@@ -225,15 +226,14 @@ impl SetSlips {
         let waited = jobs.running.iter().map(|(_, interval)| interval);
         let at_least = tau.sorted.iter().chain(waited).sum::<f64>();
         let tau_bound = (running > 0).then(|| at_least / (tau.sorted.len() + running) as f64);
-        let tau_off =
-            tau_deviation
-                .zip(tau_mean)
-                .filter(|_| jobs.cut > 0)
-                .map(|(deviation, mean)| {
-                    let variation = deviation / mean;
-                    -variation * variation * jobs.cut as f64 / tau.sorted.len() as f64
-                });
+        let cut_share = jobs.cut as f64 / tau.sorted.len() as f64;
+        let relative = tau_deviation.zip(tau_mean).map(|(sd, mean)| sd / mean);
+        let tau_off = relative
+            .filter(|_| jobs.cut > 0)
+            .map(|relative| -relative * relative * cut_share);
         let friction = jobs.over_time(|job| job.friction);
+        let normal_force = jobs.parameters.normal_force;
+        let coefficient = jobs.over_time(|job| job.friction / normal_force);
         let peak_forces = estimate(&by_job, |slip| Some([slip.peak_force]));
         let slip_share = jobs.over_time(|job| job.slip_share);
         let can_lock = periods != Some(0);
@@ -270,13 +270,13 @@ impl SetSlips {
             periods,
             locking_index: locking.resultant_length().filter(|_| can_lock),
             locking_interval: locking
-                .length_interval(&of_intervals.0, unseen(&Tongue::of_intervals))
+                .length_interval(&of_intervals.0, missing(OF_INTERVALS))
                 .filter(|_| can_lock),
             phase_mean: phases.direction(top),
             phase_interval,
             has_phase: phase_interval.is_some_and(|Interval { low, high }| high - low < WHOLE_TURN),
             resultant_length: phases.resultant_length(),
-            length_interval: phases.length_interval(&of_phases.0, unseen(&Tongue::of_phases)),
+            length_interval: phases.length_interval(&of_phases.0, missing(OF_PHASES)),
             drop_mean: drops.mean().map(mean),
             drop_interval: drops.interval_with(unseen(&|tongue| tongue.of_mean(step(&drops)))),
             drop_deviation,
@@ -285,6 +285,8 @@ impl SetSlips {
             peak_force_interval: peak_forces.interval(),
             mean_friction: friction.mean().map(mean),
             mean_friction_interval: friction.interval(),
+            friction_coefficient: coefficient.mean().map(mean),
+            friction_coefficient_interval: coefficient.interval(),
             // What the drive alone explains: see `drive_alone.rs`.
             ..SetRow::default()
         };

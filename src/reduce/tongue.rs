@@ -9,11 +9,11 @@ use super::confidence::Unseen;
 /// Standard deviation of intervals about whole numbers of periods, in periods, from which jitter alone puts slips off n.
 const MAX_JITTER: f64 = 0.1;
 
-/// What a slip off n takes from the sum of the cosines of phases about their mean.
-const OF_PHASES: f64 = 0.75;
+/// What a slip off n takes from the sum of phases as unit vectors.
+pub(super) const OF_PHASES: f64 = 0.75;
 
-/// The same of the intervals before and after it, as angles.
-const OF_INTERVALS: f64 = 1.4;
+/// The same of the intervals in periods, as angles: those before and after it.
+pub(super) const OF_INTERVALS: f64 = 1.4;
 
 /// Periods that are missing after an interval shorter than n: most are followed by one that is as much longer.
 const OF_SHORTER: f64 = 0.4;
@@ -57,22 +57,6 @@ impl Tongue {
         Unseen {
             below: 0.0,
             above: if self.beyond == 0.0 { step * step } else { 0.0 },
-        }
-    }
-
-    /// Of the phases of slips as unit vectors.
-    pub(super) const fn of_phases(&self) -> Unseen {
-        Unseen {
-            below: OF_PHASES,
-            above: 0.0,
-        }
-    }
-
-    /// Of intervals in periods as unit vectors.
-    pub(super) const fn of_intervals(&self) -> Unseen {
-        Unseen {
-            below: OF_INTERVALS,
-            above: 0.0,
         }
     }
 }

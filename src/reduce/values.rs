@@ -4,35 +4,10 @@ use super::SetRow;
 use super::swept::ascending;
 use crate::model::Symbol;
 use crate::sweep::{Digits, Expression, Label, label, nearest};
-use crate::table::columns::{Column, Interval, Kind, Row, Value, columns};
+use crate::table::columns::{Column, Kind, Row, Value};
 use crate::table::value::floored;
 
 pub const FREQUENCY: &str = "frequency";
-
-columns! {
-    /// What is shown of a set that the table of sets leaves to its parameters.
-    #[derive(Clone, Copy, Debug)]
-    struct Derived {
-        friction_coefficient: Option<f64> = "", "mean_friction over the normal force FN";
-        friction_coefficient_interval as "friction_coefficient": Option<Interval> = "", "lower end of its 95 % confidence interval";
-    }
-}
-
-impl Derived {
-    fn of(row: &SetRow) -> Self {
-        let coefficient = |friction: f64| friction / row.parameters.normal_force;
-        Self {
-            friction_coefficient: row.mean_friction.map(coefficient),
-            friction_coefficient_interval: row.mean_friction_interval.map(|ends| Interval {
-                low: coefficient(ends.low),
-                high: coefficient(ends.high),
-            }),
-        }
-    }
-}
-
-/// What is shown of a set.
-type Shown<'a> = (&'a SetRow, Derived);
 
 /// A column of the sets, or a formula of such.
 #[derive(Clone, Debug)]
@@ -48,7 +23,7 @@ pub struct Values {
 
 /// The columns of the sets that can be shown.
 pub fn set_columns() -> Vec<Column> {
-    Shown::columns()
+    SetRow::columns()
 }
 
 impl Values {
@@ -178,7 +153,7 @@ pub fn sets_where(rows: Vec<SetRow>, condition: &str) -> Result<Vec<SetRow>, Str
 }
 
 fn each_cell(row: &SetRow, mut give: impl FnMut(Value<'_>)) {
-    (row, Derived::of(row)).cells(&mut give);
+    row.cells(&mut give);
 }
 
 /// A value over the columns of a row; what has none is no number.
@@ -226,6 +201,7 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::model::selected::Selected;
+    use crate::table::columns::Interval;
 
     fn rows() -> Vec<SetRow> {
         let row = |period: Option<f64>| SetRow {
@@ -259,10 +235,6 @@ mod tests {
         assert_eq!(
             Values::of(&rows(), FREQUENCY).unwrap().numbers,
             [Some(50.0), None]
-        );
-        assert_eq!(
-            Values::of(&rows(), "friction_coefficient").unwrap().numbers,
-            [Some(0.1), None]
         );
         assert!(
             set_columns()

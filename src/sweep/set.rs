@@ -75,6 +75,8 @@ columns! {
         mean_friction: Option<f64> = "N", "shear force, over the time of all jobs";
         mean_friction_interval as "mean_friction": Option<Interval> = "N",
             "lower end of its 95 % confidence interval, of jobs as units";
+        friction_coefficient: Option<f64> = "", "mean_friction over the normal force FN";
+        friction_coefficient_interval as "friction_coefficient": Option<Interval> = "", "lower end of its 95 % confidence interval";
     }
 }
 
@@ -160,11 +162,9 @@ impl Statistic {
     /// Whether the population has a value of it, with an error that leaving out seeds shows: quantiles jump, numbers of
     /// values and bounds change with their number, and angles have no order.
     pub fn can_cross(self) -> bool {
-        const OTHERS: &[&str] = &["tau_05", "tau_25", "tau_50", "tau_75", "tau_95"];
-        let is_of_sample = ["tau_mean_"]
-            .iter()
-            .any(|begin| self.key.starts_with(begin));
-        self.kind == Kind::Real && !self.is_angle() && !is_of_sample && !OTHERS.contains(&self.key)
+        let is_of_sample =
+            self.key.starts_with("tau_") && !["tau_mean", "tau_sd"].contains(&self.key);
+        self.kind == Kind::Real && !self.is_angle() && !is_of_sample
     }
 
     /// Whether it says what the drive alone explains, or what it does not.
@@ -208,7 +208,7 @@ mod tests {
                 .iter()
                 .filter(|statistic| statistic.has_interval)
                 .count(),
-            13
+            14
         );
     }
 }
