@@ -1,14 +1,16 @@
-//! Pages and tables in `docs/` that follow from the code: the tests hold them against it, and write them with
+//! Pages and tables in `docs/` that follow from the code. The tests compare them with it, and write them with
 //! `UPDATE_DOCS=1`.
 
 use crate::model::{Description, Parameters, Symbol, Value};
-use crate::observe::{Recording, RecordingKey};
+use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, TraceRow};
+use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, RoundOfSet, SetRow};
+use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::table::columns::{Column, Kind, Table};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Asserts that a page has this text.
-pub(crate) fn assert_documented(page: &str, text: &str) {
+fn assert_documented(page: &str, text: &str) {
     if std::env::var_os("UPDATE_DOCS").is_some() {
         std::fs::write(file(page), text).unwrap();
     }
@@ -124,9 +126,36 @@ pub(crate) fn markdown<T: Table>() -> String {
 /// How the meaning of the lower end of an interval begins.
 const LOWER_END: &str = "lower end of";
 
-/// How the pages of tables show units and kinds.
-pub(crate) const UNITS: &str = "Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.\n\
-    A `?` marks columns that may be null.\n";
+/// How the page of tables begins.
+const TABLES: &str = "\
+# Tables
+
+For readers of the data: the columns of every file, in order.
+[results.md](results.md) has the files and how to read them; units and meanings are also in the metadata of each.
+Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.
+A `?` marks columns that may be null.
+
+";
+
+#[test]
+fn documented_tables_are_those_written() {
+    let tables = [
+        markdown::<SlipRow<'_>>(),
+        markdown::<PrecursorRow<'_>>(),
+        markdown::<JobRow>(),
+        markdown::<SetRow>(),
+        markdown::<RoundOfSet>(),
+        markdown::<EdgeRow>(),
+        markdown::<HistogramBin>(),
+        markdown::<BackboneBin>(),
+        markdown::<Point>(),
+        markdown::<TraceRow>(),
+        markdown::<MapRow>(),
+        markdown::<ProfileRow>(),
+        markdown::<ContactRow>(),
+    ];
+    assert_documented("tables.md", &format!("{TABLES}{}", tables.join("\n")));
+}
 
 #[test]
 fn documented_parameters_are_those_of_the_model() {
