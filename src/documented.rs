@@ -74,18 +74,22 @@ fn table(fields: &[(Description, Value)]) -> String {
 }
 
 /// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
-/// share a line, and so do the ends of an interval; a unit with `?` is that of a column that may be null.
+/// share a line, and so do a statistic and its interval; a unit with `?` is that of a column that may be null.
 pub(crate) fn markdown<T: Table>() -> String {
     let is_parameter = |column: &Column| {
         Symbol::from_key(&column.name)
             .is_some_and(|symbol| symbol.description().meaning == column.meaning)
     };
     let share_a_line = |one: &Column, next: &Column| {
+        let is_interval =
+            next.meaning == INTERVAL && next.name.strip_suffix("_low") == Some(&*one.name);
         let is_pair = one
             .name
             .strip_suffix("_low")
             .is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
-        (is_parameter(one) && is_parameter(next)) || (is_pair && one.meaning.starts_with(LOWER_END))
+        (is_parameter(one) && is_parameter(next))
+            || is_interval
+            || (is_pair && one.meaning.starts_with(LOWER_END))
     };
     let line = |columns: &[Column]| {
         let names: Vec<String> = columns
@@ -123,7 +127,10 @@ pub(crate) fn markdown<T: Table>() -> String {
     )
 }
 
-/// How the meaning of the lower end of an interval begins.
+/// The meaning of the lower end of an interval of which there is nothing else to say.
+const INTERVAL: &str = "lower end of its 95 % confidence interval";
+
+/// How the meaning of the lower end of any interval begins.
 const LOWER_END: &str = "lower end of";
 
 /// How the page of tables begins.
@@ -134,6 +141,7 @@ For readers of the data: the columns of every file, in order.
 [results.md](results.md) has the files and how to read them; units and meanings are also in the metadata of each.
 Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.
 A `?` marks columns that may be null.
+Names with `_low` and `_high` are the ends of a 95 % confidence interval.
 
 ";
 
