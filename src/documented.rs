@@ -1,14 +1,16 @@
-//! Pages and tables in `docs/` that follow from the code: the tests hold them against it, and write them with
+//! Pages and tables in `docs/` that follow from the code. The tests compare them with it, and write them with
 //! `UPDATE_DOCS=1`.
 
 use crate::model::{Description, Parameters, Symbol, Value};
-use crate::observe::{Recording, RecordingKey};
+use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, TraceRow};
+use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, RoundOfSet, SetRow};
+use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::table::columns::{Column, Kind, Table};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Asserts that a page has this text.
-pub(crate) fn assert_documented(page: &str, text: &str) {
+fn assert_documented(page: &str, text: &str) {
     if std::env::var_os("UPDATE_DOCS").is_some() {
         std::fs::write(file(page), text).unwrap();
     }
@@ -72,18 +74,22 @@ fn table(fields: &[(Description, Value)]) -> String {
 }
 
 /// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
-/// share a line, and so do the ends of an interval; a unit with `?` is that of a column that may be null.
+/// share a line, and so do a statistic and its interval; a unit with `?` is that of a column that may be null.
 pub(crate) fn markdown<T: Table>() -> String {
     let is_parameter = |column: &Column| {
         Symbol::from_key(&column.name)
             .is_some_and(|symbol| symbol.description().meaning == column.meaning)
     };
     let share_a_line = |one: &Column, next: &Column| {
+        let is_interval =
+            next.meaning == INTERVAL && next.name.strip_suffix("_low") == Some(&*one.name);
         let is_pair = one
             .name
             .strip_suffix("_low")
             .is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
-        (is_parameter(one) && is_parameter(next)) || (is_pair && one.meaning.starts_with(LOWER_END))
+        (is_parameter(one) && is_parameter(next))
+            || is_interval
+            || (is_pair && one.meaning.starts_with(LOWER_END))
     };
     let line = |columns: &[Column]| {
         let names: Vec<String> = columns
@@ -121,12 +127,43 @@ pub(crate) fn markdown<T: Table>() -> String {
     )
 }
 
-/// How the meaning of the lower end of an interval begins.
+/// The meaning of the lower end of an interval of which there is nothing else to say.
+const INTERVAL: &str = "lower end of its 95 % confidence interval";
+
+/// How the meaning of the lower end of any interval begins.
 const LOWER_END: &str = "lower end of";
 
-/// How the pages of tables show units and kinds.
-pub(crate) const UNITS: &str = "Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.\n\
-    A `?` marks columns that may be null.\n";
+/// How the page of tables begins.
+const TABLES: &str = "\
+# Tables
+
+For readers of the data: the columns of every file, in order.
+[results.md](results.md) has the files and how to read them; units and meanings are also in the metadata of each.
+Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.
+A `?` marks columns that may be null.
+Names with `_low` and `_high` are the ends of a 95 % confidence interval.
+
+";
+
+#[test]
+fn documented_tables_are_those_written() {
+    let tables = [
+        markdown::<SlipRow<'_>>(),
+        markdown::<PrecursorRow<'_>>(),
+        markdown::<JobRow>(),
+        markdown::<SetRow>(),
+        markdown::<RoundOfSet>(),
+        markdown::<EdgeRow>(),
+        markdown::<HistogramBin>(),
+        markdown::<BackboneBin>(),
+        markdown::<Point>(),
+        markdown::<TraceRow>(),
+        markdown::<MapRow>(),
+        markdown::<ProfileRow>(),
+        markdown::<ContactRow>(),
+    ];
+    assert_documented("tables.md", &format!("{TABLES}{}", tables.join("\n")));
+}
 
 #[test]
 fn documented_parameters_are_those_of_the_model() {

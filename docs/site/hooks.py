@@ -13,7 +13,7 @@ from markdown.preprocessors import Preprocessor
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[2]
-PICTURES = [*sorted(ROOT.glob("docs/*.png")), *sorted(ROOT.glob("results/*.png"))]
+PICTURES = [*sorted(ROOT.glob("docs/*.svg")), *sorted(ROOT.glob("docs/*.png")), *sorted(ROOT.glob("results/*.png"))]
 LANGUAGES = {".cff": "yaml", ".json": "json", ".py": "python", ".rs": "rust", ".toml": "toml"}
 LINK = re.compile(r"(?<=\]\()(?!https?://)([^)#\s]+)")
 
@@ -81,7 +81,7 @@ def on_files(files, config):
 
 def page(target):
     """The page that shows a file, or a folder."""
-    return target if target.endswith((".md", ".png")) else f"{target}.md"
+    return target if target.endswith((".md", ".png", ".svg")) else f"{target}.md"
 
 
 def shown(path):
@@ -99,7 +99,7 @@ def shown(path):
 def gallery():
     """Every picture with what its sweep file says of it, or else results/README.md, and the command that draws it."""
     sweeps = dict(line.split()[:2] for line in (ROOT / "results" / "pictures.txt").read_text().splitlines())
-    others = re.findall(r"^\| `(\S+\.png)` \| (.+?) \| (.+) \|$", (ROOT / "results" / "README.md").read_text(), re.M)
+    others = re.findall(r"^\| `(\S+\.(?:png|svg))` \| (.+?) \| (.+) \|$", (ROOT / "results" / "README.md").read_text(), re.M)
     others = {picture: about for picture, *about in others}
     text = "# Gallery\n\nEvery picture, and the command that draws it in a clone of the repository.\n\n"
     for picture in PICTURES:

@@ -1,4 +1,4 @@
-"""Reference results for other codes, in tests/reference: ``python -m validation.reference``; docs/reference.md.
+"""Reference results for other codes, in tests/reference: ``python -m validation.reference``; docs/other-programs.md.
 
     make                     computes them, with Taylor steps; takes ten minutes
     entry SOLVER FOLDER      the same tables by a solver of this program, with few and other seeds

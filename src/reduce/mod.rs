@@ -41,6 +41,8 @@ pub use quantile::quantile;
 pub use reduced::{Renewed, advise, read_reduced, read_sets, renew};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
+#[cfg(test)]
+pub(crate) use rounds::RoundOfSet;
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
 pub use swept::{Swept, ascending, differing, has_even_steps, is_same, is_spread, swept};
@@ -55,29 +57,4 @@ fn top_of_phases(eta: f64) -> f64 {
     minimum_phase(eta)
         .zip(load_maximum_phase(eta))
         .map_or(PI, |(low, high)| 0.5 * (low + high + TAU))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::rounds::RoundOfSet;
-    use super::*;
-    use crate::documented::assert_documented;
-    use crate::documented::{UNITS, markdown};
-
-    #[test]
-    fn documented_reduced_tables_are_those_written() {
-        let tables = [
-            markdown::<SetRow>(),
-            markdown::<RoundOfSet>(),
-            markdown::<EdgeRow>(),
-            markdown::<HistogramBin>(),
-            markdown::<BackboneBin>(),
-            markdown::<Point>(),
-        ];
-        let text = format!(
-            "# Reduced tables\n\n[How they follow from the tables](results.md#reduced-data) of a sweep.\n{UNITS}\n{}",
-            tables.join("\n")
-        );
-        assert_documented("reduced-tables.md", &text);
-    }
 }

@@ -208,9 +208,6 @@ columns! {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::documented::assert_documented;
-    use crate::documented::{UNITS, markdown};
-    use crate::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
     use crate::table::columns::Row;
     use std::collections::HashSet;
 
@@ -241,23 +238,5 @@ pub(crate) mod tests {
             let names: HashSet<&str> = columns.iter().map(|column| column.name.as_ref()).collect();
             assert_eq!(names.len(), columns.len(), "{columns:?}");
         }
-    }
-
-    #[test]
-    fn documented_tables_are_those_written() {
-        let tables = [
-            markdown::<SlipRow<'_>>(),
-            markdown::<PrecursorRow<'_>>(),
-            markdown::<JobRow>(),
-            markdown::<TraceRow>(),
-            markdown::<MapRow>(),
-            markdown::<ProfileRow>(),
-            markdown::<ContactRow>(),
-        ];
-        let text = format!(
-            "# Tables\n\nThe columns of every file of a table, in order; units and meanings are also in its metadata.\n{UNITS}\n{}",
-            tables.join("\n")
-        );
-        assert_documented("tables.md", &text);
     }
 }

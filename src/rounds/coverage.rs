@@ -133,7 +133,7 @@ fn without_the_least_number_of_seeds_they_would_not() {
     assert!(worst < 91.5, "{worst}");
 }
 
-/// The first table of coverage in `docs/rounds.md`: run with `--ignored --nocapture`.
+/// Coverage with a minimum number of seeds, which `docs/rounds.md` sums up: run with `--ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn coverage_by_the_least_number_of_seeds_is_measured() {

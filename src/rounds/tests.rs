@@ -215,7 +215,7 @@ fn plain_bisection(
     )
 }
 
-/// The table of coverage of edges in `docs/rounds.md`: run with `--ignored --nocapture`.
+/// Coverage of edges, which `docs/rounds.md` sums up: run with `--ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn coverage_of_edges_is_measured() {

@@ -11,7 +11,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from conftest import ROOT
 
-PICTURES = [*ROOT.glob("results/*.png"), *ROOT.glob("docs/*.png")]
+PICTURES = [*ROOT.glob("results/*.png"), *ROOT.glob("docs/*.png"), *ROOT.glob("docs/*.svg")]
 LOADED = {"img": "src", "link": "href", "script": "src"}
 
 
@@ -114,7 +114,7 @@ def test_every_picture_stands_in_the_gallery_with_the_command_that_draws_it(brow
     for picture, item in gallery.items():
         assert item["width"] > 300, picture
         script, _, name = item["commands"][0].partition(" ")
-        assert script in ("scripts/reproduce", "stickslip"), picture
+        assert script in ("scripts/reproduce", "scripts/sketch", "stickslip"), picture
         if script == "scripts/reproduce":
             assert (ROOT / "sweeps" / f"{name}.toml").exists(), picture
             drawn = re.search(rf'\[{name}\]="([^"]+)"', reproduce)

@@ -63,7 +63,8 @@ def test_the_tutorial_runs_as_written(program, tmp_path):
     environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
     duckdb = "import duckdb, sys; rows = duckdb.sql(sys.argv[1]).fetchall(); assert len(rows) == 3, rows"
     shells = {"sh": ["bash", "-euc"], "python": [sys.executable, "-c"], "sql": [sys.executable, "-c", duckdb]}
-    blocks = re.findall(r"^```(\w+)\n(.*?)^```", (ROOT / "docs" / "tutorial.md").read_text(), re.M | re.S)
+    tutorial = (ROOT / "docs" / "guide.md").read_text().partition("\n## Write a sweep\n")[0]
+    blocks = re.findall(r"^```(\w+)\n(.*?)^```", tutorial, re.M | re.S)
     assert {language for language, _ in blocks} == {"toml", "text", *shells}
     printed = ""
     for language, block in blocks:

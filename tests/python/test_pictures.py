@@ -6,6 +6,7 @@ scripts/reproduce wrote it down in results/pictures.txt, and where their results
 
 import hashlib
 import shutil
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -91,3 +92,8 @@ def test_results_that_are_there_give_their_pictures_again(stickslip, tmp_path, s
     stickslip("plot", tmp_path, *OWN.get(sweep, "").split())
     for picture in pictures_of(sweep):
         picture.assert_drawn(tmp_path)
+
+
+def test_the_sketch_is_what_its_script_draws(tmp_path):
+    subprocess.run([ROOT / "scripts" / "sketch", tmp_path / "slider.svg"], check=True)
+    assert (tmp_path / "slider.svg").read_bytes() == (ROOT / "docs" / "slider.svg").read_bytes(), "run scripts/sketch"

@@ -223,25 +223,13 @@ def test_the_document_holds_every_section_and_no_number_is_missing():
         assert (ROOT / "docs" / picture).exists(), picture
 
 
-def test_the_readme_counts_the_verdicts():
+def test_each_verdict_is_of_one_kind():
     verdicts = PAGE.read_text().split("\n## ")[0]
     rows = re.findall(r"^\| (\d+)\. [^|]*\| ([^|]*) \|", verdicts, re.M)
-    kinds = {
-        "hold": ("holds",),
-        "hold in part": ("holds in part", "holds for"),
-        "holds, but follows from kinematics": ("holds; ",),
-        "restates another": ("restates",),
-    }
-    counts = {
-        said: sum(word == "holds" if said == "hold" else word.startswith(words) for _, word in rows)
-        for said, words in kinds.items()
-    }
-    assert sum(counts.values()) == len(rows), "each verdict is of one kind"
-    numbers = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
-    readme = (ROOT / "README.md").read_text()
-    assert f"| of {numbers[len(rows)]} |" in readme
-    for said, count in counts.items():
-        assert f"| {numbers[count]} | {said} |" in readme, f"{numbers[count]} ... {said}"
+    kinds = (r"holds", r"holds in part.*", r"holds for .*", r"holds; .*", r"restates .*")
+    assert len(rows) == 12
+    for number, verdict in rows:
+        assert sum(bool(re.fullmatch(kind, verdict)) for kind in kinds) == 1, f"{number}: {verdict}"
 
 
 def test_sentences_begin_on_lines_of_their_own_and_long_ones_are_wrapped():
