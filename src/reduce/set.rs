@@ -184,8 +184,7 @@ impl SetSlips {
         let over_period = Intervals::new(&by_job, |slip| slip.periods, running);
         let intervals = tau.estimate(|interval| [interval]);
         let drops = estimate(&by_job, |slip| Some([slip.drop]));
-        let whole = |periods: f64| floored(periods.round()) as u64;
-        let periods = over_period.quantile(0.5).map(whole);
+        let periods = over_period.quantile(0.5).map(|n| floored(n.round()) as u64);
         let mean = |[mean]: [f64; 1]| mean;
         let periods_mean = over_period.estimate(|periods| [periods]).mean().map(mean);
         let tongue = Tongue::of(&over_period.sorted, periods);
@@ -232,8 +231,7 @@ impl SetSlips {
             .filter(|_| jobs.cut > 0)
             .map(|relative| -relative * relative * cut_share);
         let friction = jobs.over_time(|job| job.friction);
-        let normal_force = jobs.parameters.normal_force;
-        let coefficient = jobs.over_time(|job| job.friction / normal_force);
+        let coefficient = jobs.over_time(|job| job.friction / jobs.parameters.normal_force);
         let peak_forces = estimate(&by_job, |slip| Some([slip.peak_force]));
         let slip_share = jobs.over_time(|job| job.slip_share);
         let can_lock = periods != Some(0);

@@ -38,7 +38,7 @@ impl Values {
         let (mut numbers, mut intervals, mut given) = (Vec::new(), Vec::new(), Vec::new());
         for row in rows {
             let (mut cells, mut word) = (Vec::new(), None);
-            each_cell(row, |cell| {
+            row.cells(&mut |cell| {
                 if cells.len() == column {
                     word = match cell {
                         Value::Flag(flag) => Some(if flag { "yes" } else { "no" }.to_owned()),
@@ -152,14 +152,10 @@ pub fn sets_where(rows: Vec<SetRow>, condition: &str) -> Result<Vec<SetRow>, Str
         .collect())
 }
 
-fn each_cell(row: &SetRow, mut give: impl FnMut(Value<'_>)) {
-    row.cells(&mut give);
-}
-
 /// A value over the columns of a row; what has none is no number.
 fn evaluate(expression: &Expression<usize>, row: &SetRow) -> f64 {
     let mut cells = Vec::new();
-    each_cell(row, |cell| cells.push(cell.number().unwrap_or(f64::NAN)));
+    row.cells(&mut |cell| cells.push(cell.number().unwrap_or(f64::NAN)));
     expression.evaluate(&|&column| cells[column])
 }
 

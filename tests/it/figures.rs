@@ -17,7 +17,7 @@ fn each_sweep_gets_the_figures_that_fit_it() {
         ),
         (
             "Delta = [0, 1e-6]\nfrequency = { linear = [20, 400], points = 24 }",
-            &["overview", "tau-histograms"],
+            &["overview"],
         ),
         (
             "Delta = { linear = [0, 2e-6], points = 8 }\nfrequency = { linear = [20, 400], points = 7 }",
