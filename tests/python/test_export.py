@@ -45,10 +45,11 @@ def rows(table):
 
 
 def expected(results, name):
-    """A table in the order of its parts, with the frequency as people write it, and Kd, which only the jobs have."""
+    """A table in the order of its parts, with the frequency as people write it, Kd, which only the jobs have, and no control."""
     table, jobs = (pd.read_parquet(results / "tables" / folder) for folder in (name, "jobs"))
     assert table["frequency"].dropna().tolist() == [float(f"{1 / period:.12g}") for period in table["T"].dropna()]
-    return table if name == "jobs" else table.join(jobs.set_index("job_id")["Kd"], on="job_id")
+    table = table if name == "jobs" else table.join(jobs.set_index("job_id")["Kd"], on="job_id")
+    return table.assign(control=False)
 
 
 @pytest.mark.parametrize("reader", READERS)

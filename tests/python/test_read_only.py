@@ -40,7 +40,7 @@ def reader(program):
 def test_results_are_reduced_elsewhere_where_nothing_can_be_written(reader):
     run, folder = reader
     done = run("show", "r")
-    assert done.returncode == 0 and done.stdout.count("   12   ") == 2, done.stdout + done.stderr
+    assert done.returncode == 0 and done.stdout.count(" 12  ") == 2, done.stdout + done.stderr
     for command in (("plot", "r", "--x", "V0", "--y", "tau_mean", "-o", "own/a.png"), ("report", "r", "-o", "own/r.html")):
         done = run(*command)
         assert done.returncode == 0, done.stderr
