@@ -148,10 +148,12 @@ impl Beyond {
                 continue;
             };
             let [mut seen, mut alone] = [Sum::default(); 2];
-            deviations
-                .iter()
-                .for_each(|[from_x, from_y]| seen.push([from_x + x, from_y + y], 1.0));
-            passage.iter().for_each(|&vector| alone.push(vector, 1.0));
+            for [from_x, from_y] in deviations {
+                seen.push([from_x + x, from_y + y], 1.0);
+            }
+            for &vector in passage {
+                alone.push(vector, 1.0);
+            }
             pairs[0].push(seen);
             pairs[1].push(alone);
         }
@@ -403,7 +405,9 @@ mod tests {
             }
             let sum = |vectors: &Vec<[f64; 2]>| {
                 let mut sum = Sum::default();
-                vectors.iter().for_each(|&vector| sum.push(vector, 1.0));
+                for &vector in vectors {
+                    sum.push(vector, 1.0);
+                }
                 sum
             };
             let pairs = [seen, alone].map(|jobs| jobs.iter().map(sum).collect());
