@@ -46,12 +46,18 @@ fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
             folder.contents("mine")
         );
     }
-    // The same seed without modulation: the bias of a solver is against other seeds, and has an interval.
+    // Biases are against other seeds. Where one realisation slides, another alone has no error.
+    let mut known = 0;
     for row in printed["biases"].as_array().unwrap() {
-        let [low, bias, high] =
-            ["mean_bias_low", "mean_bias", "mean_bias_high"].map(|key| row[key].as_f64().unwrap());
-        assert!(low <= bias && bias <= high, "{row}");
+        let ends = ["mean_bias_low", "mean_bias", "mean_bias_high"].map(|key| row[key].as_f64());
+        if let [Some(low), Some(bias), Some(high)] = ends {
+            assert!(low <= bias && bias <= high, "{row}");
+            known += 1;
+        } else {
+            assert!(row["freedom"].is_null(), "{row}");
+        }
     }
+    assert!(known > 50, "{known}");
 }
 
 #[test]
