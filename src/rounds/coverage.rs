@@ -344,7 +344,7 @@ fn of_backbone(pool: &Pool) -> [f64; 2] {
 fn described(parameters: &Parameters, row: &SetRow) -> String {
     let number = |key: &str| row.number(key).map_or("none".into(), |n| format!("{n:.2}"));
     format!(
-        "N = {}, N_s = {}, V0 = {:e} m/s, Δ = {:.2} µm, {:.1} Hz: η = {:.2}, n = {}, R = {}, locking index = {}",
+        "N = {}, N_s = {}, V0 = {:e} m/s, Δ = {:.2} µm, {:.1} Hz:\nη = {:.2}, n = {}, R = {}, locking index = {}",
         parameters.blocks,
         parameters.contacts_per_block,
         parameters.drive_velocity,
