@@ -179,7 +179,8 @@ mod tests {
     #[test]
     fn intervals_hold_both_biases_in_95_of_100_studies() {
         const STUDIES: u64 = 1000;
-        let (mut means, mut deviations) = (0, 0);
+        let mut means = 0;
+        let mut deviations = 0;
         for study in 0..STUDIES {
             let bias = Bias::of(
                 &realisations(8, 1.2, 0.1, 2 * study),

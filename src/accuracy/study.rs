@@ -475,7 +475,8 @@ fn bias_rows(
         Sample::of(&values.collect::<Vec<_>>())
     };
     let row = |(quantity, value): Quantity| {
-        let (found, reference) = (sample(slips, value)?, sample(reference, value)?);
+        let found = sample(slips, value)?;
+        let reference = sample(reference, value)?;
         Some(BiasRow {
             parameters: Selected::new(parameters.clone()),
             case: set_in_words(parameters),

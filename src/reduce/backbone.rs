@@ -253,7 +253,8 @@ mod tests {
             let seeds = (0..8 * copies).zip(jobs.iter().cycle());
             seeds.map(|(seed, job)| (seed, job.as_slice())).collect()
         };
-        let (eight, more) = (bin(&sets(1)), bin(&sets(4)));
+        let eight = bin(&sets(1));
+        let more = bin(&sets(4));
         // Half as wide, and less with more degrees of freedom.
         let ratio = width(&more) / width(&eight);
         assert!((0.485..0.5).contains(&ratio), "{ratio}");

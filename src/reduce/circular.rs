@@ -8,6 +8,16 @@ pub(super) fn unit(angle: f64) -> [f64; 2] {
     [libm::cos(angle), libm::sin(angle)]
 }
 
+/// The unit vector along a vector; any, if that has no length.
+pub(super) fn heading([x, y]: [f64; 2]) -> [f64; 2] {
+    let length = libm::hypot(x, y);
+    if length > 0.0 {
+        [x / length, y / length]
+    } else {
+        [1.0, 0.0]
+    }
+}
+
 impl Estimate<2> {
     /// Resultant length |<exp(iφ)>| of unit vectors, 0 to 1; `None` without any.
     pub(super) fn resultant_length(&self) -> Option<f64> {

@@ -5,6 +5,7 @@
 //! rare events; and slips of a kind that none of those seen is of, of which there may be [`MAX_UNSEEN`]. Errors on one side are
 //! put together by their squares (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693 (2008)).
 
+use super::circular::heading;
 use super::sequence::{Estimate, Sequences};
 use crate::model::standard_normal_quantile;
 use crate::table::columns::Interval;
@@ -19,8 +20,8 @@ const LONG: f64 = 0.5;
 /// Events of which none is seen in 5 of 100 repetitions: -ln 0.05.
 const MAX_UNSEEN: f64 = 3.0;
 
-/// How far a count of rare events k lies from the middle √((1.96² k) + a²) of its interval: so k = 0 ends at [`MAX_UNSEEN`], and
-/// the others where the binomial distribution (mid-P) does, to 5 %.
+/// The interval of a count k of rare events is k + a ± √(1.96² k + a²) with this a: that of the Poisson distribution (mid-P) to
+/// 0.07 events, and [`MAX_UNSEEN`] at k = 0.
 const RARE: f64 = 0.5 * MAX_UNSEEN;
 
 /// Relative error of a mean.
@@ -58,7 +59,8 @@ impl Estimate<1> {
 
     /// The same where slips may be missing.
     pub(super) fn interval_with(&self, unseen: Unseen) -> Option<Interval> {
-        let ([mean], half) = (self.mean()?, self.half()?);
+        let [mean] = self.mean()?;
+        let half = self.half()?;
         let n = self.count() as f64;
         let [skew] = self.rare.map(|rare| RARE * rare / n);
         let wide = skew.abs() + libm::hypot(half, skew);
@@ -100,20 +102,9 @@ impl Estimate<1> {
 }
 
 impl Estimate<2> {
-    /// The unit vector along the mean.
-    pub(super) fn heading(&self) -> Option<[f64; 2]> {
-        let [x, y] = self.mean()?;
-        let length = libm::hypot(x, y);
-        Some(if length > 0.0 {
-            [x / length, y / length]
-        } else {
-            [1.0, 0.0]
-        })
-    }
-
     /// The length of the mean, and its variances along the mean and across it.
     fn polar(&self) -> Option<(f64, f64, f64)> {
-        let [x, y] = self.heading()?;
+        let [x, y] = heading(self.mean()?);
         Some((
             self.resultant_length()?,
             self.variance(&[x, y]),
@@ -136,9 +127,10 @@ impl Estimate<2> {
         if self.count() < MIN_VALUES {
             return None;
         }
-        let ((length, along, across), t) = (self.polar()?, student(self.freedom()?));
+        let (length, along, across) = self.polar()?;
+        let t = student(self.freedom()?);
         if length > LONG {
-            let components = deviations.along(&self.heading()?).estimate();
+            let components = deviations.along(&heading(self.mean()?)).estimate();
             let Interval { low, high } = components.interval_with(Unseen::below(unseen))?;
             return Some(Interval {
                 low: (length + low.min(-ROUNDING)).max(0.0),
@@ -161,7 +153,8 @@ impl Estimate<2> {
     /// Analysis of Circular Data (1993), Sec. 4.4.4), whose (1 - ρ_2)/2 is the variance across the mean; valid for
     /// short resultants, too (Fieller's interval).
     pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
-        let (direction, (length, _, across)) = (self.direction(top)?, self.polar()?);
+        let direction = self.direction(top)?;
+        let (length, _, across) = self.polar()?;
         let sine = (student(self.freedom()?) * across.sqrt()).max(CANCELLED);
         let half = if sine < length {
             libm::asin(sine / length)
@@ -299,6 +292,27 @@ pub(super) mod tests {
             );
         }
         assert!(student(1.5) < student(1.0) && student(1.5) > student(2.0));
+    }
+
+    /// Ends of mid-P intervals of the Poisson distribution, from its probabilities.
+    #[test]
+    fn counts_of_rare_events_have_the_intervals_of_the_poisson_distribution() {
+        let exact = [
+            (0.0, 0.0, 3.00),
+            (1.0, 0.05, 4.93),
+            (2.0, 0.34, 6.61),
+            (5.0, 1.83, 11.08),
+            (10.0, 5.08, 17.82),
+            (30.0, 20.61, 42.29),
+        ];
+        for (count, low, high) in exact {
+            let half = libm::hypot(student(1e9) * f64::sqrt(count), RARE);
+            let ends = [count + RARE - half, count + RARE + half];
+            assert!(
+                (ends[0] - low).abs() < 0.07 && (ends[1] - high).abs() < 0.07,
+                "{count}: {ends:?}"
+            );
+        }
     }
 
     /// How often of 100 the intervals of length, direction and plain mean hold the true values, over repetitions of

@@ -3,8 +3,8 @@
 //! Jobs of a set are independent, slips of a job are not. The variance of a mean of n values is that of the sums of jobs,
 //! which are independent whatever the correlation within them: n values in m jobs with the sums S_j of the deviations from the
 //! mean have m/(m-1) Σ_j S_j²/n² with m - 1 degrees of freedom. It is the jackknife over jobs of any function of means, to
-//! first order. Of fewer than [`MIN_STRETCHES`] jobs, each is cut into equal stretches that count as jobs (batch means): slips
-//! remember one or two of those before, and a stretch is longer.
+//! first order. Of fewer than [`MIN_STRETCHES`] jobs, each is cut into equal stretches that count as jobs (batch means). What
+//! that costs where stretches are no longer than the memory of slips is in docs/coverage.md.
 
 /// Stretches of slips whose sums make a variance, at least: it is then known to 27 %.
 const MIN_STRETCHES: usize = 8;

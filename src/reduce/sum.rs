@@ -1,5 +1,6 @@
 //! Sums of a job, and what each job adds to the length of their mean: the jackknife over jobs, to first order.
 
+use super::circular::heading;
 use super::sequence::add;
 
 /// A sum of vectors, or of numbers as such, and of their weights.
@@ -33,7 +34,7 @@ impl Sum {
     pub(super) fn added(sums: &[Self]) -> Vec<f64> {
         let total = Self::of_all(sums);
         let length = libm::hypot(total.vector[0], total.vector[1]);
-        let [x, y] = total.vector.map(|part| part / length);
+        let [x, y] = heading(total.vector);
         let of_one = |sum: &Self| {
             let along = x * sum.vector[0] + y * sum.vector[1];
             sums.len() as f64 * (along - length / total.weight * sum.weight) / total.weight
