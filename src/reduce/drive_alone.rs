@@ -85,9 +85,12 @@ impl Explained {
         let Some(passages) = &self.passages else {
             return;
         };
-        let unseen = |loss: f64| if set.tongue.is_some() { loss } else { 0.0 };
         let phases = phases_of(passages, set.cycles);
-        let phases = Beyond::of((&set.seeds, &set.phases), unseen(OF_PHASES), &phases);
+        let phases = Beyond::of(
+            (&set.seeds, &set.phases),
+            set.tongue.map_or(0.0, |_| OF_PHASES),
+            &phases,
+        );
         set.row.resultant_drive = phases.alone;
         set.row.resultant_excess = phases.excess;
         set.row.resultant_excess_interval = phases.interval;
@@ -99,7 +102,7 @@ impl Explained {
             .map(|(&seed, job)| (seed, job.periods.clone()));
         let locking = Beyond::of(
             (&set.seeds, &set.locking),
-            unseen(OF_INTERVALS),
+            set.tongue.map_or(0.0, |_| OF_INTERVALS),
             &periods.collect(),
         );
         set.row.locking_index_drive = locking.alone;

@@ -189,12 +189,13 @@ impl SetSlips {
         let periods_mean = over_period.estimate(|periods| [periods]).mean().map(mean);
         let tongue = Tongue::of(&over_period.sorted, periods);
         let unseen = |of: &dyn Fn(&Tongue) -> Unseen| tongue.as_ref().map(of).unwrap_or_default();
-        let missing = |loss: f64| if tongue.is_some() { loss } else { 0.0 };
         // What a period more changes.
         let step = |of: &Estimate<1>| {
             let ([mean], periods) = of.mean().zip(periods_mean).unwrap_or(([0.0], 1.0));
             mean / periods
         };
+        // A longer interval ends at a force that is higher by what it drops more.
+        let unseen_forces = unseen(&|tongue| tongue.of_mean(step(&drops)));
         // The whole turns go first: they would cost the sine its digits.
         let of_intervals = sequences(&by_job, |slip| {
             non_nan(slip.periods).map(|periods| unit(TAU * periods.fract()))
@@ -268,19 +269,20 @@ impl SetSlips {
             periods,
             locking_index: locking.resultant_length().filter(|_| can_lock),
             locking_interval: locking
-                .length_interval(&of_intervals.0, missing(OF_INTERVALS))
+                .length_interval(&of_intervals.0, tongue.map_or(0.0, |_| OF_INTERVALS))
                 .filter(|_| can_lock),
             phase_mean: phases.direction(top),
             phase_interval,
             has_phase: phase_interval.is_some_and(|Interval { low, high }| high - low < WHOLE_TURN),
             resultant_length: phases.resultant_length(),
-            length_interval: phases.length_interval(&of_phases.0, missing(OF_PHASES)),
+            length_interval: phases
+                .length_interval(&of_phases.0, tongue.map_or(0.0, |_| OF_PHASES)),
             drop_mean: drops.mean().map(mean),
-            drop_interval: drops.interval_with(unseen(&|tongue| tongue.of_mean(step(&drops)))),
+            drop_interval: drops.interval_with(unseen_forces),
             drop_deviation,
             drop_deviation_interval,
             peak_force_mean: peak_forces.mean().map(mean),
-            peak_force_interval: peak_forces.interval(),
+            peak_force_interval: peak_forces.interval_with(unseen_forces),
             mean_friction: friction.mean().map(mean),
             mean_friction_interval: friction.interval(),
             friction_coefficient: coefficient.mean().map(mean),
