@@ -172,6 +172,8 @@ const SLIPS_BY_RULE: usize = 15;
 const MAX_JOBS: u64 = 256;
 /// Jobs from which coverage and width are promised.
 const MANY: usize = 8;
+/// Coverage that 2,000 repetitions find of a true one of 91 %, at least, in %.
+const MIN_COVERAGE: f64 = 89.5;
 /// The pools that `scripts/coverage` makes.
 const POOLS: [&str; 5] = ["locking", "deep", "short", "slow", "loose"];
 
@@ -340,30 +342,137 @@ fn of_backbone(pool: &Pool) -> [f64; 2] {
     held.map(|held| 100.0 * f64::from(held) / repetitions as f64)
 }
 
-/// What a set is, and how much it is locked.
-fn described(parameters: &Parameters, row: &SetRow) -> String {
-    let number = |key: &str| row.number(key).map_or("none".into(), |n| format!("{n:.2}"));
-    format!(
-        "N = {}, N_s = {}, V0 = {:e} m/s, Δ = {:.2} µm, {:.1} Hz:\nη = {:.2}, n = {}, R = {}, locking index = {}",
-        parameters.blocks,
-        parameters.contacts_per_block,
-        parameters.drive_velocity,
-        1e6 * parameters.modulation_amplitude,
-        parameters.frequency().unwrap_or_default(),
-        parameters.eta(),
-        row.periods.unwrap_or_default(),
-        number("resultant_length"),
-        number("locking_index"),
-    )
+/// A cell with where it stands.
+struct Measured {
+    set: usize,
+    statistic: &'static str,
+    truth: f64,
+    column: usize,
+    cell: Cell,
 }
 
-/// The value at a share of the sorted values.
-fn quantile_of(mut values: Vec<f64>, share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    quantile(&values, share).unwrap_or(f64::NAN)
+impl Measured {
+    /// Whether it has as many jobs as are promised to do.
+    fn is_of_many(&self) -> bool {
+        SIZES.get(self.column).is_none_or(|&(jobs, _)| jobs >= MANY)
+    }
+
+    fn is_by_rule(&self) -> bool {
+        self.column >= SIZES.len()
+    }
 }
 
-/// `docs/coverage.md`: run by `scripts/coverage`.
+/// Coverage and half-widths of some cells: least, middle and greatest.
+struct Summary {
+    count: usize,
+    coverage: [f64; 3],
+    width: [f64; 3],
+}
+
+impl Summary {
+    fn of<'a>(cells: impl Iterator<Item = &'a Measured>) -> Self {
+        let cells: Vec<Cell> = cells.map(|measured| measured.cell).collect();
+        let quantiles = |of: fn(&Cell) -> f64| {
+            let mut values: Vec<f64> = cells.iter().map(of).collect();
+            values.sort_by(f64::total_cmp);
+            [0.0, 0.5, 1.0].map(|share| quantile(&values, share).unwrap_or(f64::NAN))
+        };
+        Self {
+            count: cells.len(),
+            coverage: quantiles(|cell| cell.coverage),
+            width: quantiles(|cell| cell.width),
+        }
+    }
+}
+
+/// A line for each statistic: the coverage and half-width of its cells with many jobs, and with few.
+fn by_statistic(cells: &[Measured], statistics: &[Statistic]) -> String {
+    let mut lines = vec![
+        "| statistic | cells | least | median | half-width | widest | few jobs: least | median | half-width |"
+            .to_owned(),
+        "|---|---|---|---|---|---|---|---|---|".to_owned(),
+    ];
+    for statistic in statistics {
+        let own = || cells.iter().filter(|cell| cell.statistic == statistic.key);
+        let many = Summary::of(own().filter(|cell| cell.is_of_many()));
+        let few = Summary::of(own().filter(|cell| !cell.is_of_many()));
+        let [least, median, _] = many.coverage;
+        let [_, width, widest] = many.width;
+        let [few_least, few_median, _] = few.coverage;
+        let [_, few_width, _] = few.width;
+        lines.push(format!(
+            "| `{}` | {} | {least:.1} | {median:.1} | {width:.2} | {widest:.2} | {few_least:.1} | {few_median:.1} | {few_width:.2} |",
+            statistic.key, many.count,
+        ));
+    }
+    lines.join("\n")
+}
+
+/// A line for each set: what it is, how much it is locked, and the coverage of its cells with many jobs.
+fn by_set(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
+    let mut lines = vec![
+        "| N | N_s | V0 (m/s) | Δ (µm) | f (Hz) | η | n | R | locking index | least | median | by the rule: least |"
+            .to_owned(),
+        "|---|---|---|---|---|---|---|---|---|---|---|---|".to_owned(),
+    ];
+    for (set, (parameters, row)) in sets.iter().enumerate() {
+        let number = |key: &str| {
+            row.number(key)
+                .map_or("–".into(), |number| format!("{number:.2}"))
+        };
+        let own = || cells.iter().filter(|cell| cell.set == set);
+        let many = Summary::of(own().filter(|cell| cell.is_of_many()));
+        let rule = Summary::of(own().filter(|cell| cell.is_by_rule()));
+        lines.push(format!(
+            "| {} | {} | {:e} | {:.2} | {:.1} | {:.2} | {} | {} | {} | {:.1} | {:.1} | {:.1} |",
+            parameters.blocks,
+            parameters.contacts_per_block,
+            parameters.drive_velocity,
+            1e6 * parameters.modulation_amplitude,
+            parameters.frequency().unwrap_or_default(),
+            parameters.eta(),
+            row.periods.unwrap_or_default(),
+            number("resultant_length"),
+            number("locking_index"),
+            many.coverage[0],
+            many.coverage[1],
+            rule.coverage[0],
+        ));
+    }
+    lines.join("\n")
+}
+
+/// Every cell, for `docs/coverage.csv`.
+fn csv(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
+    let mut lines = vec![
+        "N,Ns,V0,Delta,frequency,statistic,true_value,jobs,slips,coverage,half_width".to_owned(),
+    ];
+    for measured in cells {
+        let parameters = &sets[measured.set].0;
+        let (jobs, slips) = SIZES.get(measured.column).map_or_else(
+            || {
+                let enough = BY_RULE[measured.column - SIZES.len()];
+                (format!("rule {enough}"), SLIPS_BY_RULE)
+            },
+            |&(jobs, slips)| (jobs.to_string(), slips),
+        );
+        lines.push(format!(
+            "{},{},{:e},{:e},{:.4},{},{:.6e},{jobs},{slips},{:.2},{:.3}",
+            parameters.blocks,
+            parameters.contacts_per_block,
+            parameters.drive_velocity,
+            parameters.modulation_amplitude,
+            parameters.frequency().unwrap_or_default(),
+            measured.statistic,
+            measured.truth,
+            measured.cell.coverage,
+            measured.cell.width,
+        ));
+    }
+    lines.join("\n") + "\n"
+}
+
+/// `docs/coverage.md` and `docs/coverage.csv`: run by `scripts/coverage`.
 #[test]
 #[ignore = "a measurement, with pools of jobs"]
 fn coverage_is_measured() {
@@ -374,70 +483,59 @@ fn coverage_is_measured() {
         .copied()
         .filter(|statistic| statistic.has_interval)
         .collect();
-    let sizes = SIZES.map(|(jobs, slips)| format!("{jobs} × {slips}"));
-    let rules = BY_RULE.map(|enough| format!("rule, {enough}"));
-    let head: Vec<String> = sizes.into_iter().chain(rules).collect();
-    let is_many = |column: usize| SIZES.get(column).is_none_or(|&(jobs, _)| jobs >= MANY);
-    let mut lines = Vec::new();
-    let (mut of_many, mut of_few) = (Vec::new(), Vec::new());
+    let mut sets = Vec::new();
+    let mut all = Vec::new();
     for name in POOLS {
         let pool = read_pool(folder, name);
         for (set, (parameters, jobs)) in pool.sets.iter().enumerate() {
-            let truth = pool.row(set, jobs, SLIPS_BY_RULE);
-            lines.push(format!("\n{}\n", described(parameters, &truth)));
-            lines.push(format!("| statistic | true value | {} |", head.join(" | ")));
-            lines.push(format!("|---|---|{}", "---|".repeat(head.len())));
-            for (statistic, row) in statistics.iter().zip(cells(&pool, set, &statistics)) {
-                let Some(value) = truth.number(statistic.key) else {
+            let row = pool.row(set, jobs, SLIPS_BY_RULE);
+            for (statistic, cells) in statistics.iter().zip(cells(&pool, set, &statistics)) {
+                let Some(truth) = row.number(statistic.key) else {
                     continue;
                 };
-                let mut shown = Vec::new();
-                for (column, cell) in row.into_iter().enumerate() {
-                    shown.push(cell.map_or("–".to_owned(), |cell| {
-                        format!("{:.1}, {:.1}", cell.coverage, cell.width)
+                for (column, cell) in cells.into_iter().enumerate() {
+                    all.extend(cell.map(|cell| Measured {
+                        set: sets.len(),
+                        statistic: statistic.key,
+                        truth,
+                        column,
+                        cell,
                     }));
-                    if is_many(column) {
-                        of_many.extend(cell);
-                    } else {
-                        of_few.extend(cell);
-                    }
                 }
-                let key = statistic.key;
-                lines.push(format!("| `{key}` | {value:.4} | {} |", shown.join(" | ")));
             }
-            println!("{name}: {}", described(parameters, &truth));
+            println!("{name}: set {set} of {}", pool.sets.len());
+            sets.push((parameters.clone(), row));
         }
     }
-    let coverages = |cells: &[Cell]| cells.iter().map(|cell| cell.coverage).collect::<Vec<_>>();
-    let widths = |cells: &[Cell]| cells.iter().map(|cell| cell.width).collect::<Vec<_>>();
-    let below = of_many.iter().filter(|cell| cell.coverage < 89.5).count();
-    let summary = format!(
-        "From {MANY} jobs on there are {} cells: {below} lie below 89.5 %, the least at {:.1} %, the median at {:.1} %; the\n\
-         half-width is {:.2} times 1.96 standard deviations in the median, {:.2} times at most.\n\
-         With fewer jobs the median is {:.1} %, and the half-width {:.2} times in the median, {:.2} times at most.",
-        of_many.len(),
-        quantile_of(coverages(&of_many), 0.0),
-        quantile_of(coverages(&of_many), 0.5),
-        quantile_of(widths(&of_many), 0.5),
-        quantile_of(widths(&of_many), 1.0),
-        quantile_of(coverages(&of_few), 0.5),
-        quantile_of(widths(&of_few), 0.5),
-        quantile_of(widths(&of_few), 1.0),
-    );
-    let [slips, sets] = of_backbone(&read_pool(folder, "dense"));
-    let backbone = format!(
-        "The back-bone: twelve sets with η from 2 to 2.2 and Δ = 0.6 µm in one bin, with two seeds in common of 15 slips; 400\n\
-         repetitions. The interval of the mean phase of all slips holds the true value in {slips:.1} %, that of the mean of\n\
-         the sets that have a phase in {sets:.1} %."
-    );
+    let many = Summary::of(all.iter().filter(|cell| cell.is_of_many()));
+    let few = Summary::of(all.iter().filter(|cell| !cell.is_of_many()));
+    let is_low = |cell: &&Measured| cell.is_of_many() && cell.cell.coverage < MIN_COVERAGE;
+    let low = all.iter().filter(is_low).count();
+    let [slips, means] = of_backbone(&read_pool(folder, "dense"));
     let text = format!(
-        "{}\n\n{summary}\n\n{backbone}\n{}\n",
+        "{}\n\n\
+         From {MANY} jobs on there are {} cells: {low} lie below {MIN_COVERAGE} %, the least at {:.1} %, the median at\n\
+         {:.1} %; the half-width is {:.2} in the median, {:.2} at most.\n\
+         With fewer jobs the median is {:.1} %, and the half-width {:.2} in the median, {:.2} at most.\n\n\
+         ## By statistic\n\n{}\n\n\
+         ## By set, from {MANY} jobs on\n\n{}\n\n\
+         ## The back-bone\n\n\
+         Twelve sets with η from 2 to 2.2 and Δ = 0.6 µm in one bin, with two seeds in common of 15 slips; 400\n\
+         repetitions. The interval of the mean phase of all slips holds the true value in {slips:.1} %, that of the mean\n\
+         of the sets that have a phase in {means:.1} %.\n",
         include_str!("coverage.md").trim_end(),
-        lines.join("\n"),
+        many.count,
+        many.coverage[0],
+        many.coverage[1],
+        many.width[1],
+        many.width[2],
+        few.coverage[1],
+        few.width[1],
+        few.width[2],
+        by_statistic(&all, &statistics),
+        by_set(&all, &sets),
     );
-    std::fs::write(
-        concat!(env!("CARGO_MANIFEST_DIR"), "/docs/coverage.md"),
-        text,
-    )
-    .unwrap();
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    std::fs::write(docs.join("coverage.md"), text).unwrap();
+    std::fs::write(docs.join("coverage.csv"), csv(&all, &sets)).unwrap();
 }
