@@ -5,11 +5,10 @@
 //! around in every reader.
 
 use super::columns::{Column, Field as _, FromRow, Kind, Row, Value};
+use arrow_array::builder::{BooleanBuilder, Float64Builder, Int64Builder, StringBuilder};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};
-use arrow_array::{
-    Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray,
-};
+use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use serde_json::{Map, Value as Json, json};
 use std::borrow::Cow;
@@ -34,15 +33,12 @@ fn data_type(kind: Kind) -> DataType {
 }
 
 fn field(column: &Column) -> Field {
-    Field::new(
-        column.name.as_ref(),
-        data_type(column.kind),
-        column.nullable,
-    )
-    .with_metadata(HashMap::from([
+    let metadata = HashMap::from([
         (UNIT.to_owned(), column.unit.to_owned()),
         (DESCRIPTION.to_owned(), column.meaning.to_owned()),
-    ]))
+    ]);
+    let kind = data_type(column.kind);
+    Field::new(&*column.name, kind, column.nullable).with_metadata(metadata)
 }
 
 /// Arrow schema of a row, with units and meanings in the metadata of its fields and, for pandas, of the schema.
@@ -62,18 +58,9 @@ pub fn schema_of(fields: Vec<Field>) -> SchemaRef {
 
 /// What the metadata of fields hold under a key, by the names of the fields.
 pub(super) fn by_name<'f>(fields: impl Iterator<Item = &'f Field>, key: &str) -> Json {
-    let text = |field: &Field| {
-        field
-            .metadata()
-            .get(key)
-            .cloned()
-            .unwrap_or_default()
-            .into()
-    };
-    fields
-        .map(|field| (field.name().clone(), text(field)))
-        .collect::<Map<_, _>>()
-        .into()
+    let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default();
+    let texts = fields.map(|field| (field.name().clone(), Json::from(text(field))));
+    texts.collect::<Map<_, _>>().into()
 }
 
 /// The rows of a batch as texts, which read back as the same values; empty where a value is missing.
@@ -84,17 +71,19 @@ pub fn texts(rows: &RecordBatch) -> impl Iterator<Item = Vec<String>> {
         Value::Count(count) => count.cast_signed().to_string(),
         other => other.to_string(),
     };
-    (0..rows.num_rows()).map(move |row| {
+    let texts = move |row| {
         rows.columns()
             .iter()
             .map(|array| text(array, row))
             .collect()
-    })
+    };
+    (0..rows.num_rows()).map(texts)
 }
 
 /// A row as JSON: an object with the names of the columns; null where a value is missing or not finite.
 pub fn json<R: Row>(row: &R) -> Json {
-    let (columns, mut object) = (R::columns(), Map::new());
+    let columns = R::columns();
+    let mut object = Map::new();
     row.cells(&mut |cell| {
         object.insert(columns[object.len()].name.to_string(), json!(cell));
     });
@@ -104,16 +93,16 @@ pub fn json<R: Row>(row: &R) -> Json {
 /// Rows of one table, column by column, before they become a record batch. How rows came in leaves no trace in the batch.
 pub struct RowBuffer {
     schema: SchemaRef,
-    /// Of all columns of the row type; none of one that is left out.
+    /// One for each column of the row type; `None` for a column that is left out.
     cells: Vec<Option<Cells>>,
     rows: usize,
 }
 
 enum Cells {
-    Real(Vec<Option<f64>>),
-    Count(Vec<Option<i64>>),
-    Flag(Vec<Option<bool>>),
-    Text(Vec<Option<String>>),
+    Real(Float64Builder),
+    Count(Int64Builder),
+    Flag(BooleanBuilder),
+    Text(StringBuilder),
 }
 
 impl RowBuffer {
@@ -121,10 +110,10 @@ impl RowBuffer {
     pub fn new<R: Row>() -> Self {
         let cells = R::columns().into_iter().map(|column| {
             Some(match column.kind {
-                Kind::Real => Cells::Real(Vec::new()),
-                Kind::Count => Cells::Count(Vec::new()),
-                Kind::Flag => Cells::Flag(Vec::new()),
-                Kind::Text => Cells::Text(Vec::new()),
+                Kind::Real => Cells::Real(Float64Builder::new()),
+                Kind::Count => Cells::Count(Int64Builder::new()),
+                Kind::Flag => Cells::Flag(BooleanBuilder::new()),
+                Kind::Text => Cells::Text(StringBuilder::new()),
             })
         });
         Self {
@@ -136,20 +125,15 @@ impl RowBuffer {
 
     /// The same without the columns of these names.
     pub fn without(mut self, left_out: &[Cow<'static, str>]) -> Self {
-        let has = |field: &Field| !left_out.iter().any(|name| name == field.name());
+        let mut fields = Vec::new();
         for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
-            if !has(field) {
+            if left_out.iter().any(|name| name == field.name()) {
                 *cells = None;
+            } else {
+                fields.push(Field::clone(field));
             }
         }
-        self.schema = schema_of(
-            self.schema
-                .fields()
-                .iter()
-                .map(|field| Field::clone(field))
-                .filter(has)
-                .collect(),
-        );
+        self.schema = schema_of(fields);
         self
     }
 
@@ -178,14 +162,10 @@ impl RowBuffer {
 
     /// Appends some rows of a batch of the same table.
     pub fn copy(&mut self, batch: &RecordBatch, rows: Range<usize>) -> Result<(), ArrowError> {
-        for (field, cells) in self
-            .schema
-            .fields()
-            .iter()
-            .zip(self.cells.iter_mut().flatten())
-        {
-            let array =
-                column(batch, field.name(), field.data_type()).map_err(ArrowError::SchemaError)?;
+        let fields = self.schema.fields().iter();
+        for (field, cells) in fields.zip(self.cells.iter_mut().flatten()) {
+            let array = column(batch, field.name(), field.data_type());
+            let array = array.map_err(ArrowError::SchemaError)?;
             rows.clone().for_each(|row| cells.push(cell(array, row)));
         }
         self.rows += rows.len();
@@ -195,46 +175,33 @@ impl RowBuffer {
     /// Takes all rows out as one batch.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
-        RecordBatch::try_new(
-            Arc::clone(&self.schema),
-            self.cells.iter_mut().flatten().map(Cells::take).collect(),
-        )
+        let columns = self.cells.iter_mut().flatten().map(Cells::take);
+        RecordBatch::try_new(Arc::clone(&self.schema), columns.collect())
     }
 }
 
 impl Cells {
     fn push(&mut self, cell: Value<'_>) {
-        // What is of no kind is a missing value; a cell of another kind than its column does not exist.
+        // A cell is of the kind of its column, or missing.
         match self {
-            Self::Real(cells) => cells.push(if let Value::Real(real) = cell {
-                Some(real)
-            } else {
-                None
-            }),
-            Self::Count(cells) => cells.push(u64::from_value(cell).map(u64::cast_signed)),
-            Self::Flag(cells) => cells.push(bool::from_value(cell)),
-            Self::Text(cells) => cells.push(if let Value::Text(text) = cell {
-                Some(text.to_owned())
-            } else {
-                None
-            }),
+            Self::Real(cells) => cells.append_option(f64::from_value(cell)),
+            Self::Count(cells) => {
+                cells.append_option(u64::from_value(cell).map(u64::cast_signed));
+            }
+            Self::Flag(cells) => cells.append_option(bool::from_value(cell)),
+            Self::Text(cells) => match cell {
+                Value::Text(text) => cells.append_value(text),
+                _ => cells.append_null(),
+            },
         }
     }
 
     fn take(&mut self) -> ArrayRef {
         match self {
-            Self::Real(cells) => {
-                Arc::new(std::mem::take(cells).into_iter().collect::<Float64Array>())
-            }
-            Self::Count(cells) => {
-                Arc::new(std::mem::take(cells).into_iter().collect::<Int64Array>())
-            }
-            Self::Flag(cells) => {
-                Arc::new(std::mem::take(cells).into_iter().collect::<BooleanArray>())
-            }
-            Self::Text(cells) => {
-                Arc::new(std::mem::take(cells).into_iter().collect::<StringArray>())
-            }
+            Self::Real(cells) => Arc::new(cells.finish()),
+            Self::Count(cells) => Arc::new(cells.finish()),
+            Self::Flag(cells) => Arc::new(cells.finish()),
+            Self::Text(cells) => Arc::new(cells.finish()),
         }
     }
 }
@@ -245,14 +212,11 @@ fn column<'a>(
     name: &str,
     expected: &DataType,
 ) -> Result<&'a ArrayRef, String> {
-    let array = batch
-        .column_by_name(name)
-        .ok_or_else(|| format!("there is no column {name}"))?;
-    let found = array.data_type();
-    if found == expected {
-        Ok(array)
-    } else {
-        Err(format!("column {name} is {found}, not {expected}"))
+    let array = batch.column_by_name(name);
+    let array = array.ok_or_else(|| format!("there is no column {name}"))?;
+    match array.data_type() {
+        found if found == expected => Ok(array),
+        found => Err(format!("column {name} is {found}, not {expected}")),
     }
 }
 
@@ -279,13 +243,10 @@ pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
     });
     let arrays = arrays.collect::<Result<Vec<Option<&ArrayRef>>, String>>()?;
     let row = |row: usize| {
-        let mut columns = arrays.iter();
+        let mut columns = arrays.iter().copied();
         R::from_cells(&mut || {
-            columns
-                .next()
-                .copied()
-                .flatten()
-                .map_or(Value::Null, |array| cell(array, row))
+            let column = columns.next().flatten();
+            column.map_or(Value::Null, |array| cell(array, row))
         })
     };
     (0..batch.num_rows()).map(row).collect()
@@ -295,6 +256,7 @@ pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
 mod tests {
     use super::super::columns::tests::{Reading, Readings, readings};
     use super::*;
+    use arrow_array::{BooleanArray, Float64Array, Int64Array, StringArray};
 
     fn batch() -> RecordBatch {
         let mut buffer = RowBuffer::new::<Readings>();

@@ -1,4 +1,4 @@
-//! Tables: row types with names. What their columns are is told in [`mod@stickslip_physics::columns`].
+//! Tables: row types with names. Their columns are described by [`mod@stickslip_physics::columns`].
 
 pub use stickslip_physics::columns::*;
 

@@ -8,7 +8,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Whose fault an error is.
+/// What kind of error it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
     /// What was asked for does not fit the directory. Nothing was changed.
@@ -58,7 +58,7 @@ impl ResultsError {
         move |problem| Self::damaged(path, problem)
     }
 
-    /// For `map_err`: why a file of the directory cannot be read. What has its name and is no file is damage.
+    /// For `map_err`: why a file of the directory cannot be read. If it is not a regular file, it is damaged.
     pub fn of_reading(error: StorageError) -> Self {
         if error.is_no_file() {
             Self::damaged(&error.path, error.source)
@@ -70,11 +70,8 @@ impl ResultsError {
     /// For `map_err`: why a file cannot be written.
     pub(super) fn unwritten(path: &Path) -> impl FnOnce(ParquetError) -> Self {
         move |error| {
-            Self::new(
-                ErrorKind::Disk(io::ErrorKind::Other),
-                path,
-                format!("cannot be written: {error}"),
-            )
+            let kind = ErrorKind::Disk(io::ErrorKind::Other);
+            Self::new(kind, path, format!("cannot be written: {error}"))
         }
     }
 
@@ -114,10 +111,7 @@ impl Error for ResultsError {}
 
 impl From<StorageError> for ResultsError {
     fn from(error: StorageError) -> Self {
-        Self::new(
-            ErrorKind::Disk(error.kind()),
-            &error.path,
-            format!("cannot {}: {}", error.action, error.source),
-        )
+        let problem = format!("cannot {}: {}", error.action, error.source);
+        Self::new(ErrorKind::Disk(error.kind()), &error.path, problem)
     }
 }

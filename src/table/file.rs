@@ -47,17 +47,10 @@ pub struct Footer(BTreeMap<String, String>);
 impl Default for Footer {
     /// Program, model version and scheme of random numbers.
     fn default() -> Self {
-        let texts = [
-            ("program", PROGRAM),
-            ("model_version", &MODEL_VERSION.to_string()),
-            ("rng_scheme", RNG_SCHEME),
-        ];
-        Self(
-            texts
-                .into_iter()
-                .map(|(key, text)| (key.to_owned(), text.to_owned()))
-                .collect(),
-        )
+        Self::empty()
+            .with("program", PROGRAM)
+            .with("model_version", &MODEL_VERSION.to_string())
+            .with("rng_scheme", RNG_SCHEME)
     }
 }
 
@@ -67,9 +60,8 @@ const PLACE: &str = "file";
 /// Folder and name of a file.
 fn place(path: &Path) -> String {
     let names = [path.parent().and_then(Path::file_name), path.file_name()];
-    names
-        .map(|name| name.unwrap_or_default().to_string_lossy())
-        .join("/")
+    let names = names.map(|name| name.unwrap_or_default().to_string_lossy());
+    names.join("/")
 }
 
 impl Footer {
@@ -77,7 +69,7 @@ impl Footer {
         Self(BTreeMap::new())
     }
 
-    /// The same, with the name and the text of a sweep.
+    /// This footer with the name and the text of a sweep.
     pub fn with_sweep(self, name: &str, text: &str) -> Self {
         self.with("sweep_name", name).with("sweep", text)
     }
@@ -87,25 +79,24 @@ impl Footer {
         self
     }
 
-    /// The same with the texts of another.
+    /// This footer with the texts of another.
     pub fn and(mut self, other: &Self) -> Self {
         self.0.extend(other.0.clone());
         self
     }
 
-    /// The same, of a file at this place.
+    /// This footer for a file at this place.
     pub fn at(self, path: &Path) -> Self {
         self.with(PLACE, &place(path))
     }
 
     pub(super) fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
-        let [units, meaning] = [UNIT, DESCRIPTION].map(|key| by_name(schema, key));
-        let footer = self.clone().with("units", &units).with("meaning", &meaning);
+        let footer = self.clone();
+        let footer = footer.with("units", &by_name(schema, UNIT));
+        let footer = footer.with("meaning", &by_name(schema, DESCRIPTION));
         let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
-        let texts = footer
-            .0
-            .into_iter()
-            .map(|(key, text)| KeyValue::new(key, text));
+        let texts = footer.0.into_iter();
+        let texts = texts.map(|(key, text)| KeyValue::new(key, text));
         let mut properties = WriterProperties::builder()
             .set_created_by(concat!("stickslip version ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
@@ -150,12 +141,11 @@ impl<R: Row> TableWriter<R> {
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
         let buffer = RowBuffer::new::<R>().without(left_out);
-        let writer = footer
-            .properties(buffer.schema())
-            .and_then(|properties| {
-                ArrowWriter::try_new(Vec::new(), Arc::clone(buffer.schema()), Some(properties))
-            })
-            .map_err(ResultsError::unwritten(file.path()))?;
+        let schema = buffer.schema();
+        let writer = footer.properties(schema).and_then(|properties| {
+            ArrowWriter::try_new(Vec::new(), Arc::clone(schema), Some(properties))
+        });
+        let writer = writer.map_err(ResultsError::unwritten(file.path()))?;
         Ok(Self {
             row: PhantomData,
             buffer,
@@ -191,15 +181,12 @@ impl<R: Row> TableWriter<R> {
 
     /// Writes the buffered rows as a row group.
     fn flush(&mut self) -> Result<(), ResultsError> {
-        let written = self
-            .buffer
-            .take()
-            .map_err(ParquetError::from)
-            .and_then(|batch| self.writer.write(&batch));
-        let written = written
-            .and_then(|()| self.writer.flush())
-            .and_then(|()| Ok(self.writer.sync()?));
-        written.map_err(ResultsError::unwritten(self.file.path()))?;
+        let mut encode = || -> Result<(), ParquetError> {
+            self.writer.write(&self.buffer.take()?)?;
+            self.writer.flush()?;
+            Ok(self.writer.sync()?)
+        };
+        encode().map_err(ResultsError::unwritten(self.file.path()))?;
         let bytes = std::mem::take(self.writer.inner_mut());
         self.hasher.update(&bytes);
         Ok(self.file.write(&bytes)?)
@@ -212,14 +199,14 @@ impl<R: Row> TableWriter<R> {
             self.flush()?;
         }
         let mut file = self.file;
-        let footer = self.writer.into_inner().and_then(|mut footer| {
-            let missing =
-                || ParquetError::General("the footer has no place for a checksum".to_owned());
+        let footer = || -> Result<Vec<u8>, ParquetError> {
+            let mut footer = self.writer.into_inner()?;
+            let no_place = "the footer has no place for a checksum";
             checksum::close(self.hasher, &mut footer)
-                .ok_or_else(missing)
-                .map(|()| footer)
-        });
-        let footer = footer.map_err(ResultsError::unwritten(file.path()))?;
+                .ok_or_else(|| ParquetError::General(no_place.to_owned()))?;
+            Ok(footer)
+        };
+        let footer = footer().map_err(ResultsError::unwritten(file.path()))?;
         file.write(&footer)?;
         Ok(file.sync()?)
     }
@@ -238,7 +225,7 @@ impl Batch {
     }
 }
 
-/// The bytes of a file that are those that were written.
+/// The bytes of a file, if they match its checksum.
 fn load(storage: &dyn Storage, path: &Path) -> Result<Bytes, ResultsError> {
     let bytes = storage.read(path).map_err(ResultsError::of_reading)?;
     checksum::check(&bytes).map_err(ResultsError::damage_at(path))?;
@@ -287,7 +274,7 @@ impl RowCount {
     }
 }
 
-/// A file of a table, and what is known of it: one that is otherwise is damaged.
+/// A file of a table, and what is known of it: if it differs from that, it is damaged.
 #[derive(Clone)]
 pub struct DataFile {
     pub path: PathBuf,
@@ -297,7 +284,7 @@ pub struct DataFile {
 }
 
 impl DataFile {
-    /// One of which nothing is known but these texts of its footer.
+    /// A file of which only these texts of its footer are known.
     pub fn with_footer(path: PathBuf, footer: Footer) -> Self {
         Self {
             path,
@@ -306,7 +293,7 @@ impl DataFile {
         }
     }
 
-    /// Whether it is whole, and what is known of it holds.
+    /// Whether it is whole and agrees with what is known of it.
     pub fn check(&self, storage: &dyn Storage) -> Result<(), ResultsError> {
         open(storage, self, &[]).map(drop)
     }
@@ -362,11 +349,10 @@ impl<'a> Dataset<'a> {
     ) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
         let Self { storage, files } = self;
         let batches = files.into_iter().flat_map(move |file| {
-            let opened = open(storage, &file, &columns);
-            let (reader, error) = opened.map_or_else(
-                |error| (None, Some(Err(error))),
-                |reader| (Some(reader), None),
-            );
+            let (reader, error) = match open(storage, &file, &columns) {
+                Ok(reader) => (Some(reader), None),
+                Err(error) => (None, Some(Err(error))),
+            };
             let path: Arc<Path> = file.path.into();
             let batch = move |rows: Result<RecordBatch, ArrowError>| {
                 Ok(Batch {
@@ -389,22 +375,17 @@ fn open(
     let path = &file.path;
     let bytes = load(storage, path)?;
     let reader = || {
-        let mut builder =
-            ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
-        check_footer(path, builder.metadata(), &file.footer).map_err(ParquetError::General)?;
+        let builder = ParquetRecordBatchReaderBuilder::try_new(bytes)?;
+        let mut builder = builder.with_batch_size(BATCH_ROWS);
+        let metadata = builder.metadata();
+        check_footer(path, metadata, &file.footer).map_err(ParquetError::General)?;
         if let Some(expected) = file.rows {
-            let rows = builder
-                .metadata()
-                .file_metadata()
-                .num_rows()
-                .cast_unsigned();
+            let rows = metadata.file_metadata().num_rows().cast_unsigned();
             expected.check(rows).map_err(ParquetError::General)?;
         }
         if !columns.is_empty() {
-            let mask = ProjectionMask::columns(
-                builder.parquet_schema(),
-                columns.iter().map(AsRef::as_ref),
-            );
+            let names = columns.iter().map(AsRef::as_ref);
+            let mask = ProjectionMask::columns(builder.parquet_schema(), names);
             builder = builder.with_projection(mask);
         }
         builder.build()
@@ -494,10 +475,8 @@ mod tests {
     #[test]
     fn bytes_do_not_depend_on_how_rows_came_in() {
         let folder = tempfile::tempdir().unwrap();
-        let (whole, copied) = (
-            folder.path().join("whole.parquet"),
-            folder.path().join("copied.parquet"),
-        );
+        let whole = folder.path().join("whole.parquet");
+        let copied = folder.path().join("copied.parquet");
         let rows = GROUP_ROWS as u64 + 1000;
         write(&whole, 0..rows);
         let footer = Footer::default().with("note", "test");

@@ -58,18 +58,14 @@ impl RowWriter {
         let encoder = || -> Result<Encoder, ParquetError> {
             Ok(match format {
                 Format::Parquet => {
-                    let properties = footer.properties(schema)?;
-                    Encoder::Parquet(Box::new(ArrowWriter::try_new(
-                        file,
-                        Arc::clone(schema),
-                        Some(properties),
-                    )?))
+                    let properties = Some(footer.properties(schema)?);
+                    let writer = ArrowWriter::try_new(file, Arc::clone(schema), properties)?;
+                    Encoder::Parquet(Box::new(writer))
                 }
                 Format::Csv => {
                     let mut writer = csv::Writer::from_writer(file);
-                    writer
-                        .write_record(schema.fields().iter().map(|field| field.name()))
-                        .map_err(of_csv)?;
+                    let names = schema.fields().iter().map(|field| field.name());
+                    writer.write_record(names).map_err(of_csv)?;
                     Encoder::Csv(Box::new(writer))
                 }
                 Format::Arrow => Encoder::Arrow(Box::new(FileWriter::try_new(file, schema)?)),

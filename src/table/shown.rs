@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-/// A path as messages show it: as it is, if it is plain. Control characters and those that turn the direction of writing
+/// A path as messages show it: unchanged if it is plain. Control characters and those that turn the direction of writing
 /// are escaped as in Rust, and bytes that are not UTF-8 as `\xff`.
 pub fn shown(path: &Path) -> Shown<'_> {
     Shown(path.as_os_str().as_encoded_bytes())
@@ -27,10 +27,9 @@ impl fmt::Display for Shown<'_> {
                     write!(f, "{}", c.escape_default())?;
                 }
             }
-            chunk
-                .invalid()
-                .iter()
-                .try_for_each(|byte| write!(f, "\\x{byte:02x}"))?;
+            for byte in chunk.invalid() {
+                write!(f, "\\x{byte:02x}")?;
+            }
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ pub(crate) mod over_disk;
 use crate::table::shown::shown;
 use std::error::Error;
 use std::ffi::OsString;
-use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
@@ -108,14 +108,11 @@ pub trait Storage: Sync {
 
     /// When a file, or a name in a folder, was written last, by the clock of its file system.
     fn modified(&self, path: &Path) -> Result<SystemTime, StorageError> {
-        // A network file system tells the truth about what is opened.
-        let opened = self
-            .open(path)
-            .or_else(|error| open_folder(path).map_err(|_| error))?;
-        opened
-            .metadata()
-            .and_then(|metadata| metadata.modified())
-            .map_err(StorageError::at("look up", path))
+        // A network file system may have stale answers for what is not opened.
+        let opened = self.open(path);
+        let opened = opened.or_else(|error| open_folder(path).map_err(|_| error))?;
+        let modified = opened.metadata().and_then(|metadata| metadata.modified());
+        modified.map_err(StorageError::at("look up", path))
     }
 
     /// Whether files can be moved from one folder to another, as far as that is known.
@@ -126,17 +123,8 @@ pub trait Storage: Sync {
     /// The number of bytes of a file.
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
         let metadata = self.open(file)?.metadata();
-        let is_file = |metadata: Metadata| {
-            if metadata.is_file() {
-                Ok(metadata)
-            } else {
-                Err(NoFile::Irregular.into())
-            }
-        };
-        Ok(metadata
-            .and_then(is_file)
-            .map_err(StorageError::at("read", file))?
-            .len())
+        let metadata = metadata.map_err(StorageError::at("read", file))?;
+        Ok(metadata.len())
     }
 
     /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.
@@ -163,18 +151,19 @@ pub trait Storage: Sync {
         if !self.exists(from)? {
             return Ok(());
         }
-        to.parent()
-            .map_or(Ok(()), |folder| self.ensure_folder(folder))?;
-        let (mut free, mut number) = (to.to_owned(), 0);
+        if let Some(folder) = to.parent() {
+            self.ensure_folder(folder)?;
+        }
+        let mut free = to.to_owned();
+        let mut number = 0;
         while self.exists(&free)? {
             number += 1;
             free = to.with_added_extension(number.to_string());
         }
         self.rename(from, &free)?;
-        [free.parent(), from.parent()]
-            .into_iter()
-            .flatten()
-            .try_for_each(|folder| self.sync_folder(folder))
+        let folders = [free.parent(), from.parent()];
+        let mut folders = folders.into_iter().flatten();
+        folders.try_for_each(|folder| self.sync_folder(folder))
     }
 
     /// Tries for a lock until it is free or the time is over.
@@ -190,7 +179,7 @@ pub trait Storage: Sync {
     }
 }
 
-/// That what is to be removed or moved is gone is no error: another process was first.
+/// Ignores that a file to be removed or moved is gone: another process was first.
 pub fn gone_is_fine(ended: Result<(), StorageError>) -> Result<(), StorageError> {
     match ended {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -198,9 +187,9 @@ pub fn gone_is_fine(ended: Result<(), StorageError>) -> Result<(), StorageError>
     }
 }
 
-/// What trying for a lock says.
+/// The answer to a request for a lock.
 pub enum Lock {
-    /// It is ours, until this is dropped or the process ends.
+    /// The caller has the lock until this value is dropped or the process ends.
     Ours(Box<dyn Send + Sync>),
     Taken,
     /// The file system has no locks.
@@ -239,7 +228,7 @@ impl StorageError {
         )
     }
 
-    /// Whether something has this name that the program cannot have written: it is not that the disk fails.
+    /// Whether something has this name that the program cannot have written, while the disk works.
     pub fn is_no_file(&self) -> bool {
         self.source
             .get_ref()
@@ -247,7 +236,7 @@ impl StorageError {
     }
 }
 
-/// What has the name of a file and is none.
+/// Why a file cannot be read as one.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 enum NoFile {
     #[error("it is no regular file, but a folder, a device, a FIFO or a socket")]
@@ -314,10 +303,8 @@ impl Storage for Disk {
     }
 
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
-        Ok(StoredFile::new(
-            file,
-            File::create_new(file).map_err(StorageError::at("create", file))?,
-        ))
+        let sink = File::create_new(file).map_err(StorageError::at("create", file))?;
+        Ok(StoredFile::new(file, sink))
     }
 
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
@@ -330,35 +317,35 @@ impl Storage for Disk {
             File::create_new(to)?.write_all(&bytes)
         };
         let is_there = |error: &io::Error| error.kind() == io::ErrorKind::AlreadyExists;
-        match fs::hard_link(from, to).or_else(|error| {
-            if is_there(&error) {
-                Err(error)
-            } else {
-                copied()
-            }
-        }) {
+        let mut made = fs::hard_link(from, to);
+        if made.as_ref().is_err_and(|error| !is_there(error)) {
+            made = copied();
+        }
+        match made {
             Err(error) if is_there(&error) => Ok(false),
             made => made.map(|()| true).map_err(StorageError::at("create", to)),
         }
     }
 
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        open_folder(folder)
-            .and_then(|folder| folder.sync_all())
-            .map_err(StorageError::at("sync", folder))
+        let synced = open_folder(folder).and_then(|folder| folder.sync_all());
+        synced.map_err(StorageError::at("sync", folder))
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
-        let entries = match fs::read_dir(folder) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-            entries => entries.map_err(StorageError::at("list", folder))?,
+        let names = || -> io::Result<Vec<OsString>> {
+            fs::read_dir(folder)?
+                .map(|entry| Ok(entry?.file_name()))
+                .collect()
         };
-        let names = entries
-            .map(|entry| Ok(entry?.file_name()))
-            .collect::<io::Result<Vec<_>>>();
-        let mut names = names.map_err(StorageError::at("list", folder))?;
-        names.sort();
-        Ok(names)
+        match names() {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+            names => {
+                let mut names = names.map_err(StorageError::at("list", folder))?;
+                names.sort();
+                Ok(names)
+            }
+        }
     }
 
     fn open(&self, file: &Path) -> Result<File, StorageError> {
@@ -385,10 +372,9 @@ impl Storage for Disk {
     }
 
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        let handle = open_regular(
-            File::options().create(true).truncate(false).write(true),
-            file,
-        );
+        let mut options = File::options();
+        options.create(true).truncate(false).write(true);
+        let handle = open_regular(&options, file);
         let handle = handle.map_err(StorageError::at("lock", file))?;
         match handle.try_lock() {
             Ok(()) => Ok(Lock::Ours(Box::new(handle))),
