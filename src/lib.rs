@@ -4,16 +4,17 @@
 //! ```text
 //! sweep file -> plan -> jobs -> measurements -> tables -> reduced data -> figures, report
 //!     sweep/             run/   physics/        results/   reduce/         figure/  report/
-//!                                 solver/       table/
+//!                                 solver/       table/     sets/
 //!                                 observe/
 //!                                 model/
 //! ```
 //!
-//! Imports run one way: `physics` <- `table` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
+//! Imports run one way: `physics` <- `table` <- `sets` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
 //! `reduce` <- `figure`; `run`, `figure` <- `report`.
-//! `physics/` is a crate of its own, which others can depend on: model, solvers and measurements, with the columns of their
-//! rows; it knows no file. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from
-//! the model to figures. Only `cli` prints, which is the command line; `python/` makes a Python module of the library.
+//! `physics/` is a separate crate, on which other programs can depend: model, solvers and measurements, with the columns of
+//! their rows; it knows no file. `sets` describes the columns of a parameter set. `simulate` runs one job with all its records.
+//! `accuracy` compares the solvers, from the model to figures. `cli` is the command line, the only code that prints; `python/`
+//! makes a Python module of the library.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -26,11 +27,11 @@
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
 //! | job | one point of a sweep, known by a hash of parameters, solver and recording |
 //! | set | all jobs that differ in the seed alone |
-//! | round | points of a sweep that decides for itself, run together: an extension ([`rounds`]) |
-//! | extension | a sweep in a results directory; it owns its jobs but for those that earlier ones have done |
+//! | round | points of an adaptive sweep that run together: an extension ([`rounds`]) |
+//! | extension | a sweep in a results directory; it owns its jobs except those that earlier extensions have done |
 //! | part | consecutive jobs of an extension, committed together |
-//! | outline | a part without its jobs: where they lie, and what they add up to |
-//! | worker | a process at work on a results directory, beside others |
+//! | outline | a part without its jobs: where they lie, and their sums |
+//! | worker | a process that works on a results directory, beside others |
 //! | claim | which worker runs a part |
 //! | shard | a share of the parts, run into a directory of its own |
 
@@ -44,6 +45,7 @@ pub mod report;
 pub mod results;
 pub mod rounds;
 pub mod run;
+pub mod sets;
 pub mod simulate;
 pub mod sweep;
 pub mod table;

@@ -9,7 +9,7 @@ use crate::reduce::{
 };
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::sweep::{Digits, label};
+use crate::sets::{Digits, label};
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Table};
 use crate::table::file::Dataset;

@@ -10,7 +10,7 @@ use super::sets::Grid;
 use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point, SetRow};
-use crate::sweep::label;
+use crate::sets::label;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 

@@ -8,7 +8,7 @@ use super::picture::{Anchor, Dot, Ink, Picture, Stroke};
 use super::sets::axis_of;
 use super::style::{GRID, INKS, LEGEND_TEXT, Look};
 use crate::reduce::{Point, RampStage, quantile};
-use crate::sweep::label;
+use crate::sets::label;
 
 /// Space right of the frames for the numbers of lines.
 const NUMBERS: f64 = 66.0;

@@ -9,7 +9,7 @@ use super::picture::{Anchor, Fill, Picture, Stroke};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{FREQUENCY, HistogramBin, SetRow, Values, differing};
-use crate::sweep::label;
+use crate::sets::label;
 use kuva::render::color::Color;
 
 /// Panels that fit a page.

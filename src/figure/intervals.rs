@@ -9,7 +9,7 @@ use super::picture::{Dot, Picture};
 use super::sets::axis_of;
 use super::style::{GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::{Point, ascending};
-use crate::sweep::{Digits, label};
+use crate::sets::{Digits, label};
 
 const RADIUS: f64 = 1.8;
 const OTHER: Dot = Dot {

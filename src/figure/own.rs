@@ -13,7 +13,7 @@ use super::style::{
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{FREQUENCY, SetRow, Swept, Values, ascending, is_same, swept};
-use crate::sweep::Label;
+use crate::sets::Label;
 use clap::Args;
 use std::collections::BTreeMap;
 

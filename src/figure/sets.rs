@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{FREQUENCY, SetRow, Swept, has_even_steps, is_spread};
-use crate::sweep::{Digits, label, symbol_of};
+use crate::sets::{Digits, label, symbol_of};
 
 /// T, or 1/T if its steps are even and those of T are not.
 pub(super) fn period_column(sets: &[SetRow]) -> &'static str {

@@ -11,7 +11,7 @@ use super::sets::common;
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
 use crate::observe::MapRow;
-use crate::sweep::label;
+use crate::sets::label;
 use crate::table::value::floored;
 use anyhow::{Result, anyhow};
 use kuva::render::color::Color;

@@ -7,17 +7,18 @@
 //!     pub struct Reading {
 //!         /// (docs of a field follow from its unit and meaning)
 //!         force: f64 = "N", "shear force";
-//!         phase: Option<f64> = "rad", "phase of the onset, null without modulation";
+//!         phase: Option<f64> = "rad", "phase of the onset, null without modulation", "φ" "Phase";
 //!         number as "slip": u64 = "", "number of the slip";
 //!     }
 //! }
 //! ```
 //!
 //! From this follow the struct and its documentation, the columns with their types, a writer and a reader. `name as "key"` is
-//! for a field that is called otherwise than its column. A field without unit and meaning holds the columns of another row
-//! type, or is a projection: it reads a column that another row type describes. Rows side by side are tuples. Nothing here
-//! knows Arrow, files or JSON. No derive that exists fits: serde_arrow 0.15 has no place for units and meanings beside a
-//! field, typed-arrow 0.8 ends at Arrow 59 and would bind the physics to it, parquet_derive 60 writes no Arrow schema.
+//! for a field whose name differs from that of its column. After the meaning may stand the symbol of a quantity in figures, and
+//! a few words for its axis. A field without unit and meaning holds the columns of another row type, or is a projection: it
+//! reads a column that another row type describes. Rows side by side are tuples. Nothing here knows Arrow, files or JSON.
+//! No existing derive fits: serde_arrow 0.15 has no place for units and meanings beside a field, typed-arrow 0.8 ends at
+//! Arrow 59 and would bind the physics to it, parquet_derive 60 writes no Arrow schema.
 
 pub use super::value::{Field, Kind, Value};
 use std::borrow::Cow;
@@ -29,6 +30,10 @@ pub struct Column {
     pub unit: &'static str,
     /// One line, without a full stop.
     pub meaning: &'static str,
+    /// Symbol in figures; empty for a column that no figure names.
+    pub symbol: &'static str,
+    /// What it is, for the axis of a figure; empty if the meaning says it in a few words.
+    pub words: &'static str,
     pub kind: Kind,
     pub nullable: bool,
 }
@@ -50,8 +55,8 @@ pub trait FromRow: Row + Sized {
 
 /// A field of a row type: one cell, several that belong together, or all the cells of another row. What the macro `columns` is built on.
 pub trait Part: Sized {
-    /// The columns of a field with this name, unit and meaning.
-    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column>;
+    /// The columns of a field that is described so; its type says of which kind they are.
+    fn columns_as(described: Column) -> Vec<Column>;
 
     fn give(&self, give: &mut dyn FnMut(Value<'_>));
 
@@ -60,13 +65,11 @@ pub trait Part: Sized {
 }
 
 impl<T: Field> Part for T {
-    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+    fn columns_as(described: Column) -> Vec<Column> {
         vec![Column {
-            name: name.into(),
-            unit,
-            meaning,
             kind: T::KIND,
             nullable: T::NULLABLE,
+            ..described
         }]
     }
 
@@ -82,13 +85,10 @@ impl<T: Field> Part for T {
 
 /// A text of a row's own is no [`Field`]: its value does not outlive the row.
 impl Part for String {
-    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+    fn columns_as(described: Column) -> Vec<Column> {
         vec![Column {
-            name: name.into(),
-            unit,
-            meaning,
             kind: Kind::Text,
-            nullable: false,
+            ..described
         }]
     }
 
@@ -103,13 +103,11 @@ impl Part for String {
 }
 
 impl Part for Option<String> {
-    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+    fn columns_as(described: Column) -> Vec<Column> {
         vec![Column {
-            name: name.into(),
-            unit,
-            meaning,
             kind: Kind::Text,
             nullable: true,
+            ..described
         }]
     }
 
@@ -135,18 +133,14 @@ pub struct Interval {
 
 /// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
 impl Part for Option<Interval> {
-    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
-        let column = |name: String, meaning| Column {
-            name: name.into(),
-            unit,
+    fn columns_as(described: Column) -> Vec<Column> {
+        let end = |end: &str, meaning| Column {
+            name: format!("{}_{end}", described.name).into(),
             meaning,
-            kind: Kind::Real,
             nullable: true,
+            ..described.clone()
         };
-        vec![
-            column(format!("{name}_low"), meaning),
-            column(format!("{name}_high"), "upper end"),
-        ]
+        vec![end("low", described.meaning), end("high", "upper end")]
     }
 
     fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
@@ -170,7 +164,7 @@ impl Part for Option<Interval> {
 macro_rules! part {
     ($row:ty $(where $($parameter:ident: $bound:path),*)?) => {
         impl $(<$($parameter: $bound),*>)? $crate::columns::Part for $row {
-            fn columns_as(_: &'static str, _: &'static str, _: &'static str) -> Vec<$crate::columns::Column> {
+            fn columns_as(_: $crate::columns::Column) -> Vec<$crate::columns::Column> {
                 <Self as $crate::columns::Row>::columns()
             }
 
@@ -200,7 +194,8 @@ macro_rules! columns {
     (@in "") => { "" };
     (@in $unit:tt) => { concat!(", in ", $unit) };
     ($(#[$attribute:meta])* $visibility:vis struct $row:ident {
-        $($field:ident $(as $name:literal)? : $type:ty $(= $unit:tt, $meaning:tt)?;)*
+        $($field:ident $(as $name:literal)? : $type:ty
+            $(= $unit:tt, $meaning:tt $(, $symbol:literal $($words:literal)?)?)?;)*
     }) => {
         $(#[$attribute])*
         #[allow(rustdoc::invalid_html_tags, reason = "meanings are plain text")]
@@ -213,11 +208,15 @@ macro_rules! columns {
 
         impl $crate::columns::Row for $row {
             fn columns() -> Vec<$crate::columns::Column> {
-                [$(<$type as $crate::columns::Part>::columns_as(
-                    $crate::columns!(@name $field $($name)?),
-                    $crate::columns!(@text $($unit)?),
-                    $crate::columns!(@text $($meaning)?),
-                )),*].concat()
+                [$(<$type as $crate::columns::Part>::columns_as($crate::columns::Column {
+                    name: $crate::columns!(@name $field $($name)?).into(),
+                    unit: $crate::columns!(@text $($unit)?),
+                    meaning: $crate::columns!(@text $($meaning)?),
+                    symbol: $crate::columns!(@text $($($symbol)?)?),
+                    words: $crate::columns!(@text $($($($words)?)?)?),
+                    kind: $crate::columns::Kind::Real,
+                    nullable: false,
+                })),*].concat()
             }
 
             fn cells(&self, give: &mut dyn FnMut($crate::columns::Value<'_>)) {

@@ -1,8 +1,8 @@
 //! The φ-η back-bone: phases pooled in logarithmic bins of η (Fig. 3e).
 
 use super::circular::unit;
-use super::sequence::{Estimate, add};
-use super::set::{FinishedSet, OfSet};
+use super::sequence::{Centred, Estimate, add};
+use super::set::FinishedSet;
 use super::top_of_phases;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::table::columns::{columns, tables};
@@ -75,14 +75,15 @@ impl Together {
     /// Adds vectors, and what each stretch of the slips of a set adds to the error of their sum.
     fn push(
         &mut self,
-        (count, total): (u64, [f64; 2]),
+        count: u64,
+        total: [f64; 2],
         seeds: &[u64],
-        of_set: &OfSet,
+        of_set: &Centred<2>,
         error: impl Fn([f64; 2]) -> [f64; 2],
     ) {
         self.count += count;
         add(&mut self.total, &total);
-        let jobs = of_set.0.stretch_sums();
+        let jobs = of_set.deviations.stretch_sums();
         // Deviations from the mean of the same slips are too small by this.
         let freedom = 1.0 - 1.0 / jobs.iter().flatten().count() as f64;
         for (&seed, sums) in seeds.iter().zip(jobs) {
@@ -126,10 +127,10 @@ fn bin_of(eta: f64) -> i32 {
 }
 
 impl Backbone {
-    /// Adds a set. One without modulation has no phase and is left out, one with a ramp no single η, and of one with a single
-    /// slip nothing says how far it is off.
+    /// Adds a set. Left out are sets without modulation, which have no phase, with a ramp, which have no single η, and with a
+    /// single slip, whose phase has no interval.
     pub(super) fn push(&mut self, set: &FinishedSet) {
-        if set.row.parameters.ramp_time > 0.0 || set.phases.1.count() < 2 {
+        if set.row.parameters.ramp_time > 0.0 || set.phases.mean.count() < 2 {
             return;
         }
         let Some(phase) = set.row.phase_mean else {
@@ -137,28 +138,32 @@ impl Backbone {
         };
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
-        let all = (set.phases.1.count(), set.phases.1.total);
+        let all = &set.phases.mean;
+        let as_seen = |deviation| deviation;
         bin.phases
-            .push(all, &set.seeds, &set.phases, |deviation| deviation);
+            .push(all.count(), all.total, &set.seeds, &set.phases, as_seen);
         if set.row.has_phase {
             // The mean direction is off by the deviations across it, over the length of their sum.
-            let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total);
+            let [x, y] = unit(phase);
+            let [sum_x, sum_y] = all.total;
             let error = |[dx, dy]: [f64; 2]| {
                 let angle = (x * dy - y * dx) / libm::hypot(sum_x, sum_y);
                 [-y * angle, x * angle]
             };
-            bin.means
-                .push((1, unit(phase)), &set.seeds, &set.phases, error);
+            bin.means.push(1, [x, y], &set.seeds, &set.phases, error);
         }
     }
 
     pub(super) fn finish(self) -> Vec<BackboneBin> {
         let row = |(index, bin): (i32, Bin)| {
-            let (eta_low, eta_high) = (edge(index), edge(index + 1));
+            let eta_low = edge(index);
+            let eta_high = edge(index + 1);
             let eta_centre = (eta_low * eta_high).sqrt();
             let top = top_of_phases(eta_centre);
-            let [phases, means] = [bin.phases, bin.means].map(Together::estimate);
-            let [interval, means_interval] = [&phases, &means].map(|of| of.direction_interval(top));
+            let phases = bin.phases.estimate();
+            let means = bin.means.estimate();
+            let interval = phases.direction_interval(top);
+            let means_interval = means.direction_interval(top);
             BackboneBin {
                 eta_low,
                 eta_high,
@@ -227,7 +232,8 @@ mod tests {
     fn bin(sets: &[(u64, &[f64])]) -> BackboneBin {
         let mut backbone = Backbone::default();
         for &(seed, phases) in sets {
-            let (jobs, mut set) = (jobs(1e-6, 0.01), SetSlips::default());
+            let jobs = jobs(1e-6, 0.01);
+            let mut set = SetSlips::default();
             for &phase in phases {
                 set.push(seed, &slip(None, Some(phase)));
             }
@@ -292,7 +298,8 @@ mod tests {
             let mut backbone = Backbone::default();
             let shared: Vec<f64> = (0..30).map(|_| draws.normal()).collect();
             for _ in 0..12 {
-                let (jobs, mut set) = (jobs(1e-6, 0.01), SetSlips::default());
+                let jobs = jobs(1e-6, 0.01);
+                let mut set = SetSlips::default();
                 for (seed, of_seed) in (0..).zip(shared.chunks(15)) {
                     for shared in of_seed {
                         let phase =

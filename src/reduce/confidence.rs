@@ -1,12 +1,12 @@
 //! Confidence intervals: they contain the true value in 95 of 100 repetitions.
 //!
-//! Where few slips differ from all others, as in a deep tongue, sums of jobs hardly vary, and the little that they vary by is
-//! skewed. Two things are added to Student's t: towards the side on which a sum is skewed, what the third moment says of
-//! rare events; and slips of a kind that none of those seen is of, of which there may be [`MAX_UNSEEN`]. Errors on one side are
-//! put together by their squares (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693 (2008)).
+//! Where few slips differ from all others, as in a deep tongue, sums of jobs hardly vary, and their small variation is skewed.
+//! Two things are added to Student's t: towards the side on which a sum is skewed, what the third moment says of rare events;
+//! and slips of a kind that was not seen at all, of which there may be [`MAX_UNSEEN`]. Errors on one side are combined by
+//! their squares (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693 (2008)).
 
 use super::circular::heading;
-use super::sequence::{Estimate, Sequences};
+use super::sequence::{Centred, Estimate};
 use crate::model::standard_normal_quantile;
 use crate::table::columns::Interval;
 use std::f64::consts::PI;
@@ -33,7 +33,7 @@ const CANCELLED: f64 = 1e-9;
 /// Values of which a standard deviation or a resultant length has an error: of two, both are as far from their mean.
 pub(super) const MIN_VALUES: u64 = 3;
 
-/// What a slip of a kind that none of those seen is of would take from a sum, or add to it.
+/// What a slip of a kind that was not seen would take from a sum, or add to it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Unseen {
     pub(super) below: f64,
@@ -79,17 +79,14 @@ impl Estimate<1> {
     pub(super) fn deviation(&self, unseen: Unseen) -> (Option<f64>, Option<Interval>) {
         let n = self.count() as f64;
         let of_sample = |square: f64| (square.max(0.0) * n / (n - 1.0)).sqrt();
-        let square = self.mean().filter(|_| n > 1.0).map(|[square]| square);
-        let ends = self
-            .interval_with(unseen)
-            .filter(|_| self.count() >= MIN_VALUES);
-        (
-            square.map(of_sample),
-            ends.map(|squares| Interval {
-                low: of_sample(squares.low),
-                high: of_sample(squares.high),
-            }),
-        )
+        let square = self.value().filter(|_| n > 1.0);
+        let squares = self.interval_with(unseen);
+        let ends = squares.filter(|_| self.count() >= MIN_VALUES);
+        let ends = ends.map(|squares| Interval {
+            low: of_sample(squares.low),
+            high: of_sample(squares.high),
+        });
+        (square.map(of_sample), ends)
     }
 
     /// Shares of the values between whose quantiles the median lies, if these are the values' indicators of not exceeding it
@@ -101,36 +98,64 @@ impl Estimate<1> {
     }
 }
 
+/// The length of a mean vector, and its variances along the mean and across it.
+struct Polar {
+    length: f64,
+    along: f64,
+    across: f64,
+}
+
 impl Estimate<2> {
-    /// The length of the mean, and its variances along the mean and across it.
-    fn polar(&self) -> Option<(f64, f64, f64)> {
+    fn polar(&self) -> Option<Polar> {
         let [x, y] = heading(self.mean()?);
-        Some((
-            self.resultant_length()?,
-            self.variance(&[x, y]),
-            self.variance(&[-y, x]),
-        ))
+        Some(Polar {
+            length: self.resultant_length()?,
+            along: self.variance(&[x, y]),
+            across: self.variance(&[-y, x]),
+        })
     }
 
-    /// Of the resultant length R of unit vectors with these deviations from their mean, of which vectors may be missing that
-    /// each take `unseen` from the sum; `None` for fewer than [`MIN_VALUES`].
+    /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if
+    /// no direction is excluded; `None` for fewer than two. By the circular standard error (Fisher, Statistical
+    /// Analysis of Circular Data (1993), Sec. 4.4.4), whose (1 - ρ_2)/2 is the variance across the mean; valid for
+    /// short resultants, too (Fieller's interval).
+    pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
+        let direction = self.direction(top)?;
+        let Polar { length, across, .. } = self.polar()?;
+        let sine = (student(self.freedom()?) * across.sqrt()).max(CANCELLED);
+        let half = if sine < length {
+            libm::asin(sine / length)
+        } else {
+            PI
+        };
+        Some(Interval {
+            low: direction - half,
+            high: direction + half,
+        })
+    }
+}
+
+impl Centred<2> {
+    /// Of the resultant length R of unit vectors, of which vectors may be missing that each take `unseen` from the sum; `None`
+    /// for fewer than [`MIN_VALUES`].
     ///
     /// Of short ones: the square of the length of a mean has the mean R² + s² + s'² and the variance 4 R² s² + 2 (s⁴ +
     /// s'⁴), with the variances s² along and s'² across. The interval contains every R from which the measured square is
     /// less than t standard deviations away (score interval). It also holds near R = 0, where chance alone makes a
     /// resultant longer. Long ones are the mean of the components along their direction.
-    pub(super) fn length_interval(
-        &self,
-        deviations: &Sequences<2>,
-        unseen: f64,
-    ) -> Option<Interval> {
-        if self.count() < MIN_VALUES {
+    pub(super) fn length_interval(&self, unseen: f64) -> Option<Interval> {
+        let mean = &self.mean;
+        if mean.count() < MIN_VALUES {
             return None;
         }
-        let (length, along, across) = self.polar()?;
-        let t = student(self.freedom()?);
+        let Polar {
+            length,
+            along,
+            across,
+        } = mean.polar()?;
+        let t = student(mean.freedom()?);
         if length > LONG {
-            let components = deviations.along(&heading(self.mean()?)).estimate();
+            let components = self.deviations.along(&heading(mean.mean()?)).estimate();
             let Interval { low, high } = components.interval_with(Unseen::below(unseen))?;
             return Some(Interval {
                 low: (length + low.min(-ROUNDING)).max(0.0),
@@ -147,32 +172,14 @@ impl Estimate<2> {
             high: end(middle + root),
         })
     }
-
-    /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if
-    /// no direction is excluded; `None` for fewer than two. By the circular standard error (Fisher, Statistical
-    /// Analysis of Circular Data (1993), Sec. 4.4.4), whose (1 - ρ_2)/2 is the variance across the mean; valid for
-    /// short resultants, too (Fieller's interval).
-    pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
-        let direction = self.direction(top)?;
-        let (length, _, across) = self.polar()?;
-        let sine = (student(self.freedom()?) * across.sqrt()).max(CANCELLED);
-        let half = if sine < length {
-            libm::asin(sine / length)
-        } else {
-            PI
-        };
-        Some(Interval {
-            low: direction - half,
-            high: direction + half,
-        })
-    }
 }
 
 /// The mean of independent values, and its interval.
 #[cfg(test)]
 pub(crate) fn mean_of(values: &[f64]) -> (Option<f64>, Option<Interval>) {
-    let mean = Sequences::independent(values.iter().map(|&value| [value]).collect()).estimate();
-    (mean.mean().map(|[mean]| mean), mean.interval())
+    let values = values.iter().map(|&value| [value]).collect();
+    let mean = super::sequence::Sequences::independent(values).estimate();
+    (mean.value(), mean.interval())
 }
 
 /// Student's t for a two-sided probability of [`CONFIDENCE`], at >= 1 degrees of freedom, to 1e-6.
@@ -227,6 +234,7 @@ fn simpson(steps: u32, width: f64, value: impl Fn(u32) -> f64) -> f64 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::circular::unit;
+    use super::super::sequence::Sequences;
     use super::*;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -335,7 +343,7 @@ pub(super) mod tests {
                         .collect()
                 })
                 .collect();
-            let (deviations, vectors) = Sequences::of(
+            let vectors = Sequences::of(
                 sample
                     .iter()
                     .map(|job| job.iter().map(|&angle| unit(angle))),
@@ -345,12 +353,12 @@ pub(super) mod tests {
                 Sequences::of(sample.iter().map(|job| job.iter().map(|&angle| [angle]))).estimate();
             let holds = |interval: Interval, truth| interval.low <= truth && truth <= interval.high;
             held[0] += f64::from(u8::from(holds(
-                vectors.length_interval(&deviations, 0.0).unwrap(),
+                vectors.length_interval(0.0).unwrap(),
                 resultant,
             )));
             // No direction is near the seam a turn away.
             held[1] += f64::from(u8::from(holds(
-                vectors.direction_interval(MEAN + PI).unwrap(),
+                vectors.mean.direction_interval(MEAN + PI).unwrap(),
                 MEAN,
             )));
             held[2] += f64::from(u8::from(holds(reals.interval().unwrap(), MEAN)));

@@ -1,7 +1,7 @@
 //! Edges: where a statistic of the population crosses a threshold along an axis, each with its 95 % interval.
 //!
 //! A set is clear if its interval lies on one side of the threshold. Between two clear neighbours of opposite sides, unclear
-//! ones left out, lies an edge; up and down are edges of their own. Of the sets in between, two neighbours count between
+//! sets left out, lies an edge; up and down are separate edges. Of the sets in between, two neighbours count between
 //! which the estimate crosses. If both are clear, the edge lies between them, and nothing is said of the response there.
 //! If not, it is near: where a line through the sets of a small window crosses, with Fieller's interval (E. C. Fieller,
 //! J. R. Stat. Soc. B 16, 175 (1954)); where that has no end, as the line may be level, with the bracket of clear sets.
@@ -16,7 +16,8 @@ use super::gather::{Gathered, each_chosen};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
 use crate::results::{Results, ResultsError};
-use crate::sweep::{AllButSeed, Digits, Refinement, Statistic, Sweep, label};
+use crate::sets::{AllButSeed, Digits, Statistic, label};
+use crate::sweep::{Refinement, Sweep};
 use crate::table::columns::{Interval, columns, tables};
 use crate::table::value::floored;
 use crate::table::value::words;
@@ -28,7 +29,7 @@ pub const GROUPS: usize = 30;
 /// they are a larger share of the value at the edge, over which responses bend.
 const WINDOW: f64 = 3.0;
 const LARGEST_SHARE: f64 = 0.2;
-/// What the interval of a line is widened by, as windows that are steep by chance end first: measured, docs/rounds.md.
+/// Factor of the interval of a line, as windows that are steep by chance end first: measured, docs/rounds.md.
 const LOOKS: f64 = 1.2;
 /// How often the window is moved to where its line crosses.
 const MOVES: usize = 3;
@@ -89,13 +90,14 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// From the jobs of each group, and the value of all jobs but those of a group; `None` if one of these has none.
+    /// From the jobs of each group, and the value of all jobs except those of a group; `None` if one of these values is missing.
     pub fn new(
         counts: &[u64; GROUPS],
         threshold: f64,
         less: impl Fn(Option<usize>) -> Option<f64>,
     ) -> Option<Self> {
-        let (jobs, value) = (counts.iter().sum::<u64>() as f64, less(None)?);
+        let jobs = counts.iter().sum::<u64>() as f64;
+        let value = less(None)?;
         let mut sample = Self {
             excess: value - threshold,
             influences: [0.0; GROUPS],
@@ -111,8 +113,8 @@ impl Sample {
 
     /// Below the threshold, above it, or equal if that is not clear.
     pub(crate) fn side(&self) -> f64 {
-        let half =
-            (quantile(self.concentration) * product(&self.influences, &self.influences)).sqrt();
+        let variance = product(&self.influences, &self.influences);
+        let half = (quantile(self.concentration) * variance).sqrt();
         if self.excess.abs() > half {
             self.excess.signum()
         } else {
@@ -128,10 +130,8 @@ fn quantile(concentration: f64) -> f64 {
 }
 
 fn product(left: &[f64; GROUPS], right: &[f64; GROUPS]) -> f64 {
-    left.iter()
-        .zip(right)
-        .map(|(left, right)| left * right)
-        .sum()
+    let pairs = left.iter().zip(right);
+    pairs.map(|(left, right)| left * right).sum()
 }
 
 /// What the rounds know of a set.
@@ -191,9 +191,8 @@ impl<'a> Edge<'a> {
         let bracket = [all[first], all[last]];
         let excess = |set: &Placed<'_>| bracket[1].side * set.sample.excess;
         let rise = |pair: &&[Placed<'_>]| excess(&pair[1]) - excess(&pair[0]);
-        let crossings = all[first..=last]
-            .windows(2)
-            .filter(|pair| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0);
+        let crosses = |pair: &&[Placed<'_>]| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0;
+        let crossings = all[first..=last].windows(2).filter(crosses);
         let pair = crossings.max_by(|left, right| rise(left).total_cmp(&rise(right)))?;
         let ends = [pair[0].row, pair[1].row].map(|row| row as f64);
         if pair.iter().all(|set| set.side != 0.0) {
@@ -214,34 +213,29 @@ impl<'a> Edge<'a> {
         let near =
             |set: &&Placed<'_>, place: f64| (set.row as f64 - place).abs() <= window(place) as f64;
         let mut place = fit(pair, ends[0])?.crossing;
+        let ends = bracket.map(|set| set.row as f64);
         for _ in 0..MOVES {
-            let sets: Vec<Placed<'_>> =
-                all.iter().filter(|set| near(set, place)).copied().collect();
-            let Some(line) = fit(&sets, place).filter(|line| line.slope * bracket[1].side > 0.0)
-            else {
+            let sets = all.iter().filter(|set| near(set, place));
+            let line = fit(&sets.copied().collect::<Vec<_>>(), place);
+            let Some(line) = line.filter(|line| line.slope * bracket[1].side > 0.0) else {
                 break;
             };
-            place = line
-                .crossing
-                .clamp(bracket[0].row as f64, bracket[1].row as f64);
+            place = line.crossing.clamp(ends[0], ends[1]);
         }
-        let above = all
-            .partition_point(|set| set.row as f64 <= place)
-            .clamp(1, all.len() - 1);
-        let (low, high) = (all[above - 1].row, all[above].row);
+        let above = all.partition_point(|set| set.row as f64 <= place);
+        let above = above.clamp(1, all.len() - 1);
+        let low = all[above - 1].row;
+        let high = all[above].row;
         let nearest = floored(place.round()) as u64;
         let window = window(place);
         let inner = window.saturating_sub(1).max(1);
         let wanted_row = (high - low > window).then(|| nearest.clamp(low + inner, high - inner));
-        let sets: Vec<Placed<'_>> = all
-            .iter()
-            .filter(|set| near(set, place) || set.row == low || set.row == high)
-            .copied()
-            .collect();
+        let is_used = |set: &&Placed<'_>| near(set, place) || set.row == low || set.row == high;
+        let sets: Vec<Placed<'_>> = all.iter().filter(is_used).copied().collect();
         let line = fit(&sets, place)?;
         let (place, interval, error) = match line.interval {
             Some([low, high]) => (line.crossing, [low, high], (high - low) / width),
-            None => (place, bracket.map(|set| set.row as f64), f64::INFINITY),
+            None => (place, ends, f64::INFINITY),
         };
         Some(Self {
             sets,
@@ -267,6 +261,35 @@ impl<'a> Edge<'a> {
         let [fewest, most] = self.seeds();
         self.wanted_row.is_none() && (self.is_bracketed || (self.error <= 1.0 && fewest == most))
     }
+
+    /// Why it is as precise as it is, if sets have this many seeds at most.
+    fn ended(&self, max_seeds: u64, is_over: bool) -> Ended {
+        if self.is_done() {
+            Ended::Width
+        } else if self.wanted_row.is_none() && self.seeds()[0] >= max_seeds {
+            Ended::Seeds
+        } else if is_over {
+            Ended::Jobs
+        } else {
+            Ended::Open
+        }
+    }
+}
+
+/// A sum of samples with factors.
+#[derive(Default)]
+struct Combination {
+    excess: f64,
+    influences: [f64; GROUPS],
+}
+
+impl Combination {
+    fn add(&mut self, factor: f64, sample: &Sample) {
+        self.excess += factor * sample.excess;
+        for (sum, influence) in self.influences.iter_mut().zip(sample.influences) {
+            *sum += factor * influence;
+        }
+    }
 }
 
 /// A line through the samples of sets.
@@ -279,41 +302,34 @@ struct Fit {
 
 /// By least squares, sets weighted by their seeds; `None` for less than two rows.
 fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
-    let points = || {
-        sets.iter()
-            .map(|set| (set.row as f64 - origin, set.set.seeds as f64, set.sample))
-    };
-    let total: f64 = points().map(|(_, weight, _)| weight).sum();
-    let mean = points().map(|(x, weight, _)| weight * x).sum::<f64>() / total;
-    let moment: f64 = points()
-        .map(|(x, weight, _)| weight * (x - mean) * (x - mean))
-        .sum();
-    let (mut begin, mut slope) = ((0.0, [0.0; GROUPS]), (0.0, [0.0; GROUPS]));
+    let point = |set: &Placed<'_>| (set.row as f64 - origin, set.set.seeds as f64);
+    let points = || sets.iter().map(point);
+    let total: f64 = points().map(|(_, weight)| weight).sum();
+    let mean = points().map(|(x, weight)| weight * x).sum::<f64>() / total;
+    let moments = points().map(|(x, weight)| weight * (x - mean) * (x - mean));
+    let moment: f64 = moments.sum();
+    let mut begin = Combination::default();
+    let mut slope = Combination::default();
     let mut concentration: f64 = 0.0;
-    for (x, weight, sample) in points() {
+    for (set, (x, weight)) in sets.iter().zip(points()) {
         let of_slope = weight * (x - mean) / moment;
-        for (sum, factor) in [
-            (&mut begin, weight / total - mean * of_slope),
-            (&mut slope, of_slope),
-        ] {
-            sum.0 += factor * sample.excess;
-            sum.1
-                .iter_mut()
-                .zip(sample.influences)
-                .for_each(|(sum, influence)| *sum += factor * influence);
-        }
-        concentration = concentration.max(sample.concentration);
+        begin.add(weight / total - mean * of_slope, set.sample);
+        slope.add(of_slope, set.sample);
+        concentration = concentration.max(set.sample.concentration);
     }
     let factor = LOOKS * LOOKS * quantile(concentration);
+    let beyond_error = |left: &Combination, right: &Combination| {
+        left.excess * right.excess - factor * product(&left.influences, &right.influences)
+    };
     // All x at which the line is no more than so many standard deviations away: a + 2 b x + c x² <= 0.
-    let a = begin.0 * begin.0 - factor * product(&begin.1, &begin.1);
-    let b = begin.0 * slope.0 - factor * product(&begin.1, &slope.1);
-    let c = slope.0 * slope.0 - factor * product(&slope.1, &slope.1);
+    let a = beyond_error(&begin, &begin);
+    let b = beyond_error(&begin, &slope);
+    let c = beyond_error(&slope, &slope);
     let root = (b * b - a * c).max(0.0).sqrt();
     let interval = (c > 0.0).then(|| [origin - (b + root) / c, origin + (root - b) / c]);
     (moment > 0.0).then(|| Fit {
-        slope: slope.0,
-        crossing: origin - begin.0 / slope.0,
+        slope: slope.excess,
+        crossing: origin - begin.excess / slope.excess,
         interval,
     })
 }
@@ -335,15 +351,19 @@ pub fn lines<'a>(
     } else {
         refinement.to
     };
-    let (first, step) = scale(sweep, refinement).unwrap_or((f64::NAN, f64::NAN));
-    let width = to / step;
+    let scale = Scale::of(sweep, refinement).unwrap_or(Scale {
+        first: f64::NAN,
+        step: f64::NAN,
+        is_log: refinement.is_log,
+    });
+    let width = to / scale.step;
     let window = |place: f64| {
-        let value = if refinement.is_log {
+        let value = if scale.is_log {
             1.0
         } else {
-            (first + step * place).abs()
+            scale.value(place).abs()
         };
-        floored((LARGEST_SHARE * value / step).clamp(1.0, WINDOW)) as u64
+        floored((LARGEST_SHARE * value / scale.step).clamp(1.0, WINDOW)) as u64
     };
     let line = |rows: &Vec<u64>, sets: &Vec<(u64, &'a SetOfEdges)>, statistic: usize| {
         // Without a value, a set says nothing.
@@ -357,12 +377,10 @@ pub fn lines<'a>(
             })
         };
         let known: Vec<Placed<'_>> = sets.iter().filter_map(sample).collect();
-        let clear: Vec<usize> = (0..known.len())
-            .filter(|&index| known[index].side != 0.0)
-            .collect();
-        let opposite = clear
-            .windows(2)
-            .filter(|pair| known[pair[0]].side != known[pair[1]].side);
+        let mut clear: Vec<usize> = (0..known.len()).collect();
+        clear.retain(|&index| known[index].side != 0.0);
+        let is_opposite = |pair: &&[usize]| known[pair[0]].side != known[pair[1]].side;
+        let opposite = clear.windows(2).filter(is_opposite);
         let edges = opposite
             .filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window))
             .collect();
@@ -384,18 +402,36 @@ pub fn lines<'a>(
         .collect()
 }
 
-/// The value at the first row of the refined axis, and the step of rows; of their logarithms on a logarithmic axis.
-fn scale(sweep: &Sweep, refinement: &Refinement) -> Option<(f64, f64)> {
-    let last = sweep.row_counts()[refinement.axis] - 1;
-    let [first, end] = [0, last].map(|row| {
-        let (_, value) = sweep.value_at(refinement.axis, row)?;
-        Some(if refinement.is_log {
-            libm::log(value)
-        } else {
-            value
+/// Where the rows of the refined axis lie.
+struct Scale {
+    /// Value of the first row, and the step of rows; of their logarithms on a logarithmic axis.
+    first: f64,
+    step: f64,
+    is_log: bool,
+}
+
+impl Scale {
+    fn of(sweep: &Sweep, refinement: &Refinement) -> Option<Self> {
+        let is_log = refinement.is_log;
+        let place = |row: u64| {
+            let (_, value) = sweep.value_at(refinement.axis, row)?;
+            Some(if is_log { libm::log(value) } else { value })
+        };
+        let last = sweep.row_counts()[refinement.axis] - 1;
+        let first = place(0)?;
+        let step = (place(last)? - first) / last as f64;
+        Some(Self {
+            first,
+            step,
+            is_log,
         })
-    });
-    Some((first?, (end? - first?) / last as f64))
+    }
+
+    /// The value of the parameter at a row, or a fraction of one.
+    fn value(&self, row: f64) -> f64 {
+        let place = self.first + self.step * row;
+        if self.is_log { libm::exp(place) } else { place }
+    }
 }
 
 /// The table of edges of a directory.
@@ -403,88 +439,66 @@ pub(super) fn edge_rows(
     results: &Results<'_>,
     refinement: &Refinement,
 ) -> Result<Vec<EdgeRow>, ResultsError> {
-    let (sweep, sets) = (results.sweep(), sets_of_edges(results, refinement)?);
-    let Some((first, step)) = scale(sweep, refinement) else {
+    let sweep = results.sweep();
+    let sets = sets_of_edges(results, refinement)?;
+    let Some(scale) = Scale::of(sweep, refinement) else {
         return Ok(Vec::new());
     };
     let is_over = results.rounds_so_far().is_none_or(|rounds| rounds.is_over);
-    let value = |place: f64| {
-        if refinement.is_log {
-            libm::exp(first + step * place)
-        } else {
-            first + step * place
+    let mut rows = Vec::new();
+    for line in lines(sweep, refinement, &sets) {
+        let key = line.statistic.key;
+        for edge in &line.edges {
+            let [low, high] = &edge.bracket;
+            let row = row_between(sweep, refinement, key, (low.row, low.set), high.row);
+            rows.extend(row.map(|row| EdgeRow {
+                edge: Some(scale.value(edge.place)),
+                edge_interval: Some(Interval {
+                    low: scale.value(edge.interval[0]),
+                    high: scale.value(edge.interval[1]),
+                }),
+                rises: Some(high.side > 0.0),
+                jobs: edge.sets.iter().map(|set| set.set.seeds).sum(),
+                ended: edge.ended(sweep.seed_count(), is_over),
+                ..row
+            }));
         }
-    };
-    let mut found = Vec::new();
-    for Line {
-        statistic: Statistic { key, .. },
-        sets,
-        edges,
-        ..
-    } in lines(sweep, refinement, &sets)
-    {
-        let row = |bracket: [(u64, &SetOfEdges); 2],
-                   used: Vec<&SetOfEdges>,
-                   edge: Option<&Edge<'_>>| {
-            let ends = bracket.map(|(row, _)| sweep.value_at(refinement.axis, row));
-            let [Some((axis, bracket_low)), Some((_, bracket_high))] = ends else {
-                return None;
-            };
-            let SetOfEdges {
-                set_id, parameters, ..
-            } = bracket[0].1.clone();
-            Some(EdgeRow {
-                set_id,
-                parameters: Selected::new(parameters),
-                axis: axis.to_owned(),
-                statistic: refinement
-                    .periods
-                    .map_or_else(|| key.to_owned(), |periods| format!("{key} = {periods}")),
-                threshold: refinement.threshold,
-                edge: edge.map(|edge| value(edge.place)),
-                edge_interval: edge.map(
-                    |Edge {
-                         interval: [low, high],
-                         ..
-                     }| Interval {
-                        low: value(*low),
-                        high: value(*high),
-                    },
-                ),
-                rises: edge.map(|edge| edge.bracket[1].side > 0.0),
-                jobs: used.into_iter().map(|set| set.seeds).sum(),
-                bracket_low,
-                bracket_high,
-                ended: match edge {
-                    None => Ended::NoCrossing,
-                    Some(edge) if edge.is_done() => Ended::Width,
-                    Some(edge)
-                        if edge.wanted_row.is_none() && edge.seeds()[0] >= sweep.seed_count() =>
-                    {
-                        Ended::Seeds
-                    }
-                    Some(_) if is_over => Ended::Jobs,
-                    Some(_) => Ended::Open,
-                },
-            })
-        };
-        for edge in &edges {
-            let used = edge.sets.iter().map(|set| set.set).collect();
-            found.extend(row(
-                edge.bracket.map(|set| (set.row, set.set)),
-                used,
-                Some(edge),
-            ));
-        }
-        if let (true, Some(&first), Some(&last)) = (edges.is_empty(), sets.first(), sets.last()) {
-            found.extend(row(
-                [first, last],
-                sets.iter().map(|(_, set)| *set).collect(),
-                None,
-            ));
+        if line.edges.is_empty()
+            && let Some((first, last)) = line.sets.first().zip(line.sets.last())
+        {
+            let row = row_between(sweep, refinement, key, *first, last.0);
+            rows.extend(row.map(|row| EdgeRow {
+                jobs: line.sets.iter().map(|(_, set)| set.seeds).sum(),
+                ..row
+            }));
         }
     }
-    Ok(found)
+    Ok(rows)
+}
+
+/// A row without an edge between the first of these rows of the axis, with its set, and the last.
+fn row_between(
+    sweep: &Sweep,
+    refinement: &Refinement,
+    key: &str,
+    (first, set): (u64, &SetOfEdges),
+    last: u64,
+) -> Option<EdgeRow> {
+    let (axis, bracket_low) = sweep.value_at(refinement.axis, first)?;
+    let (_, bracket_high) = sweep.value_at(refinement.axis, last)?;
+    Some(EdgeRow {
+        set_id: set.set_id.clone(),
+        parameters: Selected::new(set.parameters.clone()),
+        axis: axis.to_owned(),
+        statistic: match refinement.periods {
+            None => key.to_owned(),
+            Some(periods) => format!("{key} = {periods}"),
+        },
+        threshold: refinement.threshold,
+        bracket_low,
+        bracket_high,
+        ..EdgeRow::default()
+    })
 }
 
 /// The sets that the rounds of a directory have chosen, by their numbers.
@@ -502,10 +516,9 @@ pub fn sets_of_edges(
 fn of_set(set: &Gathered, explained: &Explained, refinement: &Refinement) -> SetOfEdges {
     let group = |seed: u64| usize::try_from(seed % GROUPS as u64).unwrap_or_default();
     let mut counts = [0; GROUPS];
-    set.jobs
-        .averages
-        .keys()
-        .for_each(|&seed| counts[group(seed)] += 1);
+    for &seed in set.jobs.averages.keys() {
+        counts[group(seed)] += 1;
+    }
     let without = |left_out: Option<usize>| {
         let part = set.only(|seed| Some(group(seed)) != left_out);
         if let Some(periods) = refinement.periods {
@@ -515,23 +528,15 @@ fn of_set(set: &Gathered, explained: &Explained, refinement: &Refinement) -> Set
         refinement.by.iter().map(|by| row.number(by.key)).collect()
     };
     let all = without(None);
-    let each: Vec<Vec<Option<f64>>> = counts
-        .iter()
-        .enumerate()
-        .map(|(group, count)| {
-            if *count > 0 {
-                without(Some(group))
-            } else {
-                Vec::new()
-            }
-        })
-        .collect();
+    let of_others = |group: usize| match counts[group] {
+        0 => Vec::new(),
+        _ => without(Some(group)),
+    };
+    let each: Vec<Vec<Option<f64>>> = (0..GROUPS).map(of_others).collect();
     let sample = |statistic: usize| {
-        Sample::new(&counts, refinement.threshold, |group| {
-            group
-                .map_or(&all, |group| &each[group])
-                .get(statistic)
-                .copied()?
+        Sample::new(&counts, refinement.threshold, |left_out| {
+            let values = left_out.map_or(&all, |group| &each[group]);
+            values.get(statistic).copied()?
         })
     };
     SetOfEdges {

@@ -1,15 +1,14 @@
-//! What the drive alone explains: slips at the very loads of an unmodulated slider, under the modulation.
+//! What the drive alone explains: slips at the loads of an unmodulated slider, under the modulation.
 //!
 //! The control of a job has its parameters and seed, and no modulation. Its onset at t comes when the driven end has moved
 //! V0 t; under the modulation it first gets there at the [first passage](Drive::first_passage), through start-up as in the run.
-//! Phases and intervals of these passages go through the estimators of the slips. What is seen beyond them is the slider's:
-//! the excess, of pairs of a job and its control.
+//! Phases and intervals of these passages go through the estimators of the slips. What is seen beyond them is due to the
+//! slider: the excess, of pairs of a job and its control.
 
-use super::circular::unit;
+use super::circular::{Sum, unit};
 use super::confidence::{MIN_VALUES, ROUNDING, Unseen};
-use super::sequence::Sequences;
-use super::set::{Cycles, FinishedSet, OfSet};
-use super::sum::Sum;
+use super::sequence::{Centred, Sequences};
+use super::set::{Cycles, FinishedSet};
 use super::tongue::{OF_INTERVALS, OF_PHASES};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
@@ -22,7 +21,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
 
 columns! {
-    /// What is taken of a slip of a control.
+    /// What is read of a slip of a control.
     #[derive(Clone, Copy, Debug)]
     struct Onset {
         onset: f64;
@@ -30,12 +29,12 @@ columns! {
     }
 }
 
-/// The slips of the controls of a directory, by the ids of their sets and by seeds; none without `control = true`.
+/// The slips of the controls of a directory, by the ids of their sets and by seeds; empty without `control = true`.
 #[derive(Debug, Default)]
 pub(super) struct Controls(HashMap<String, BTreeMap<u64, Vec<Onset>>>);
 
 impl Controls {
-    /// Those of these sets, from the table of slips.
+    /// Reads the slips of the controls of these sets.
     pub(super) fn read<'a>(
         slips: Dataset<'_>,
         plan: Plan<'_>,
@@ -71,7 +70,7 @@ impl Controls {
     }
 }
 
-/// What the drive alone explains of a set: the passages by their seeds; none without a control.
+/// What the drive alone explains of a set: the passages by their seeds; `None` without a control.
 #[derive(Debug, Default)]
 pub(super) struct Explained {
     is_control: bool,
@@ -85,26 +84,19 @@ impl Explained {
         let Some(passages) = &self.passages else {
             return;
         };
+        let unseen = set.tongue.map_or(0.0, |_| OF_PHASES);
         let phases = phases_of(passages, set.cycles);
-        let phases = Beyond::of(
-            (&set.seeds, &set.phases),
-            set.tongue.map_or(0.0, |_| OF_PHASES),
-            &phases,
-        );
+        let phases = Beyond::of(&set.seeds, &set.phases, unseen, &phases);
         set.row.resultant_drive = phases.alone;
         set.row.resultant_excess = phases.excess;
         set.row.resultant_excess_interval = phases.interval;
         if set.row.periods == Some(0) {
             return;
         }
-        let periods = passages
-            .iter()
-            .map(|(&seed, job)| (seed, job.periods.clone()));
-        let locking = Beyond::of(
-            (&set.seeds, &set.locking),
-            set.tongue.map_or(0.0, |_| OF_INTERVALS),
-            &periods.collect(),
-        );
+        let unseen = set.tongue.map_or(0.0, |_| OF_INTERVALS);
+        let periods = passages.iter();
+        let periods = periods.map(|(&seed, job)| (seed, job.periods.clone()));
+        let locking = Beyond::of(&set.seeds, &set.locking, unseen, &periods.collect());
         set.row.locking_index_drive = locking.alone;
         set.row.locking_index_excess = locking.excess;
         set.row.locking_excess_interval = locking.interval;
@@ -140,66 +132,73 @@ struct Beyond {
 impl Beyond {
     /// Of the jobs with these seeds and the passages of the same seeds, or of all if there are no such pairs.
     fn of(
-        (seeds, seen): (&[u64], &OfSet),
+        seeds: &[u64],
+        seen: &Centred<2>,
         unseen: f64,
         passages: &BTreeMap<u64, Vec<[f64; 2]>>,
     ) -> Self {
-        let [x, y] = seen.1.mean().unwrap_or_default();
-        let mut pairs: [Vec<Sum>; 2] = Default::default();
-        for (seed, deviations) in seeds.iter().zip(seen.0.jobs()) {
+        let [x, y] = seen.mean.mean().unwrap_or_default();
+        let mut of_jobs = Vec::new();
+        let mut of_controls = Vec::new();
+        for (seed, deviations) in seeds.iter().zip(seen.deviations.jobs()) {
             let Some(passage) = passages.get(seed) else {
                 continue;
             };
-            let [mut seen, mut alone] = [Sum::default(); 2];
+            let mut of_job = Sum::default();
             for [from_x, from_y] in deviations {
-                seen.push([from_x + x, from_y + y], 1.0);
+                of_job.push([from_x + x, from_y + y], 1.0);
             }
+            let mut of_control = Sum::default();
             for &vector in passage {
-                alone.push(vector, 1.0);
+                of_control.push(vector, 1.0);
             }
-            pairs[0].push(seen);
-            pairs[1].push(alone);
+            of_jobs.push(of_job);
+            of_controls.push(of_control);
         }
-        if pairs[0].is_empty() {
+        if of_jobs.is_empty() {
             let alone = Sequences::of(passages.values().map(|job| job.iter().copied())).centred();
             Self::of_independent(seen, &alone, unseen)
         } else {
-            Self::of_pairs(&pairs, unseen)
+            Self::of_pairs(&of_jobs, &of_controls, unseen)
         }
     }
 
     /// Of sums of jobs and of their controls.
-    fn of_pairs([seen, alone]: &[Vec<Sum>; 2], unseen: f64) -> Self {
+    fn of_pairs(seen: &[Sum], alone: &[Sum], unseen: f64) -> Self {
         let ends = |excess: f64| {
-            let slips = [seen, alone].map(|sums| Sum::of_all(sums).weight);
-            if slips[0].min(slips[1]) < MIN_VALUES as f64 {
+            let slips = Sum::of_all(seen).weight;
+            if slips.min(Sum::of_all(alone).weight) < MIN_VALUES as f64 {
                 return None;
             }
             let added = Sum::added(seen).into_iter().zip(Sum::added(alone));
-            let unseen = Unseen::below(unseen * seen.len() as f64 / slips[0]);
-            let error = Sequences::independent(added.map(|(seen, alone)| [seen - alone]).collect())
-                .estimate()
-                .interval_with(unseen)?;
+            let added = added.map(|(seen, alone)| [seen - alone]);
+            let unseen = Unseen::below(unseen * seen.len() as f64 / slips);
+            let added = Sequences::independent(added.collect()).estimate();
+            let error = added.interval_with(unseen)?;
             Some(Interval {
                 low: excess + error.low.min(-ROUNDING),
                 high: excess + error.high.max(ROUNDING),
             })
         };
-        let [seen, alone] = [seen, alone].map(|sums| Sum::of_all(sums).length());
+        let seen = Sum::of_all(seen).length();
+        let alone = Sum::of_all(alone).length();
         Self::with(seen, alone, ends)
     }
 
-    fn of_independent(seen: &OfSet, alone: &OfSet, unseen: f64) -> Self {
+    fn of_independent(seen: &Centred<2>, alone: &Centred<2>, unseen: f64) -> Self {
+        let of_slips = seen.length_interval(unseen);
+        let of_drive = alone.length_interval(0.0);
+        let seen = seen.mean.resultant_length();
+        let alone = alone.mean.resultant_length();
         let ends = |excess: f64| {
-            let own = seen.1.length_interval(&seen.0, unseen)?;
-            let of_drive = alone.1.length_interval(&alone.0, 0.0)?;
-            let (seen, alone) = (seen.1.resultant_length()?, alone.1.resultant_length()?);
+            let of_slips = of_slips?;
+            let of_drive = of_drive?;
             Some(Interval {
-                low: excess - libm::hypot(seen - own.low, of_drive.high - alone),
-                high: excess + libm::hypot(own.high - seen, alone - of_drive.low),
+                low: excess - libm::hypot(seen? - of_slips.low, of_drive.high - alone?),
+                high: excess + libm::hypot(of_slips.high - seen?, alone? - of_drive.low),
             })
         };
-        Self::with(seen.1.resultant_length(), alone.1.resultant_length(), ends)
+        Self::with(seen, alone, ends)
     }
 
     fn with(seen: Option<f64>, alone: Option<f64>, ends: impl Fn(f64) -> Option<Interval>) -> Self {
@@ -228,10 +227,12 @@ impl Passage {
             drive.advance_to(time);
             (drive.first_passage(time), drive)
         };
-        let (mut phases, mut periods) = (Vec::new(), Vec::new());
-        let mut last = slips
+        let mut phases = Vec::new();
+        let mut periods = Vec::new();
+        let before = slips
             .first()
-            .and_then(|slip| Some(passage(slip.onset - slip.interval?).0));
+            .and_then(|slip| Some(slip.onset - slip.interval?));
+        let mut last = before.map(|onset| passage(onset).0);
         for slip in slips {
             let (time, cycle) = passage(slip.onset);
             let phase = phase(time - cycle.cycle_start, cycle.period, cycle.eta);
@@ -248,7 +249,8 @@ mod tests {
     use super::super::confidence::tests::Draws;
     use super::*;
     use crate::model::selected::Selected;
-    use crate::sweep::{Extension, SetRow, Sweep};
+    use crate::sets::SetRow;
+    use crate::sweep::{Extension, Sweep};
     use std::path::Path;
 
     const FREQUENCY: f64 = 29.0;
@@ -329,7 +331,8 @@ mod tests {
                 .map(|number| 0.01 + step * f64::from(number))
                 .collect::<Vec<f64>>()
         };
-        let (whole, free) = (apart(3.0 / FREQUENCY), apart(0.1234));
+        let whole = apart(3.0 / FREQUENCY);
+        let free = apart(0.1234);
         let of =
             |seeds: &[u64]| explained(1e-6, &[whole.clone(), free.clone()], seeds, &unseen(seeds));
         let row = of(&[0, 5]);
@@ -347,10 +350,10 @@ mod tests {
         let seeds: Vec<u64> = (20..29).collect();
         let onsets = [vec![0.1, 0.25, 0.37, 0.52], vec![0.13, 0.24, 0.41, 0.5]];
         let row = explained(1e-6, &onsets, &seeds, &seen);
-        let (vectors, mean) = Sequences::of(seen).centred();
-        let own = mean.length_interval(&vectors, 0.0).unwrap();
+        let vectors = Sequences::of(seen).centred();
+        let own = vectors.length_interval(0.0).unwrap();
         let excess = row.resultant_excess.unwrap();
-        let seen = mean.resultant_length().unwrap();
+        let seen = vectors.mean.resultant_length().unwrap();
         assert!((excess - (seen - row.resultant_drive.unwrap())).abs() < 1e-15);
         let interval = row.resultant_excess_interval.unwrap();
         assert!(excess - interval.low > seen - own.low);
@@ -395,7 +398,8 @@ mod tests {
         const REPETITIONS: u64 = 1000;
         let holds = |repetition: u64, pairs: u64| {
             let mut draws = Draws::new(repetition);
-            let (mut seen, mut alone) = (Vec::new(), Vec::new());
+            let mut seen = Vec::new();
+            let mut alone = Vec::new();
             for _ in 0..pairs {
                 let common = 0.3 * draws.normal();
                 let mut job = |spread: f64| {
@@ -413,8 +417,9 @@ mod tests {
                 }
                 sum
             };
-            let pairs = [seen, alone].map(|jobs| jobs.iter().map(sum).collect());
-            let found = Beyond::of_pairs(&pairs, 0.0);
+            let seen: Vec<Sum> = seen.iter().map(sum).collect();
+            let alone: Vec<Sum> = alone.iter().map(sum).collect();
+            let found = Beyond::of_pairs(&seen, &alone, 0.0);
             let length = |spread: f64| libm::exp(-0.5 * (0.09 + spread * spread));
             let excess = length(0.3) - length(0.6);
             found

@@ -1,20 +1,22 @@
 //! The sets of jobs, gathered from the tables: jobs once, slips as often as memory asks for.
 //!
-//! Contract: a function of the wanted jobs and their rows alone. What is summed over the jobs of a set is summed in the order
-//! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before.
+//! Contract: a function of the wanted jobs and their rows alone. Sums over the jobs of a set are taken in the order of their
+//! seeds, in whatever files they lie, so that no digit depends on what was run earlier in the directory.
 //!
 //! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 50 more for the jobs of
 //! [`MAX_SLIPS`] slips and 48 to 96 for each of these, and as much again for those of the set at hand; where the tables
 //! hold more, the slips are read again for the next sets.
 
 use super::drive_alone::{Controls, Explained};
+use super::jobs_of_set::{JobFacts, SetJobs};
 use super::sample::Point;
-use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
-use crate::model::selected::Selected;
+use super::set::{FinishedSet, SetSlips};
+use crate::model::selected::{Selected, Selection as _};
 use crate::model::{Parameters, Symbol, Value};
-use crate::observe::{Regime, Slip};
-use crate::results::tables::{All, JOBS, JobOfSlip, JobOutcome, SLIPS};
+use crate::observe::Slip;
+use crate::results::tables::{All, JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
+use crate::sets::{AllButSeed, SetRow};
 use crate::sweep::Plan;
 use crate::table::columns::columns;
 use crate::table::file::Dataset;
@@ -28,20 +30,6 @@ columns! {
     pub(super) struct JobOfSet {
         set_id: String;
         facts: JobFacts;
-    }
-}
-
-columns! {
-    /// What a reduction takes from the jobs table beside set and parameters.
-    #[derive(Clone, Debug)]
-    pub(super) struct JobFacts {
-        outcome: JobOutcome;
-        slips: Option<u64>;
-        averaged_time: Option<f64>;
-        mean_friction: Option<f64>;
-        slip_share: Option<f64>;
-        regime: Option<Regime>;
-        running_interval: Option<f64>;
     }
 }
 
@@ -62,17 +50,16 @@ pub(super) fn each_chosen(
     results: &Results<'_>,
     mut gathered: impl FnMut(u64, Gathered, &Explained),
 ) -> Result<(), ResultsError> {
-    let (sweep, chosen) = (results.sweep(), results.chosen());
+    let sweep = results.sweep();
+    let chosen = results.chosen();
     let is_chosen = |parameters: &Parameters| {
-        sweep
-            .find(parameters)
-            .is_some_and(|point| chosen.has(point))
+        let point = sweep.find(parameters);
+        point.is_some_and(|point| chosen.has(point))
     };
+    let is_of_grid = |number: &u64| *number < sweep.point_count();
     Gathering::of_jobs(results, &is_chosen)?.each_set(MAX_SLIPS, u64::MAX, |set, explained| {
-        if let Some(number) = sweep
-            .set_with(&set.jobs.parameters)
-            .filter(|&number| number < sweep.point_count())
-        {
+        let number = sweep.set_with(&set.jobs.parameters);
+        if let Some(number) = number.filter(is_of_grid) {
             gathered(number, set, explained);
         }
         Ok(())
@@ -106,9 +93,8 @@ impl<'a> Gathering<'a> {
                 parameters,
                 ..SetJobs::default()
             };
-            sets.entry(job.set_id)
-                .or_insert_with_key(new)
-                .push(seed, &job.facts);
+            let set = sets.entry(job.set_id).or_insert_with_key(new);
+            set.push(seed, &job.facts);
         })?;
         let mut sets: Vec<SetJobs> = sets.into_values().collect();
         sets.sort_by(by_parameters);
@@ -141,26 +127,25 @@ impl<'a> Gathering<'a> {
 
     /// Reads all slips and keeps those of the wanted jobs of these sets.
     fn slips_of(&self, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Gathered>, ResultsError> {
-        let index: HashMap<String, usize> = sets
-            .iter()
-            .enumerate()
-            .map(|(index, set)| (set.set_id.clone(), index))
-            .collect();
+        let ids = sets.iter().map(|set| set.set_id.clone());
+        let index: HashMap<String, usize> = ids.zip(0..).collect();
         let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
-        let (mut place, mut last, mut found) = (0, None, None);
+        let mut place = 0;
+        // The job of the last slip, and its set if the job is wanted.
+        let mut last = None;
+        let mut found = None;
         for batch in self.slips.clone().rows::<(JobOfSlip, Slip)>() {
             for (job, slip) in batch? {
                 let here = place;
                 place += 1;
                 if last.as_ref() != Some(&job) {
-                    let of_job = |set: &Gathered| Parameters {
-                        seed: job.seed,
-                        ..set.jobs.parameters.clone()
+                    let is_wanted = |&index: &usize| {
+                        (self.is_wanted)(&Parameters {
+                            seed: job.seed,
+                            ..sets[index].jobs.parameters.clone()
+                        })
                     };
-                    found = index
-                        .get(&job.set_id)
-                        .copied()
-                        .filter(|&index| (self.is_wanted)(&of_job(&sets[index])));
+                    found = index.get(&job.set_id).copied().filter(is_wanted);
                     last = Some(job);
                 }
                 let (Some(index), Some(job)) = (found, &last) else {
@@ -168,8 +153,8 @@ impl<'a> Gathering<'a> {
                 };
                 let set = &mut sets[index];
                 if here % spacing == 0 {
-                    set.points
-                        .push((here, Point::of(&set.jobs.parameters, &slip)));
+                    let point = Point::of(&set.jobs.parameters, &slip);
+                    set.points.push((here, point));
                 }
                 set.slips.push(job.seed, &slip);
             }
@@ -184,28 +169,27 @@ pub(super) fn each_job(
     mut job: impl FnMut(JobOfSet, Parameters),
 ) -> Result<(), ResultsError> {
     for batch in files.clone().rows::<(JobOfSet, Selected<All>)>() {
-        let wanted = batch?
-            .into_iter()
-            .filter(|(_, of_job)| is_wanted(&of_job.parameters));
-        wanted.for_each(|(facts, Selected { parameters, .. })| job(facts, parameters));
+        for (of_set, Selected { parameters, .. }) in batch? {
+            if is_wanted(&parameters) {
+                job(of_set, parameters);
+            }
+        }
     }
     Ok(())
 }
 
 fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
-    let others = Symbol::ALL
-        .into_iter()
-        .filter(|&symbol| symbol != Symbol::Seed);
-    others
-        .map(
-            |symbol| match (left.parameters.get(symbol), right.parameters.get(symbol)) {
-                (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
-                (Value::Count(left), Value::Count(right)) => left.cmp(&right),
-                (left, right) => left.to_string().cmp(&right.to_string()),
-            },
-        )
-        .find(|order| order.is_ne())
-        .unwrap_or_else(|| left.set_id.cmp(&right.set_id))
+    let order = |&symbol: &Symbol| {
+        let values = (left.parameters.get(symbol), right.parameters.get(symbol));
+        match values {
+            (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
+            (Value::Count(left), Value::Count(right)) => left.cmp(&right),
+            (left, right) => left.to_string().cmp(&right.to_string()),
+        }
+    };
+    let mut orders = AllButSeed::SYMBOLS.iter().map(order);
+    let order = orders.find(|order| order.is_ne());
+    order.unwrap_or_else(|| left.set_id.cmp(&right.set_id))
 }
 
 /// Cuts the sets where their slips would exceed the most.
@@ -243,7 +227,7 @@ impl Gathered {
         }
     }
 
-    /// What the jobs with some of the seeds say.
+    /// The jobs with some of the seeds, and their slips.
     pub(super) fn only(&self, keeps: impl Fn(u64) -> bool) -> Self {
         let mut part = self.clone();
         part.jobs.averages.retain(|&seed, _| keeps(seed));

@@ -25,27 +25,23 @@ tables! {
 
 /// The histogram of a set: bins of a width of mean τ/60, with an edge at 0; empty bins are left out.
 pub(super) fn histogram(set: &SetRow, sorted: &[f64]) -> Vec<HistogramBin> {
-    let Some(width) = set
-        .tau_mean
-        .map(|mean| mean / BINS_PER_MEAN)
-        .filter(|&width| width > 0.0)
-    else {
+    let width = set.tau_mean.unwrap_or_default() / BINS_PER_MEAN;
+    if width <= 0.0 {
         return Vec::new();
-    };
+    }
     let bin_of = |interval: f64| (interval / width).floor();
-    sorted
-        .chunk_by(|&left, &right| bin_of(left) == bin_of(right))
-        .map(|members| {
-            let bin = bin_of(members[0]);
-            HistogramBin {
-                set_id: set.set_id.clone(),
-                low: bin * width,
-                high: (bin + 1.0) * width,
-                count: members.len() as u64,
-                density: members.len() as f64 / (sorted.len() as f64 * width),
-            }
-        })
-        .collect()
+    let row = |members: &[f64]| {
+        let bin = bin_of(members[0]);
+        HistogramBin {
+            set_id: set.set_id.clone(),
+            low: bin * width,
+            high: (bin + 1.0) * width,
+            count: members.len() as u64,
+            density: members.len() as f64 / (sorted.len() as f64 * width),
+        }
+    };
+    let bins = sorted.chunk_by(|&left, &right| bin_of(left) == bin_of(right));
+    bins.map(row).collect()
 }
 
 #[cfg(test)]

@@ -5,25 +5,25 @@ mod backbone;
 mod circular;
 mod compare;
 mod confidence;
+mod crossings;
 mod drive_alone;
-mod edges;
 mod gather;
 mod histogram;
+mod jobs_of_set;
 #[cfg(test)]
 mod pool;
 mod quantile;
 mod reduced;
 mod reduction;
-mod rounds;
 mod sample;
 mod sequence;
 mod set;
-mod sum;
+mod set_writer;
 mod swept;
 mod tongue;
 mod values;
 
-pub use crate::sweep::SetRow;
+pub use crate::sets::{FREQUENCY, SetRow};
 pub use crate::table::columns::Interval;
 pub use backbone::BackboneBin;
 pub use compare::compare;
@@ -31,8 +31,8 @@ pub use compare::compare;
 pub(crate) use confidence::mean_of;
 pub(crate) use confidence::student_at;
 #[cfg(test)]
-pub(crate) use edges::{Edge, GROUPS, Sample};
-pub use edges::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
+pub(crate) use crossings::{Edge, GROUPS, Sample};
+pub use crossings::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
 pub use gather::reduce_chosen;
 pub use histogram::HistogramBin;
 #[cfg(test)]
@@ -41,12 +41,12 @@ pub use quantile::quantile;
 pub use reduced::{Renewed, advise, read_reduced, read_sets, renew};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
-#[cfg(test)]
-pub(crate) use rounds::RoundOfSet;
-pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
+#[cfg(test)]
+pub(crate) use set_writer::RoundOfSet;
+pub use set_writer::{SetInRounds, error_over_target};
 pub use swept::{Swept, ascending, differing, has_even_steps, is_same, is_spread, swept};
-pub use values::{FREQUENCY, Values, set_columns, sets_where};
+pub use values::{Values, set_columns, sets_where};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};

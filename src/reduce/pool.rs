@@ -2,8 +2,9 @@
 
 use super::backbone::{Backbone, BackboneBin};
 use super::drive_alone::{Controls, Explained};
-use super::gather::{Gathered, JobFacts, JobOfSet, each_job};
-use super::set::{FinishedSet, SetJobs, SetRow};
+use super::gather::{Gathered, JobOfSet, each_job};
+use super::jobs_of_set::{JobFacts, SetJobs};
+use super::set::{FinishedSet, SetRow};
 use crate::model::Parameters;
 use crate::observe::Slip;
 use crate::results::layout::Layout;

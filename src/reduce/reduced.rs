@@ -1,5 +1,5 @@
-//! Reduced data: what they follow from, so that those of other tables are known as such, by content, as a copied folder has
-//! other times; and their tables back as rows.
+//! Reduced data: whether they are up to date, by the content of the tables they were made from, as a copied folder has other
+//! times; and their tables read back as rows.
 
 use super::{BackboneBin, HistogramBin, Point, SetRow, reduce};
 use crate::results::layout::Layout;
@@ -18,7 +18,7 @@ use tempfile::TempDir;
 /// The footer's key of the source.
 pub(super) const SOURCE: &str = "reduced_from";
 
-/// A checksum of the sweep that was asked for last, and of names and sizes of the committed files of jobs.
+/// A checksum of all sweeps of a directory, and of names and sizes of the committed files of jobs.
 pub(super) fn source(results: &Results<'_>) -> Result<String, ResultsError> {
     let mut digest = Sha256::new();
     // All: which sets are controls follows from them.
@@ -32,7 +32,7 @@ pub(super) fn source(results: &Results<'_>) -> Result<String, ResultsError> {
     Ok(hexadecimal(&digest.finalize()))
 }
 
-/// A directory whose reduced data are of its tables. They lie elsewhere, as long as this lives, where nothing can be written.
+/// A directory whose reduced data are up to date. If nothing can be written there, they lie elsewhere as long as this lives.
 pub struct Renewed<'a> {
     results: Results<'a>,
     _elsewhere: Option<TempDir>,
@@ -46,7 +46,7 @@ impl<'a> Deref for Renewed<'a> {
     }
 }
 
-/// Reduces the tables unless the reduced data are of the tables as they are, or there are no tables any more.
+/// Reduces the tables if the reduced data are out of date, and there are tables.
 pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
     let renewed = Renewed {
         results: results.clone(),
@@ -58,18 +58,14 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
         return Ok(renewed);
     }
     let source = Footer::empty().with(SOURCE, &source(results)?);
-    let is_of_it = |table: &&str| {
+    let is_current = |table| {
         let file = DataFile::with_footer(layout.reduced_file(table), source.clone());
         file.check(layout.storage).is_ok()
     };
-    if [
-        SetRow::NAME,
-        HistogramBin::NAME,
-        BackboneBin::NAME,
-        Point::NAME,
-    ]
-    .iter()
-    .all(is_of_it)
+    if is_current(SetRow::NAME)
+        && is_current(HistogramBin::NAME)
+        && is_current(BackboneBin::NAME)
+        && is_current(Point::NAME)
     {
         return Ok(renewed);
     }
@@ -84,24 +80,22 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
                 _elsewhere: Some(elsewhere),
             })
         }
-        Err(error) if is_there => Err(error
-            .context("the reduced data are not of the tables as they are, and must be made again")),
+        Err(error) if is_there => Err(error.context("the reduced data are out of date")),
         Err(error) => Err(error),
     }
 }
 
-/// Whether something failed as nothing may be written.
+/// Whether something failed because writing is not permitted.
 fn is_read_only(error: &anyhow::Error) -> bool {
-    let of_storage = error
-        .downcast_ref()
-        .map(StorageError::kind)
-        .map(ErrorKind::Disk);
-    let kind = of_storage.or_else(|| Some(error.downcast_ref::<ResultsError>()?.kind));
+    let of_storage = error.downcast_ref().map(StorageError::kind);
+    let of_results = error.downcast_ref().map(|error: &ResultsError| error.kind);
+    let kind = of_storage.map(ErrorKind::Disk).or(of_results);
+    let Some(ErrorKind::Disk(kind)) = kind else {
+        return false;
+    };
     matches!(
         kind,
-        Some(ErrorKind::Disk(
-            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
-        ))
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
     )
 }
 
@@ -115,20 +109,17 @@ pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
 
 /// The rows of a reduced table, such as [`Point`](super::Point).
 pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
-    let batches = Dataset::new(layout.storage, vec![layout.reduced_file(R::NAME)]).rows();
-    Ok(batches
-        .collect::<Result<Vec<Vec<R>>, _>>()?
-        .into_iter()
-        .flatten()
-        .collect())
+    let file = layout.reduced_file(R::NAME);
+    let batches = Dataset::new(layout.storage, vec![file]).rows();
+    let batches: Vec<Vec<R>> = batches.collect::<Result<_, _>>()?;
+    Ok(batches.into_iter().flatten().collect())
 }
 
-/// The sets with at least one interval or a regime, controls left out, in order, if there are at most `max` of them; else none.
+/// The sets with at least one interval or a regime, controls left out, in order; empty if there are more than `max`.
 pub fn read_sets(layout: &Layout<'_>, max: usize) -> Result<Vec<SetRow>, ResultsError> {
     let mut sets = Vec::new();
-    for batch in
-        Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)]).rows::<SetRow>()
-    {
+    let file = layout.reduced_file(SetRow::NAME);
+    for batch in Dataset::new(layout.storage, vec![file]).rows::<SetRow>() {
         let rows = batch?.into_iter().filter(|row| !row.is_control);
         sets.extend(rows.filter(|row| row.intervals > 0 || row.regime.is_some()));
         if sets.len() > max {

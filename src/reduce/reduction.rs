@@ -2,13 +2,13 @@
 //! same tables give the same bytes.
 
 use super::backbone::{Backbone, BackboneBin};
-use super::edges::{EdgeRow, edge_rows};
+use super::crossings::{EdgeRow, edge_rows};
 use super::gather::{Gathering, MAX_SLIPS};
 use super::histogram::{HistogramBin, histogram};
 use super::reduced::{SOURCE, source};
-use super::rounds::SetWriter;
 use super::sample::{Point, spacing};
 use super::set::SetRow;
+use super::set_writer::SetWriter;
 use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::tables::JOBS;
@@ -61,7 +61,7 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
     results.publish(commit)?;
     let edges = layout.reduced_file(EdgeRow::NAME);
     if results.sweep().refinement().is_none() && layout.storage.exists(&edges)? {
-        // Of a sweep before.
+        // Left by an earlier sweep.
         layout.refuse_link(&edges)?;
         layout.storage.remove(&edges)?;
     }
@@ -80,10 +80,8 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
             tables: layout.table(JOBS)
         });
     }
-    let total = all_jobs
-        .iter()
-        .map(|set| set.slips)
-        .fold(0, u64::saturating_add);
+    let slips = all_jobs.iter().map(|set| set.slips);
+    let total = slips.fold(0, u64::saturating_add);
     let mut summary = ReductionSummary {
         jobs: all_jobs.iter().map(|set| set.finished).sum(),
         failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
@@ -100,7 +98,8 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, &at(BackboneBin::NAME))?;
     let mut point_writer = TableWriter::new(stage(Point::NAME)?, &at(Point::NAME))?;
 
-    let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
+    let mut pooled = Backbone::default();
+    let mut kept = Vec::new();
     gathering.each_set(max_slips, spacing(total), |set, explained| {
         let (set, points) = set.finish_with(explained);
         let row = &set.row;
@@ -109,21 +108,16 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
             return Ok(());
         }
         summary.sets += 1;
-        histogram(row, &set.intervals)
-            .iter()
-            .try_for_each(|bin| histogram_writer.push(bin))?;
+        for bin in histogram(row, &set.intervals) {
+            histogram_writer.push(&bin)?;
+        }
         pooled.push(&set);
         summary.slips += row.slips;
         summary.phased_sets += u64::from(row.has_phase);
-        kept.extend(points.into_iter().map(|(place, point)| {
-            (
-                place,
-                Point {
-                    has_phase: row.has_phase,
-                    ..point
-                },
-            )
-        }));
+        for (place, mut point) in points {
+            point.has_phase = row.has_phase;
+            kept.push((place, point));
+        }
         Ok(())
     })?;
     kept.sort_by_key(|(place, _)| *place);
@@ -137,9 +131,9 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     }
     if let Some(refinement) = results.sweep().refinement() {
         let mut edge_writer = TableWriter::new(stage(EdgeRow::NAME)?, &at(EdgeRow::NAME))?;
-        edge_rows(results, refinement)?
-            .iter()
-            .try_for_each(|edge| edge_writer.push(edge))?;
+        for edge in edge_rows(results, refinement)? {
+            edge_writer.push(&edge)?;
+        }
         edge_writer.finish()?;
     }
     set_writer.finish()?;

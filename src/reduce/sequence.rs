@@ -21,7 +21,8 @@ impl<const D: usize> Sequences<D> {
     pub(super) fn of<Job: IntoIterator<Item = [f64; D]>>(
         jobs: impl IntoIterator<Item = Job>,
     ) -> Self {
-        let (mut values, mut starts) = (Vec::new(), Vec::new());
+        let mut values = Vec::new();
+        let mut starts = Vec::new();
         for job in jobs {
             starts.push(values.len());
             values.extend(job);
@@ -35,25 +36,21 @@ impl<const D: usize> Sequences<D> {
     }
 
     pub(super) fn jobs(&self) -> impl Iterator<Item = &[[f64; D]]> {
-        let ends = self
-            .starts
-            .iter()
-            .skip(1)
-            .copied()
-            .chain([self.values.len()]);
-        self.starts
-            .iter()
+        let starts = self.starts.iter();
+        let ends = starts.clone().skip(1).copied();
+        let ends = ends.chain([self.values.len()]);
+        starts
             .zip(ends)
             .map(|(&start, end)| &self.values[start..end])
     }
 
     /// Their mean and its covariance.
     pub(super) fn estimate(self) -> Estimate<D> {
-        self.centred().1
+        self.centred().mean
     }
 
     /// Their deviations from the mean, and the mean with its covariance.
-    pub(super) fn centred(mut self) -> (Self, Estimate<D>) {
+    pub(super) fn centred(mut self) -> Centred<D> {
         let count = self.values.len() as u64;
         let total = sum(&self.values);
         let mean = total.map(|sum| sum / count as f64);
@@ -69,12 +66,14 @@ impl<const D: usize> Sequences<D> {
         } else {
             0.0
         };
-        let estimate = Estimate {
-            covariance: products(&sums).map(|line| line.map(|cell| scale * cell)),
-            rare: rare(&sums),
-            ..Estimate::of_sums(count, total, &sums, freedom)
-        };
-        (self, estimate)
+        Centred {
+            deviations: self,
+            mean: Estimate {
+                covariance: products(&sums).map(|line| line.map(|cell| scale * cell)),
+                rare: rare(&sums),
+                ..Estimate::of_sums(count, total, &sums, freedom)
+            },
+        }
     }
 
     /// The sums of jobs; of few, those of equal stretches of each job.
@@ -101,6 +100,19 @@ impl<const D: usize> Sequences<D> {
             values: self.values.iter().map(component).collect(),
             starts: self.starts.clone(),
         }
+    }
+}
+
+/// Values as deviations from their mean, and the mean.
+#[derive(Clone, Debug)]
+pub(super) struct Centred<const D: usize> {
+    pub(super) deviations: Sequences<D>,
+    pub(super) mean: Estimate<D>,
+}
+
+impl<const D: usize> Default for Centred<D> {
+    fn default() -> Self {
+        Sequences::default().centred()
     }
 }
 
@@ -149,6 +161,19 @@ pub(super) struct Estimate<const D: usize> {
 impl<const D: usize> Default for Estimate<D> {
     fn default() -> Self {
         Sequences::default().estimate()
+    }
+}
+
+impl Estimate<1> {
+    /// The mean as a number; `None` without values.
+    pub(super) fn value(&self) -> Option<f64> {
+        self.mean().map(|[mean]| mean)
+    }
+
+    /// The squared deviation of a value from the mean.
+    pub(super) fn square_of_deviation(&self) -> impl Fn(f64) -> f64 + use<> {
+        let mean = self.value().unwrap_or_default();
+        move |value| (value - mean) * (value - mean)
     }
 }
 

@@ -1,17 +1,14 @@
 //! The table of sets, a row for each with all seeds together: intervals, locking and phase statistics.
 
 use super::circular::unit;
-use super::confidence::Unseen;
-use super::gather::JobFacts;
+use super::jobs_of_set::SetJobs;
 use super::quantile::at_rank;
-use super::sequence::{Estimate, Sequences};
+use super::sequence::{Centred, Estimate, Sequences};
 use super::tongue::{OF_INTERVALS, OF_PHASES, Tongue};
 use super::top_of_phases;
 use crate::model::Parameters;
-use crate::model::selected::Selected;
-use crate::observe::{Regime, Slip};
-use crate::results::tables::JobOutcome;
-pub use crate::sweep::SetRow;
+use crate::observe::Slip;
+pub use crate::sets::SetRow;
 use crate::table::columns::Interval;
 use crate::table::value::floored;
 use std::collections::BTreeMap;
@@ -20,92 +17,7 @@ use std::f64::consts::{PI, TAU};
 /// Width from which an interval of a mean phase counts as the whole turn, in rad: others are half a turn wide at most.
 const WHOLE_TURN: f64 = 1.5 * PI;
 
-/// Quantiles of τ that are reported.
-const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
-
-/// What the jobs table says about a set.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct SetJobs {
-    /// Id of the set, 32 hexadecimal characters.
-    pub set_id: String,
-    /// Its parameters; the seed is that of any of its jobs.
-    pub parameters: Parameters,
-    /// Jobs that were run to an end.
-    pub finished: u64,
-    pub failed: u64,
-    /// Slips that the jobs recorded.
-    pub slips: u64,
-    /// Jobs that gave up, since no slip came.
-    pub without_slips: u64,
-    /// What the jobs are on average over time, by their seeds.
-    pub averages: BTreeMap<u64, JobAverages>,
-    /// Jobs that `max_time` ended.
-    pub cut: u64,
-    /// Seeds of jobs that gave up after a slip, and the time since it, in s.
-    pub running: Vec<(u64, f64)>,
-    /// How the slider moved in the jobs; mixed if they differ.
-    pub regime: Option<Regime>,
-}
-
-/// What a job is on average over a time in s.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct JobAverages {
-    time: f64,
-    /// In N.
-    friction: f64,
-    slip_share: f64,
-}
-
-impl SetJobs {
-    /// A job of the set has ended.
-    pub(super) fn push(&mut self, seed: u64, job: &JobFacts) {
-        if job.outcome == JobOutcome::Failed {
-            self.failed += 1;
-            return;
-        }
-        self.finished += 1;
-        self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
-        self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
-        self.cut += u64::from(job.outcome == JobOutcome::TimeLimit);
-        if let (Some(time), Some(friction), Some(slip_share)) =
-            (job.averaged_time, job.mean_friction, job.slip_share)
-        {
-            self.averages.insert(
-                seed,
-                JobAverages {
-                    time,
-                    friction,
-                    slip_share,
-                },
-            );
-        }
-        // Earlier versions have one of jobs that `max_time` ended, too.
-        let running = job
-            .running_interval
-            .filter(|_| job.outcome == JobOutcome::NoSlips);
-        self.running
-            .extend(running.map(|interval| (seed, interval)));
-        self.regime = match (self.regime, job.regime) {
-            (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
-            (regime, other) => other.or(regime),
-        };
-    }
-
-    /// An average over the time of all jobs: by pseudo-values, one for each job, which weigh it by its time.
-    fn over_time(&self, of: impl Fn(&JobAverages) -> f64) -> Estimate<1> {
-        let sum = |of: &dyn Fn(&JobAverages) -> f64| self.averages.values().map(of).sum::<f64>();
-        let time = sum(&|job| job.time);
-        let average = sum(&|job| job.time * of(job)) / time;
-        let weight = self.averages.len() as f64 / time;
-        let pseudo = self
-            .averages
-            .values()
-            .map(|job| [average + (of(job) - average) * job.time * weight]);
-        Sequences::independent(pseudo.collect()).estimate()
-    }
-}
-
-/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 48 bytes.
+/// The numbers of a slip that are kept until its set is complete. Missing values are NaN, so that a slip takes 48 bytes.
 #[derive(Clone, Copy, Debug)]
 struct SlipStats {
     onset: f64,
@@ -123,14 +35,12 @@ struct SlipStats {
 impl SlipStats {
     fn of(slip: &Slip) -> Self {
         let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        let periods = slip.interval.zip(slip.modulation.period);
+        let periods = periods.map(|(interval, period)| interval / period);
         Self {
             onset: slip.onset,
             interval: or_missing(slip.interval),
-            periods: or_missing(
-                slip.interval
-                    .zip(slip.modulation.period)
-                    .map(|(interval, period)| interval / period),
-            ),
+            periods: or_missing(periods),
             phase: or_missing(slip.phase),
             peak_force: slip.peak_force,
             drop: slip.drop,
@@ -163,149 +73,90 @@ impl SetSlips {
 
     /// The share of the intervals that are nearest to this number of periods.
     pub(super) fn share_of_periods(&self, periods: f64) -> Option<f64> {
-        let all = self
-            .jobs
-            .values()
-            .flatten()
-            .filter_map(|slip| non_nan(slip.periods));
-        let nearest: Vec<f64> = all
-            .map(|found| f64::from(u8::from(found.round() == periods)))
-            .collect();
-        (!nearest.is_empty()).then(|| nearest.iter().sum::<f64>() / nearest.len() as f64)
+        let slips = self.jobs.values().flatten();
+        let all: Vec<f64> = slips.filter_map(|slip| non_nan(slip.periods)).collect();
+        let nearest = all.iter().filter(|found| found.round() == periods).count();
+        (!all.is_empty()).then(|| nearest as f64 / all.len() as f64)
     }
 
     pub(super) fn finish(self, jobs: SetJobs) -> FinishedSet {
-        let slips = self.jobs.values().map(|job| job.len() as u64).sum();
         let by_job: Vec<&[SlipStats]> = self.jobs.values().map(Vec::as_slice).collect();
-        let eta = jobs.parameters.eta();
-        let top = top_of_phases(eta);
-        let running = jobs.running.len();
-        let tau = Intervals::new(&by_job, |slip| slip.interval, running);
-        let over_period = Intervals::new(&by_job, |slip| slip.periods, running);
-        let intervals = tau.estimate(|interval| [interval]);
-        let drops = estimate(&by_job, |slip| Some([slip.drop]));
-        let periods = over_period.quantile(0.5).map(|n| floored(n.round()) as u64);
-        let mean = |[mean]: [f64; 1]| mean;
-        let periods_mean = over_period.estimate(|periods| [periods]).mean().map(mean);
-        let tongue = Tongue::of(&over_period.sorted, periods);
-        let unseen = |of: &dyn Fn(&Tongue) -> Unseen| tongue.as_ref().map(of).unwrap_or_default();
-        // What a period more changes.
-        let step = |of: &Estimate<1>| {
-            let ([mean], periods) = of.mean().zip(periods_mean).unwrap_or(([0.0], 1.0));
-            mean / periods
-        };
-        // A longer interval ends at a force that is higher by what it drops more.
-        let unseen_forces = unseen(&|tongue| tongue.of_mean(step(&drops)));
-        // The whole turns go first: they would cost the sine its digits.
-        let of_intervals = sequences(&by_job, |slip| {
-            non_nan(slip.periods).map(|periods| unit(TAU * periods.fract()))
-        })
-        .centred();
-        let tau_mean = intervals.mean().map(mean);
-        let cycles = Cycles::of(&jobs.parameters, tau_mean);
-        let in_cycles: Vec<&[SlipStats]> = match &cycles {
+        let tau = Intervals::new(&by_job, |slip| slip.interval, &jobs.running);
+        let in_periods = Intervals::new(&by_job, |slip| slip.periods, &jobs.running);
+        let n = in_periods.quantile(0.5).map(|n| floored(n.round()) as u64);
+        let mean_periods = in_periods.estimate(|periods| [periods]).value();
+        let tongue = Tongue::of(&in_periods.sorted, n, mean_periods);
+        let mut row = jobs.row();
+        row.slips = by_job.iter().map(|job| job.len() as u64).sum();
+        row.periods = n;
+        tau.describe(&mut row, jobs.cut, tongue);
+        describe_forces(&mut row, &by_job, tongue);
+        let locking = describe_locking(&mut row, &by_job, tongue);
+        let cycles = Cycles::of(&jobs.parameters, row.tau_mean);
+        let in_cycles = match cycles {
             None => by_job.clone(),
             Some(cycles) => cycles.within(&by_job, |slip| slip.onset),
         };
-        let of_phases = sequences(&in_cycles, |slip| non_nan(slip.phase).map(unit)).centred();
-        let (locking, phases) = (of_intervals.1, of_phases.1);
-
-        let phase_interval = phases.direction_interval(top);
-        let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| tau.quantile(share));
-        let square = |of: &Estimate<1>| {
-            let [mean] = of.mean().unwrap_or_default();
-            move |value: f64| [(value - mean) * (value - mean)]
-        };
-        let (tau_square, drop_square) = (square(&intervals), square(&drops));
-        let (tau_deviation, tau_deviation_interval) = tau
-            .estimate(tau_square)
-            .deviation(unseen(&|tongue| tongue.of_squares(step(&intervals))));
-        let (drop_deviation, drop_deviation_interval) =
-            estimate(&by_job, |slip| Some(drop_square(slip.drop)))
-                .deviation(unseen(&|tongue| tongue.of_squares(step(&drops))));
-        let waited = jobs.running.iter().map(|(_, interval)| interval);
-        let at_least = tau.sorted.iter().chain(waited).sum::<f64>();
-        let tau_bound = (running > 0).then(|| at_least / (tau.sorted.len() + running) as f64);
-        let cut_share = jobs.cut as f64 / tau.sorted.len() as f64;
-        let relative = tau_deviation.zip(tau_mean).map(|(sd, mean)| sd / mean);
-        let tau_off = relative
-            .filter(|_| jobs.cut > 0)
-            .map(|relative| -relative * relative * cut_share);
-        let friction = jobs.over_time(|job| job.friction);
-        let coefficient = jobs.over_time(|job| job.friction / jobs.parameters.normal_force);
-        let peak_forces = estimate(&by_job, |slip| Some([slip.peak_force]));
-        let slip_share = jobs.over_time(|job| job.slip_share);
-        let can_lock = periods != Some(0);
-        let row = SetRow {
-            set_id: jobs.set_id,
-            frequency: jobs.parameters.frequency(),
-            parameters: Selected::new(jobs.parameters),
-            eta,
-            finished_jobs: jobs.finished,
-            failed_jobs: jobs.failed,
-            jobs_without_slips: jobs.without_slips,
-            jobs_cut: Some(jobs.cut),
-            regime: jobs.regime,
-            slip_share: slip_share.mean().map(mean),
-            slip_share_interval: slip_share.interval().map(|ends| Interval {
-                low: ends.low.max(0.0),
-                high: ends.high.min(1.0),
-            }),
-            slips,
-            intervals: tau.sorted.len() as u64,
-            tau_mean,
-            tau_interval: intervals
-                .interval_with(unseen(&|tongue| tongue.of_mean(step(&intervals)))),
-            tau_bound,
-            tau_off,
-            tau_deviation,
-            tau_deviation_interval,
-            tau_05,
-            tau_25,
-            tau_50,
-            median_interval: tau.median_interval(),
-            tau_75,
-            tau_95,
-            periods,
-            locking_index: locking.resultant_length().filter(|_| can_lock),
-            locking_interval: locking
-                .length_interval(&of_intervals.0, tongue.map_or(0.0, |_| OF_INTERVALS))
-                .filter(|_| can_lock),
-            phase_mean: phases.direction(top),
-            phase_interval,
-            has_phase: phase_interval.is_some_and(|Interval { low, high }| high - low < WHOLE_TURN),
-            resultant_length: phases.resultant_length(),
-            length_interval: phases
-                .length_interval(&of_phases.0, tongue.map_or(0.0, |_| OF_PHASES)),
-            drop_mean: drops.mean().map(mean),
-            drop_interval: drops.interval_with(unseen_forces),
-            drop_deviation,
-            drop_deviation_interval,
-            peak_force_mean: peak_forces.mean().map(mean),
-            peak_force_interval: peak_forces.interval_with(unseen_forces),
-            mean_friction: friction.mean().map(mean),
-            mean_friction_interval: friction.interval(),
-            friction_coefficient: coefficient.mean().map(mean),
-            friction_coefficient_interval: coefficient.interval(),
-            // What the drive alone explains: see `drive_alone.rs`.
-            ..SetRow::default()
-        };
-        let intervals = tau.sorted;
-        let seeds = self.jobs.into_keys().collect();
+        let phases = describe_phases(&mut row, &in_cycles, tongue);
         FinishedSet {
             row,
-            intervals,
-            seeds,
-            phases: of_phases,
-            locking: of_intervals,
+            intervals: tau.sorted,
+            seeds: self.jobs.keys().copied().collect(),
+            phases,
+            locking,
             tongue,
             cycles,
         }
     }
 }
 
-/// Whole cycles of a modulation that is as slow as slips follow each other, or slower: a run holds few of them, and where it
-/// begins and ends would be a phase.
+/// Stress drops and peak forces.
+fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) {
+    let drops = estimate(jobs, |slip| Some([slip.drop]));
+    // A longer interval ends at a force that is higher by the additional drop.
+    let unseen = tongue
+        .map(|tongue| tongue.of_mean(&drops))
+        .unwrap_or_default();
+    row.drop_mean = drops.value();
+    row.drop_interval = drops.interval_with(unseen);
+    let peak_forces = estimate(jobs, |slip| Some([slip.peak_force]));
+    row.peak_force_mean = peak_forces.value();
+    row.peak_force_interval = peak_forces.interval_with(unseen);
+    let square = drops.square_of_deviation();
+    let squares = estimate(jobs, |slip| Some([square(slip.drop)]));
+    let unseen = tongue
+        .map(|tongue| tongue.of_squares(&drops))
+        .unwrap_or_default();
+    (row.drop_deviation, row.drop_deviation_interval) = squares.deviation(unseen);
+}
+
+/// Intervals in periods, as angles.
+fn describe_locking(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) -> Centred<2> {
+    // Whole turns are removed first: they would cost the sine its digits.
+    let angle = |slip: &SlipStats| Some(unit(TAU * non_nan(slip.periods)?.fract()));
+    let locking = sequences(jobs, angle).centred();
+    if row.periods != Some(0) {
+        row.locking_index = locking.mean.resultant_length();
+        row.locking_interval = locking.length_interval(tongue.map_or(0.0, |_| OF_INTERVALS));
+    }
+    locking
+}
+
+fn describe_phases(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) -> Centred<2> {
+    let phases = sequences(jobs, |slip| non_nan(slip.phase).map(unit)).centred();
+    let top = top_of_phases(row.eta);
+    row.phase_mean = phases.mean.direction(top);
+    row.phase_interval = phases.mean.direction_interval(top);
+    row.has_phase = row
+        .phase_interval
+        .is_some_and(|ends| ends.high - ends.low < WHOLE_TURN);
+    row.resultant_length = phases.mean.resultant_length();
+    row.length_interval = phases.length_interval(tongue.map_or(0.0, |_| OF_PHASES));
+    phases
+}
+
+/// Whole cycles of a modulation whose period is at least the mean interval: a run holds few of them, and its beginning and end
+/// would show as a phase.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cycles {
     period: f64,
@@ -315,14 +166,14 @@ impl Cycles {
     /// Cycles that a job must have on average.
     const MIN: f64 = 2.0;
 
-    /// Those of a set with this mean interval; `None` if all slips count.
+    /// The cycles of a set with this mean interval; `None` if all slips count.
     fn of(parameters: &Parameters, tau_mean: Option<f64>) -> Option<Self> {
         let period = parameters.modulation_period?;
         let is_slow = parameters.ramp_time == 0.0 && period >= tau_mean?;
         is_slow.then_some(Self { period })
     }
 
-    /// Of each job, the slips within whole cycles from its first one on; none if these are too few.
+    /// The slips of each job within whole cycles from its first one on; none if these are too few.
     pub(super) fn within<'a, T>(self, jobs: &[&'a [T]], onset: impl Fn(&T) -> f64) -> Vec<&'a [T]> {
         let mut total = 0.0;
         let mut of_job = |slips: &&'a [T]| -> &'a [T] {
@@ -365,12 +216,16 @@ struct Intervals<'a> {
     jobs: &'a [&'a [SlipStats]],
     length: fn(&SlipStats) -> f64,
     sorted: Vec<f64>,
-    /// Those that still ran when their jobs gave up: all that is known of them is that they are long.
-    running: usize,
+    /// Seeds of jobs that gave up after a slip, and the time since it in s: these intervals are longer than all others.
+    running: &'a [(u64, f64)],
 }
 
 impl<'a> Intervals<'a> {
-    fn new(jobs: &'a [&'a [SlipStats]], length: fn(&SlipStats) -> f64, running: usize) -> Self {
+    fn new(
+        jobs: &'a [&'a [SlipStats]],
+        length: fn(&SlipStats) -> f64,
+        running: &'a [(u64, f64)],
+    ) -> Self {
         let all = jobs.iter().copied().flatten().map(length);
         let mut sorted: Vec<f64> = all.filter_map(non_nan).collect();
         sorted.sort_by(f64::total_cmp);
@@ -382,37 +237,66 @@ impl<'a> Intervals<'a> {
         }
     }
 
-    /// The mean of a value over them; not known if a job gave up.
-    fn estimate<const D: usize>(&self, value: impl Fn(f64) -> [f64; D]) -> Estimate<D> {
-        if self.running > 0 {
+    /// The mean of a value over them; unknown if a job gave up.
+    fn estimate(&self, value: impl Fn(f64) -> [f64; 1]) -> Estimate<1> {
+        if !self.running.is_empty() {
             return Estimate::default();
         }
         estimate(self.jobs, |slip| non_nan((self.length)(slip)).map(&value))
     }
 
-    /// Of all, those that still ran being the longest; none if it is one of them.
+    /// A quantile of all intervals; `None` if it is one that still ran.
     fn quantile(&self, share: f64) -> Option<f64> {
-        let last = (self.sorted.len() + self.running).checked_sub(1)?;
+        let last = (self.sorted.len() + self.running.len()).checked_sub(1)?;
         at_rank(&self.sorted, share.clamp(0.0, 1.0) * last as f64)
     }
 
     fn median_interval(&self) -> Option<Interval> {
         let median = self.quantile(0.5)?;
-        let shares = self
-            .estimate(|length| [f64::from(u8::from(length <= median))])
-            .shares_about_median()?;
-        let [low, high] = shares.map(|share| self.quantile(share));
+        let is_below = self.estimate(|length| [f64::from(u8::from(length <= median))]);
+        let [low, high] = is_below.shares_about_median()?;
         Some(Interval {
-            low: low?,
-            high: high?,
+            low: self.quantile(low)?,
+            high: self.quantile(high)?,
         })
+    }
+
+    /// Writes their statistics into a row, if `max_time` cut those of some jobs.
+    fn describe(&self, row: &mut SetRow, cut: u64, tongue: Option<Tongue>) {
+        row.intervals = self.sorted.len() as u64;
+        let mean = self.estimate(|interval| [interval]);
+        let unseen = tongue
+            .map(|tongue| tongue.of_mean(&mean))
+            .unwrap_or_default();
+        row.tau_mean = mean.value();
+        row.tau_interval = mean.interval_with(unseen);
+        let square = mean.square_of_deviation();
+        let squares = self.estimate(|interval| [square(interval)]);
+        let unseen = tongue
+            .map(|tongue| tongue.of_squares(&mean))
+            .unwrap_or_default();
+        (row.tau_deviation, row.tau_deviation_interval) = squares.deviation(unseen);
+        if !self.running.is_empty() {
+            let waited = self.running.iter().map(|(_, interval)| interval);
+            let total = self.sorted.iter().chain(waited).sum::<f64>();
+            row.tau_bound = Some(total / (self.sorted.len() + self.running.len()) as f64);
+        }
+        if cut > 0 {
+            let relative = row.tau_deviation.zip(row.tau_mean);
+            let relative = relative.map(|(deviation, mean)| deviation / mean);
+            let cut_share = cut as f64 / self.sorted.len() as f64;
+            row.tau_off = relative.map(|relative| -relative * relative * cut_share);
+        }
+        row.tau_05 = self.quantile(0.05);
+        row.tau_25 = self.quantile(0.25);
+        row.tau_50 = self.quantile(0.5);
+        row.median_interval = self.median_interval();
+        row.tau_75 = self.quantile(0.75);
+        row.tau_95 = self.quantile(0.95);
     }
 }
 
-/// Unit vectors of a set: their deviations from the mean, job by job, and the mean.
-pub(super) type OfSet = (Sequences<2>, Estimate<2>);
-
-/// A set whose slips are all there.
+/// A set with its statistics.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FinishedSet {
     pub(super) row: SetRow,
@@ -420,9 +304,9 @@ pub(super) struct FinishedSet {
     pub(super) intervals: Vec<f64>,
     /// Seeds of the jobs of these phases and intervals.
     pub(super) seeds: Vec<u64>,
-    pub(super) phases: OfSet,
+    pub(super) phases: Centred<2>,
     /// Intervals in periods, as angles.
-    pub(super) locking: OfSet,
+    pub(super) locking: Centred<2>,
     pub(super) tongue: Option<Tongue>,
     /// The cycles within which phases count, if not all do.
     pub(super) cycles: Option<Cycles>,
@@ -431,9 +315,11 @@ pub(super) struct FinishedSet {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::confidence::tests::Draws;
+    use super::super::jobs_of_set::JobFacts;
     use super::*;
     use crate::observe::Modulation;
-    use crate::sweep::STATISTICS;
+    use crate::results::tables::JobOutcome;
+    use crate::sets::STATISTICS;
     use proptest::prelude::*;
 
     pub(in crate::reduce) fn jobs(amplitude: f64, period: f64) -> SetJobs {
@@ -519,7 +405,8 @@ pub(super) mod tests {
         let phases = (0..400).map(|step| {
             // One after the other by most of a turn, so that no slip predicts the next.
             let load = TAU * (f64::from(step * 163 % 400) / 400.0 - 0.5);
-            let (mut low, mut high) = (-2.0 * TAU, 2.0 * TAU);
+            let mut low = -2.0 * TAU;
+            let mut high = 2.0 * TAU;
             for _ in 0..80 {
                 let middle = 0.5 * (low + high);
                 if middle + eta * libm::cos(middle) < load {
@@ -557,7 +444,8 @@ pub(super) mod tests {
                 })
                 .collect()
         };
-        let (even, faint) = (at(&turn(3000, 3)), at(&turn(3000, 5)));
+        let even = at(&turn(3000, 3));
+        let faint = at(&turn(3000, 5));
         assert!(
             !even.has_phase && even.phase_interval.is_some(),
             "{:?}",
@@ -778,7 +666,8 @@ pub(super) mod tests {
             })
         };
         let row = reduced(jobs(1e-6, 0.01), (0..20).flat_map(of_job));
-        let (mean, interval) = (row.phase_mean.unwrap(), row.phase_interval.unwrap());
+        let mean = row.phase_mean.unwrap();
+        let interval = row.phase_interval.unwrap();
         assert!(interval.low < mean && mean < interval.high);
         assert!(row.tau_interval.unwrap().low < row.tau_mean.unwrap());
         assert!(row.locking_interval.unwrap().high > row.locking_index.unwrap());

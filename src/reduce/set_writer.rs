@@ -1,9 +1,8 @@
-//! What a sweep that decides for itself adds to the table of sets: in which rounds a set ran, and whether it is as precise
-//! as is wanted.
+//! What an adaptive sweep adds to the table of sets: in which rounds a set ran, and whether it is as precise as is wanted.
 
 use super::set::SetRow;
 use crate::results::{Results, ResultsError};
-use crate::sweep::Sweep;
+use crate::sweep::{Precision, Sweep, Target};
 use crate::table::columns::{Row, columns, tables};
 use crate::table::file::{Footer, TableWriter};
 use crate::table::storage::StoredFile;
@@ -45,18 +44,17 @@ impl<'a> SetWriter<'a> {
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
         let sweep = results.sweep();
-        let left_out = if sweep.rounds().is_some() {
-            Vec::new()
-        } else {
-            RoundOfSet::columns()
-        };
-        let left_out: Vec<_> = left_out.into_iter().map(|column| column.name).collect();
+        let mut left_out: Vec<_> = RoundOfSet::columns()
+            .into_iter()
+            .map(|column| column.name)
+            .collect();
+        if sweep.rounds().is_some() {
+            left_out.clear();
+        }
         let mut of_sets: HashMap<u64, RoundOfSet> = HashMap::new();
         for (round, extension) in (1..).zip(results.rounds()) {
-            let points = extension
-                .round
-                .iter()
-                .flat_map(|round| round.points.iter().cloned().flatten());
+            let rounds = extension.round.iter();
+            let points = rounds.flat_map(|round| round.points.iter().cloned().flatten());
             for set in points.map(|point| sweep.set_of(point)) {
                 let of_set = of_sets.entry(set).or_default();
                 of_set.first_round.get_or_insert(round);
@@ -74,15 +72,11 @@ impl<'a> SetWriter<'a> {
     pub(super) fn push(&mut self, row: &SetRow) -> Result<(), ResultsError> {
         let mut of_set = RoundOfSet::default();
         if let Some(rounds) = self.sweep.rounds() {
-            let number = self.sweep.set_with(&row.parameters.parameters);
-            of_set = number
-                .and_then(|set| self.of_sets.get(&set))
-                .cloned()
-                .unwrap_or_default();
-            let error = rounds
-                .precision
-                .as_ref()
-                .and_then(|precision| row.error_over_target(precision));
+            let number = self.sweep.set_with(&row.parameters);
+            let known = number.and_then(|set| self.of_sets.get(&set));
+            of_set = known.cloned().unwrap_or_default();
+            let precision = rounds.precision.as_ref();
+            let error = precision.and_then(|precision| error_over_target(row, precision));
             of_set.target_met = error.map(|error| error <= 1.0);
         }
         self.writer.push(&(row.clone(), of_set))
@@ -91,4 +85,24 @@ impl<'a> SetWriter<'a> {
     pub(super) fn finish(self) -> Result<(), ResultsError> {
         self.writer.finish()
     }
+}
+
+/// The half-width of the interval of the least precise statistic over its target: 1 or less if all are as precise as is
+/// wanted. `None` if none of them has a value.
+pub fn error_over_target(row: &SetRow, precision: &Precision) -> Option<f64> {
+    let errors = precision.statistics.iter().filter_map(|statistic| {
+        let value = row.number(statistic.key)?;
+        let ends = ["low", "high"].map(|end| row.number(&format!("{}_{end}", statistic.key)));
+        let half = match ends {
+            [Some(low), Some(high)] => 0.5 * (high - low),
+            _ => f64::INFINITY,
+        };
+        let target = match precision.target {
+            Target::Relative(share) => share * value.abs(),
+            Target::Absolute(target) => target,
+        };
+        // Nothing is known better than exactly.
+        Some(if half == 0.0 { 0.0 } else { half / target })
+    });
+    errors.reduce(f64::max)
 }

@@ -1,11 +1,11 @@
-//! What was swept, told from the sets: the columns in which they differ. The first makes the axis of a figure, the second
+//! What was swept, inferred from the sets: the columns in which they differ. The first makes the axis of a figure, the second
 //! its colours, the third its panels.
 
-use super::SetRow;
-use super::values::{FREQUENCY, Values};
+use super::values::Values;
 use crate::model::Symbol;
+use crate::sets::{FREQUENCY, SetRow};
 
-/// Numbers that differ by less than this share are one: they were computed from others, which have twelve digits.
+/// Numbers that differ by less than this share count as equal: they were computed from numbers with twelve digits.
 const SAME: f64 = 1e-10;
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
 const EVEN: f64 = 0.02;
@@ -14,7 +14,7 @@ const WIDE: f64 = 9.0;
 /// Ratio of the ends up to which no axis is logarithmic: values would fall on one place.
 const NARROW: f64 = 1.1;
 
-/// A parameter in which sets differ. The period is there as whichever was swept: 1/T, η or T.
+/// A parameter in which sets differ. The period appears as the quantity that was swept: 1/T, η or T.
 #[derive(Clone, Debug)]
 pub struct Swept {
     pub values: Values,
@@ -46,7 +46,8 @@ impl Swept {
 
     /// Whether each of its values goes with one of another: both have few values, or both ascend.
     fn fixes(&self, other: &Self) -> bool {
-        let (places, others) = (self.places(), other.places());
+        let places = self.places();
+        let others = other.places();
         let mut pairs: Vec<_> = places.iter().zip(others).collect();
         pairs.sort();
         pairs.dedup();
@@ -57,15 +58,11 @@ impl Swept {
     /// The place of the value of each set among all.
     pub fn places(&self) -> Vec<Option<usize>> {
         let place = |number: f64| {
-            self.distinct
-                .iter()
-                .position(|&value| is_same(value, number))
+            let mut distinct = self.distinct.iter();
+            distinct.position(|&value| is_same(value, number))
         };
-        self.values
-            .numbers
-            .iter()
-            .map(|number| place((*number)?))
-            .collect()
+        let numbers = self.values.numbers.iter();
+        numbers.map(|number| place((*number)?)).collect()
     }
 }
 
@@ -79,8 +76,8 @@ pub fn differing<'a>(rows: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<S
     Symbol::ALL.into_iter().filter(differs).collect()
 }
 
-/// What was swept, that of most values first. What another fixes is left out, such as the amplitude that is 0 where there is
-/// no period, or the second of two parameters that an axis moves together.
+/// What was swept, the column with most values first. Left out is a column that another one determines, such as the amplitude
+/// that is 0 where there is no period, or the second of two parameters that an axis moves together.
 pub fn swept(rows: &[SetRow]) -> Vec<Swept> {
     let column = |symbol: Symbol| {
         let names: &[&str] = if symbol == Symbol::T {
@@ -91,11 +88,9 @@ pub fn swept(rows: &[SetRow]) -> Vec<Swept> {
         let columns = names.iter().filter_map(|name| Swept::of(rows, name).ok());
         columns.min_by_key(|swept| (swept.distinct.len(), !has_even_steps(&swept.distinct)))
     };
-    let mut all: Vec<Swept> = differing(&rows.iter())
-        .into_iter()
-        .filter_map(column)
-        .collect();
-    // To be without a period is a value, too.
+    let symbols = differing(&rows.iter()).into_iter();
+    let mut all: Vec<Swept> = symbols.filter_map(column).collect();
+    // A missing period counts as a value.
     let count =
         |swept: &Swept| swept.distinct.len() + usize::from(swept.values.numbers.contains(&None));
     all.sort_by_key(|swept| std::cmp::Reverse(count(swept)));

@@ -1,23 +1,22 @@
 //! Columns of the sets by name, or formulas of them, as numbers: for figures, and for tables that people read.
 
-use super::SetRow;
 use super::swept::ascending;
 use crate::model::Symbol;
-use crate::sweep::{Digits, Expression, Label, label, nearest};
+use crate::sets::{Digits, FREQUENCY, Label, SetRow, label};
+use crate::sweep::{Expression, nearest};
 use crate::table::columns::{Column, Kind, Row, Value};
 use crate::table::value::floored;
-
-pub const FREQUENCY: &str = "frequency";
+use std::collections::BTreeSet;
 
 /// A column of the sets, or a formula of such.
 #[derive(Clone, Debug)]
 pub struct Values {
     pub column: Column,
-    /// A number for each set, in SI; of a word its place among the words.
+    /// A number for each set, in SI units; for a word, its place among the words.
     pub numbers: Vec<Option<f64>>,
     /// Ends of the confidence intervals, where there are any.
     pub intervals: Vec<Option<(f64, f64)>>,
-    /// The words that occur, sorted; none of a column of numbers.
+    /// The words that occur, sorted; empty for a column of numbers.
     pub words: Vec<String>,
 }
 
@@ -35,26 +34,19 @@ impl Values {
             return Self::of_formula(rows, name, &columns);
         };
         let ends = index(&format!("{name}_low")).zip(index(&format!("{name}_high")));
-        let (mut numbers, mut intervals, mut given) = (Vec::new(), Vec::new(), Vec::new());
+        let mut numbers = Vec::new();
+        let mut intervals = Vec::new();
+        let mut given = Vec::new();
         for row in rows {
-            let (mut cells, mut word) = (Vec::new(), None);
-            row.cells(&mut |cell| {
-                if cells.len() == column {
-                    word = match cell {
-                        Value::Flag(flag) => Some(if flag { "yes" } else { "no" }.to_owned()),
-                        Value::Text(text) => Some(text.to_owned()),
-                        _ => None,
-                    };
-                }
-                cells.push(cell.number());
-            });
-            intervals.push(ends.and_then(|(low, high)| cells[low].zip(cells[high])));
-            numbers.push(cells[column].filter(|number| number.is_finite()));
+            let mut cells = Vec::new();
+            row.cells(&mut |cell| cells.push((cell.number(), word(cell))));
+            let (number, word) = cells[column].clone();
+            numbers.push(number.filter(|number| number.is_finite()));
+            intervals.push(ends.and_then(|(low, high)| cells[low].0.zip(cells[high].0)));
             given.push(word);
         }
-        let mut words: Vec<String> = given.iter().flatten().cloned().collect();
-        words.sort();
-        words.dedup();
+        let words: BTreeSet<String> = given.iter().flatten().cloned().collect();
+        let words: Vec<String> = words.into_iter().collect();
         for (number, word) in numbers.iter_mut().zip(given) {
             *number = number.or_else(|| words.binary_search(&word?).ok().map(|index| index as f64));
         }
@@ -66,32 +58,44 @@ impl Values {
         })
     }
 
+    /// Adds the value of a set, and the ends of its interval.
+    pub(super) fn push(&mut self, number: Option<f64>, interval: Option<(f64, f64)>) {
+        self.numbers.push(number);
+        self.intervals.push(interval);
+    }
+
     fn of_formula(rows: &[SetRow], text: &str, columns: &[Column]) -> Result<Self, String> {
-        let is_name = text
-            .chars()
-            .all(|letter| letter.is_alphanumeric() || letter == '_');
-        if is_name {
+        let mut letters = text.chars();
+        if letters.all(|letter| letter.is_alphanumeric() || letter == '_') {
             return Err(unknown(text, columns));
         }
-        let formula = Expression::formula(text, &|name| number_column(name, columns))
-            .map_err(|error| error.to_string())?;
-        let numbers = rows
-            .iter()
-            .map(|row| evaluate(&formula, row))
-            .map(|number| Some(number).filter(|n| n.is_finite()));
-        let column = Column {
-            name: text.to_owned().into(),
-            unit: "",
-            meaning: "",
-            kind: Kind::Real,
-            nullable: true,
-        };
+        let formula = Expression::formula(text, &|name| number_column(name, columns));
+        let formula = formula.map_err(|error| error.to_string())?;
+        let numbers = rows.iter().map(|row| evaluate(&formula, row));
+        let numbers = numbers.map(|number| number.is_finite().then_some(number));
         Ok(Self {
-            column,
             numbers: numbers.collect(),
             intervals: vec![None; rows.len()],
-            words: Vec::new(),
+            ..Self::computed(text, Kind::Real)
         })
+    }
+
+    /// A column of computed values, without any yet.
+    pub(super) fn computed(name: &str, kind: Kind) -> Self {
+        Self {
+            column: Column {
+                name: name.to_owned().into(),
+                unit: "",
+                meaning: "",
+                symbol: "",
+                words: "",
+                kind,
+                nullable: true,
+            },
+            numbers: Vec::new(),
+            intervals: Vec::new(),
+            words: Vec::new(),
+        }
     }
 
     /// Whether it holds words, or yes and no.
@@ -110,15 +114,12 @@ impl Values {
 
     /// The factor to the unit in which they are read best, and that unit.
     pub fn scale(&self) -> (f64, &'static str) {
-        self.label().scale(
-            self.numbers
-                .iter()
-                .flatten()
-                .fold(0.0, |largest, value| value.abs().max(largest)),
-        )
+        let sizes = self.numbers.iter().flatten().map(|value| value.abs());
+        self.label().scale(sizes.fold(0.0, f64::max))
     }
 
-    /// Those that distinguish its values if it is a parameter, or computed from such: of others, intervals say how many count.
+    /// The digits that distinguish its values if it is a parameter, or computed from parameters; three for a statistic, whose
+    /// interval says how many are certain.
     pub fn digits(&self) -> Digits {
         let name = &*self.column.name;
         let numbers = self.numbers.iter().flatten().copied();
@@ -141,18 +142,25 @@ impl Values {
     }
 }
 
+/// The word of a cell that holds one.
+fn word(cell: Value<'_>) -> Option<String> {
+    match cell {
+        Value::Flag(flag) => Some(if flag { "yes" } else { "no" }.to_owned()),
+        Value::Text(text) => Some(text.to_owned()),
+        _ => None,
+    }
+}
+
 /// The sets for which a condition on their columns holds, such as `V0 < 1e-4 and resultant_length > 0.5`.
 pub fn sets_where(rows: Vec<SetRow>, condition: &str) -> Result<Vec<SetRow>, String> {
     let columns = set_columns();
-    let condition = Expression::condition(condition, &|name| number_column(name, &columns))
-        .map_err(|error| error.to_string())?;
-    Ok(rows
-        .into_iter()
-        .filter(|row| evaluate(&condition, row) == 1.0)
-        .collect())
+    let condition = Expression::condition(condition, &|name| number_column(name, &columns));
+    let condition = condition.map_err(|error| error.to_string())?;
+    let holds = |row: &SetRow| evaluate(&condition, row) == 1.0;
+    Ok(rows.into_iter().filter(holds).collect())
 }
 
-/// A value over the columns of a row; what has none is no number.
+/// The value of an expression for a row; NaN stands for a missing value.
 fn evaluate(expression: &Expression<usize>, row: &SetRow) -> f64 {
     let mut cells = Vec::new();
     row.cells(&mut |cell| cells.push(cell.number().unwrap_or(f64::NAN)));
@@ -161,10 +169,8 @@ fn evaluate(expression: &Expression<usize>, row: &SetRow) -> f64 {
 
 /// The place of a column of numbers.
 fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
-    let place = columns
-        .iter()
-        .position(|column| column.name == name)
-        .ok_or_else(|| unknown(name, columns))?;
+    let place = columns.iter().position(|column| column.name == name);
+    let place = place.ok_or_else(|| unknown(name, columns))?;
     match columns[place].kind {
         Kind::Text | Kind::Flag => Err(format!(
             "{name} holds words; a number is needed here, such as slip_share, which is 0.95 or more where sets slide"
@@ -184,12 +190,8 @@ fn unknown(name: &str, columns: &[Column]) -> String {
     } else {
         Some(longer.join(", "))
     };
-    match meant {
-        Some(meant) => {
-            format!("no such column; did you mean {meant}? `stickslip plot --list` shows all")
-        }
-        None => "no such column; `stickslip plot --list` shows all".to_owned(),
-    }
+    let hint = meant.map_or_else(String::new, |meant| format!(" did you mean {meant}?"));
+    format!("no such column;{hint} `stickslip plot --list` shows all")
 }
 
 #[cfg(test)]

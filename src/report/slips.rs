@@ -4,7 +4,7 @@ use super::tables::Columns;
 use crate::observe::Slip;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
-use crate::sweep::{Label, capitalised};
+use crate::sets::{Label, capitalised, first_clause};
 use crate::table::columns::Column;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -88,7 +88,7 @@ impl Slips {
                  meaning,
                  ..
              }| {
-                let what = capitalised(meaning.split([',', ';']).next().unwrap_or_default());
+                let what = capitalised(first_clause(meaning));
                 Label {
                     symbol: symbol(name).unwrap_or_default().to_owned(),
                     what,

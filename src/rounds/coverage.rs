@@ -3,9 +3,10 @@
 
 use super::precision::{need, seeds_for};
 use crate::model::Parameters;
-use crate::reduce::{Pool, PooledJob, SetRow, mean_of, quantile};
+use crate::reduce::{Pool, PooledJob, SetRow, error_over_target, mean_of, quantile};
 use crate::results::layout::Layout;
-use crate::sweep::{MIN_SEEDS, Precision, STATISTICS, Statistic, Target};
+use crate::sets::{STATISTICS, Statistic};
+use crate::sweep::{MIN_SEEDS, Precision, Target};
 use crate::table::storage::Disk;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -36,12 +37,14 @@ fn ended(
     truth: f64,
     row: impl Fn(u64, u64) -> SetRow,
 ) -> Found {
-    let (mut held, mut seeds_used, mut met) = (0.0, 0.0, 0.0);
+    let mut held = 0.0;
+    let mut seeds_used = 0.0;
+    let mut met = 0.0;
     for repetition in 0..repetitions {
         let mut seeds = FROM.min(least);
         let (last, error) = loop {
             let row = row(repetition, seeds);
-            let error = row.error_over_target(precision).unwrap();
+            let error = error_over_target(&row, precision).unwrap();
             match seeds_for(seeds, error, least, MOST) {
                 Some(more) if more > seeds => seeds = more,
                 _ => break (row, error),
@@ -209,7 +212,9 @@ impl Repetition {
     fn of(row: &SetRow, truth: &SetRow, statistic: Statistic) -> Option<Self> {
         let [value, low, high] =
             ["", "_low", "_high"].map(|end| row.number(&format!("{}{end}", statistic.key)));
-        let (value, low, high) = (value?, low?, high?);
+        let value = value?;
+        let low = low?;
+        let high = high?;
         let off = value - truth.number(statistic.key)?;
         let turns = if statistic.is_angle() {
             TAU * (off / TAU).round()
@@ -324,7 +329,8 @@ fn by_rule(
 fn of_backbone(pool: &Pool) -> [f64; 2] {
     let seeds = pool.sets[0].1.len();
     let truth = pool.bin(0..seeds);
-    let (mut held, repetitions) = ([0; 2], seeds / 2);
+    let mut held = [0; 2];
+    let repetitions = seeds / 2;
     for repetition in 0..repetitions {
         let bin = pool.bin(2 * repetition..2 * repetition + 2);
         let holds = |[low, high, truth]: [Option<f64>; 3]| low <= truth && truth <= high;

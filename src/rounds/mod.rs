@@ -1,7 +1,7 @@
-//! Rounds: what a sweep that decides for itself runs next.
+//! Rounds: what an adaptive sweep runs next.
 //!
 //! ```text
-//! chosen jobs that are committed -> sets, reduced -> more seeds (precision.rs), or sets and seeds at edges (edges.rs)
+//! chosen jobs that are committed -> sets, reduced -> more seeds (precision.rs), or sets and seeds at edges (refinement.rs)
 //! ```
 //!
 //! Contract: a round is a pure function of the sweep and of the committed rows of the jobs that its earlier rounds chose: the
@@ -9,8 +9,8 @@
 
 #[cfg(test)]
 mod coverage;
-mod edges;
 mod precision;
+mod refinement;
 #[cfg(test)]
 mod tests;
 
@@ -19,26 +19,20 @@ use crate::results::{Results, ResultsError};
 use crate::sweep::{Precision, Round, Standing, Sweep};
 use std::collections::BTreeMap;
 
-/// The round after those that a directory has. All their jobs must be done. One that chooses no point beyond theirs would
-/// come again for ever, so it is the end.
+/// The round after those that a directory has, all of whose jobs must be done. A round that chooses no new point would repeat
+/// for ever, so it is the end.
 pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
-    Ok(next_after(results)?.beyond(&results.chosen()))
-}
-
-fn next_after(results: &Results<'_>) -> Result<Round, ResultsError> {
     let sweep = results.sweep();
-    if let Some(refinement) = sweep.refinement() {
-        return Ok(edges::decide(
-            sweep,
-            refinement,
-            &sets_of_edges(results, refinement)?,
-        ));
+    let mut round = Round::default();
+    if let Some(rounds) = sweep.rounds() {
+        if let Some(refinement) = &rounds.refinement {
+            let sets = sets_of_edges(results, refinement)?;
+            round = refinement::decide(sweep, refinement, &sets);
+        } else if let Some(precision) = &rounds.precision {
+            round = decide(sweep, precision, &reduce_chosen(results)?);
+        }
     }
-    let precision = sweep.rounds().and_then(|rounds| rounds.precision.as_ref());
-    precision.map_or_else(
-        || Ok(Round::default()),
-        |known| Ok(decide(sweep, known, &reduce_chosen(results)?)),
-    )
+    Ok(round.beyond(&results.chosen()))
 }
 
 /// The round after these sets, by their numbers.

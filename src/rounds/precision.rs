@@ -9,17 +9,17 @@
 //! values are. No set ends with fewer than [`MIN_SEEDS`] seeds. What that does to coverage is measured in
 //! `docs/rounds.md`.
 
-use crate::reduce::SetRow;
+use crate::reduce::{SetRow, error_over_target};
 use crate::sweep::{MIN_SEEDS, Precision};
 use crate::table::value::floored;
 
-/// The seeds that a set with some and these statistics is to have next: no more than it has if it may have no more. `None` if
-/// every statistic is known to the target, or if there is nothing to know: no job has a value.
+/// The seeds that a set with `seeds` seeds and these statistics is to have next: the same number if it has the most. `None` if
+/// every statistic is known to the target, or if no job has a value.
 pub(super) fn need(precision: &Precision, seeds: u64, most: u64, row: &SetRow) -> Option<u64> {
-    seeds_for(seeds, row.error_over_target(precision)?, MIN_SEEDS, most)
+    seeds_for(seeds, error_over_target(row, precision)?, MIN_SEEDS, most)
 }
 
-/// The seeds that a set with some gets next, if its half-width is `error` times the target; `None` if it needs no more.
+/// The seeds that a set with `seeds` seeds gets next, if its half-width is `error` times the target; `None` if it needs no more.
 /// It ends with `least` at least, and with `most` at most.
 pub(super) fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option<u64> {
     let least = least.min(most);
@@ -29,7 +29,8 @@ pub(super) fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option
     let now = seeds as f64;
     // NaN is no prediction, and gets the most.
     let predicted = (now * error * error).ceil().max(least as f64);
-    let (few, many) = ((1.25 * now).ceil(), 2.0 * now);
+    let few = (1.25 * now).ceil();
+    let many = 2.0 * now;
     let next = if predicted <= few {
         few
     } else if predicted <= many {
@@ -45,7 +46,8 @@ pub(super) fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option
 mod tests {
     use super::*;
     use crate::reduce::Interval;
-    use crate::sweep::{Statistic, Target};
+    use crate::sets::Statistic;
+    use crate::sweep::Target;
     use proptest::prelude::*;
 
     fn statistic(key: &str) -> Statistic {

@@ -1,4 +1,4 @@
-//! What an edge gets next: a set between its neighbours, until these are close; then seeds of the sets near it, all as many,
+//! What an edge gets next: a set between its neighbours, until these are close; then seeds of the sets near it, equally many,
 //! until its interval is as narrow as is wanted, by the rule of [`precision`](super::precision). All edges share the jobs.
 
 use super::precision::seeds_for;
@@ -12,18 +12,17 @@ pub(super) fn decide(
     refinement: &Refinement,
     sets: &BTreeMap<u64, SetOfEdges>,
 ) -> Round {
-    let from = sweep
-        .rounds()
-        .map_or(MIN_SEEDS, |rounds| *rounds.seeds.start());
+    let rounds = sweep.rounds();
+    let from = rounds.map_or(MIN_SEEDS, |rounds| *rounds.seeds.start());
     let had = |set: u64| sets.get(&set).map_or(0, |set| set.seeds);
-    let mut room = refinement
-        .max_jobs
-        .saturating_sub(sets.values().map(|set| set.seeds).sum());
-    let (mut wanted, mut standing) = (BTreeMap::new(), Standing::default());
-    for Line {
-        mut rows, edges, ..
-    } in lines(sweep, refinement, sets)
-    {
+    let jobs = sets.values().map(|set| set.seeds).sum();
+    let mut room = refinement.max_jobs.saturating_sub(jobs);
+    let mut wanted = BTreeMap::new();
+    let mut standing = Standing::default();
+    for line in lines(sweep, refinement, sets) {
+        let Line {
+            mut rows, edges, ..
+        } = line;
         for edge in edges.iter().filter(|edge| !edge.is_done()) {
             let [fewest, most] = edge.seeds();
             let seeds = match edge.wanted_row {
@@ -31,19 +30,20 @@ pub(super) fn decide(
                 None if fewest < most => most,
                 None => seeds_for(most, edge.error, MIN_SEEDS, sweep.seed_count()).unwrap_or(most),
             };
-            let at = edge.wanted_row.map_or_else(
-                || edge.sets.iter().map(|set| set.row).collect(),
-                |row| vec![row],
-            );
+            let at = match edge.wanted_row {
+                Some(row) => vec![row],
+                None => edge.sets.iter().map(|set| set.row).collect(),
+            };
             let set = |row: u64| {
                 rows[refinement.axis] = row;
                 sweep.set_at(&rows).filter(|&set| had(set) < seeds)
             };
             let new: Vec<u64> = at.into_iter().filter_map(set).collect();
-            let jobs: u64 = new
-                .iter()
-                .map(|&set| seeds.saturating_sub(*wanted.get(&set).unwrap_or(&had(set))))
-                .sum();
+            let more = |set: &u64| {
+                let known = wanted.get(set).copied();
+                seeds.saturating_sub(known.unwrap_or_else(|| had(*set)))
+            };
+            let jobs: u64 = new.iter().map(more).sum();
             if new.is_empty() || jobs > room {
                 standing.edges_capped += 1;
                 continue;
@@ -57,12 +57,10 @@ pub(super) fn decide(
     }
     standing.sets_open = wanted.len() as u64;
     standing.sets_done = sets.keys().filter(|set| !wanted.contains_key(set)).count() as u64;
-    let points = wanted
-        .iter()
-        .flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds))
-        .collect();
+    let points = wanted.iter();
+    let points = points.flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds));
     Round {
-        points: sweep.with_controls(points),
+        points: sweep.with_controls(points.collect()),
         standing,
     }
 }

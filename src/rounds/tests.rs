@@ -1,6 +1,6 @@
 //! Rounds of sweeps that look for edges, from the first to the end, with responses whose edges are known.
 
-use super::edges::decide;
+use super::refinement::decide;
 use crate::reduce::{Edge, GROUPS, Line, Sample, SetOfEdges, lines};
 use crate::sweep::{Round, Sweep};
 use rand_chacha::ChaCha8Rng;
@@ -34,7 +34,8 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
             let mut uniform = || ((generator.next_u64() >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
             (-2.0 * libm::log(uniform())).sqrt() * libm::cos(TAU * uniform())
         };
-        let (mut counts, mut sums) = ([0; GROUPS], [0.0; GROUPS]);
+        let mut counts = [0; GROUPS];
+        let mut sums = [0.0; GROUPS];
         let mean = (self.mean)(amplitude, velocity);
         for seed in 0..seeds {
             let group = usize::try_from(seed).unwrap() % GROUPS;
@@ -124,7 +125,10 @@ fn coverage(
         "Delta = { linear = [0, 1e-6], points = 5 }",
         "to = 1e-8\nseeds = { from = 24, to = 2000 }\njobs = 100000",
     );
-    let (mut held, mut reached, mut jobs, mut rounds_run) = (0, 0, 0, 0);
+    let mut held = 0;
+    let mut reached = 0;
+    let mut jobs = 0;
+    let mut rounds_run = 0;
     for repetition in 0..repetitions {
         // Anywhere between two of the first sets.
         let edge = 1e-6 * (0.3 + 0.15 * ((repetition * 89 % 144) as f64 / 144.0));
@@ -178,7 +182,8 @@ fn plain_bisection(
     deviation: f64,
     response: fn(f64) -> f64,
 ) -> (f64, f64) {
-    let (mut jobs, mut held) = (0, 0);
+    let mut jobs = 0;
+    let mut held = 0;
     for repetition in 0..repetitions {
         let edge = 0.3 + 0.15 * ((repetition * 89 % 144) as f64 / 144.0);
         let mean = |amplitude: f64, _: f64| Some(response((amplitude - edge) / (steepness * 1e-2)));
@@ -188,10 +193,12 @@ fn plain_bisection(
             common: 0.0,
             repetition,
         };
-        let (mut low, mut high) = (0.25_f64, 0.5);
+        let mut low = 0.25_f64;
+        let mut high = 0.5;
         jobs += 5 * 24;
         while high - low > 1e-2 {
-            let (middle, mut seeds) = (0.5 * (low + high), 24);
+            let middle = 0.5 * (low + high);
+            let mut seeds = 24;
             let side = loop {
                 let set = noisy.set(middle.to_bits(), seeds, middle, 0.0);
                 let sample = set.samples[0].as_ref().unwrap();

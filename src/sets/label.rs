@@ -1,55 +1,9 @@
-//! How a column is called before people: its symbol, what it is in a few words, and the unit that suits its values.
+//! Labels of columns in figures and printed tables: symbol, a few words, the unit that suits the values, and their digits.
 
-use super::set::SetRow;
-use crate::model::{Description, Symbol};
+use super::SetRow;
+use crate::model::Symbol;
 use crate::table::columns::Row;
 use std::collections::HashSet;
-
-/// Column, symbol, and what it is where its meaning does not say so in a few words.
-const LABELS: [(&str, &str, &str); 26] = [
-    ("Delta", "Δ", "Amplitude"),
-    ("ramp_time", "ramp time", "Duration of the ramp"),
-    ("eta", "η", "η = 2πΔ / (T V₀)"),
-    ("frequency", "1/T", "Modulation frequency"),
-    ("slip_share", "slip share", "Share of time within slips"),
-    ("tau_mean", "⟨τ⟩", ""),
-    ("tau_mean_bound", "⟨τ⟩, at least", "Least mean interval"),
-    ("tau_sd", "σ(τ)", "S.d. of the intervals"),
-    ("tau_05", "τ(5 %)", ""),
-    ("tau_25", "τ(25 %)", ""),
-    ("tau_50", "median τ", ""),
-    ("tau_75", "τ(75 %)", ""),
-    ("tau_95", "τ(95 %)", "95 % quantile of the intervals"),
-    ("periods", "n", "Periods per slip"),
-    ("locking_index", "locking", "Locking index of τ"),
-    (
-        "locking_index_drive",
-        "locking, drive",
-        "Locking index by the drive alone",
-    ),
-    (
-        "locking_index_excess",
-        "locking, excess",
-        "Locking index beyond the drive's",
-    ),
-    ("phase_mean", "⟨φ⟩", "Mean phase"),
-    ("resultant_length", "R", "Resultant length of the phase"),
-    (
-        "resultant_drive",
-        "R, drive",
-        "Resultant length by the drive alone",
-    ),
-    (
-        "resultant_excess",
-        "R, excess",
-        "Resultant length beyond the drive's",
-    ),
-    ("drop_mean", "⟨ΔF⟩", ""),
-    ("drop_sd", "σ(ΔF)", "S.d. of the stress drop"),
-    ("peak_force_mean", "⟨F⟩ at onsets", "Mean peak force"),
-    ("mean_friction", "⟨Fₛ⟩", "Mean friction"),
-    ("friction_coefficient", "μ", "Friction coefficient"),
-];
 
 /// Digits that distinguish all doubles.
 const MAX_DIGITS: usize = 17;
@@ -87,14 +41,12 @@ pub fn label(column: &str) -> Label {
             };
         }
     }
-    let is_of_name = |letter: char| letter.is_alphanumeric() || letter == '_';
-    if !column.chars().all(is_of_name) {
-        let words = column
-            .split_inclusive(|letter| !is_of_name(letter))
-            .map(|part| {
-                let name = part.trim_end_matches(|letter| !is_of_name(letter));
-                label(name).symbol + &part[name.len()..]
-            });
+    let is_of_formula = |letter: char| !letter.is_alphanumeric() && letter != '_';
+    if column.contains(is_of_formula) {
+        let words = column.split_inclusive(is_of_formula).map(|part| {
+            let name = part.trim_end_matches(is_of_formula);
+            label(name).symbol + &part[name.len()..]
+        });
         let symbol: String = words.collect();
         return Label {
             what: symbol.clone(),
@@ -102,43 +54,49 @@ pub fn label(column: &str) -> Label {
             unit: "",
         };
     }
-    let known = LABELS.iter().find(|(key, ..)| *key == column);
-    if let Some(symbol) = Symbol::from_key(column) {
-        let Description { meaning, unit, .. } = symbol.description();
-        let what = known.map_or_else(
-            || meaning.split([',', ';']).next().unwrap_or_default(),
-            |(.., what)| what,
-        );
-        return Label {
-            symbol: symbol_of(symbol),
-            what: capitalised(what),
-            unit,
-        };
-    }
-    let described = SetRow::columns()
-        .into_iter()
-        .find(|known| known.name == column);
     let plain = column
         .strip_suffix("_mean")
         .unwrap_or(column)
         .replace('_', " ");
-    let symbol = known.map_or_else(|| plain.clone(), |(_, symbol, _)| (*symbol).to_owned());
-    let meaning = described
-        .as_ref()
-        .map(|column| column.meaning)
-        .filter(|meaning| meaning.len() <= LONGEST);
-    let what = match (known, meaning) {
-        (Some((.., what)), _) if !what.is_empty() => (*what).to_owned(),
-        (_, Some(meaning)) => capitalised(meaning),
-        _ => capitalised(&plain),
+    let described = SetRow::columns()
+        .into_iter()
+        .find(|known| known.name == column);
+    let Some(described) = described else {
+        return Label {
+            what: capitalised(&plain),
+            symbol: plain,
+            unit: "",
+        };
     };
-    let unit = described.map_or("", |column| column.unit);
-    Label { symbol, what, unit }
+    let parameter = Symbol::from_key(column);
+    let meaning = match parameter {
+        Some(_) => first_clause(described.meaning),
+        None if described.meaning.len() <= LONGEST => described.meaning,
+        None => &plain,
+    };
+    Label {
+        what: if described.words.is_empty() {
+            capitalised(meaning)
+        } else {
+            described.words.to_owned()
+        },
+        symbol: match parameter {
+            Some(parameter) => symbol_of(parameter),
+            None if described.symbol.is_empty() => plain,
+            None => described.symbol.to_owned(),
+        },
+        unit: described.unit,
+    }
+}
+
+/// What a meaning says before it goes into details.
+pub fn first_clause(meaning: &str) -> &str {
+    meaning.split([',', ';']).next().unwrap_or_default()
 }
 
 impl Label {
     /// The factor to the unit in which values up to this are read best, and that unit: times and lengths below 1 in
-    /// thousandths or millionths, all else as it is.
+    /// thousandths or millionths, all others in SI units.
     pub fn scale(&self, largest: f64) -> (f64, &'static str) {
         match self.unit {
             "s" if largest < 1e-3 => (1e6, "µs"),
@@ -153,16 +111,12 @@ impl Label {
     pub fn axis(&self, unit: &str) -> String {
         let Self { symbol, what, .. } = self;
         let mut words = symbol.split(|letter: char| !letter.is_ascii_lowercase());
-        let is_word =
-            words.any(|word| word.len() > 2) || what.split(' ').any(|word| word == symbol);
-        with_unit(
-            &if is_word {
-                what.clone()
-            } else {
-                format!("{what} {symbol}")
-            },
-            unit,
-        )
+        let is_word = words.any(|word| word.len() > 2);
+        if is_word || what.split(' ').any(|word| word == symbol) {
+            with_unit(what, unit)
+        } else {
+            with_unit(&format!("{what} {symbol}"), unit)
+        }
     }
 
     /// The same with the symbol alone.
@@ -172,18 +126,13 @@ impl Label {
 
     /// The symbol and a value, in the unit in which it is read best.
     pub fn setting(&self, value: f64, digits: Digits) -> String {
-        let (factor, unit) = if value == 0.0 {
-            (1.0, "")
-        } else {
-            self.scale(value.abs())
+        let (factor, unit) = match value {
+            0.0 => (1.0, ""),
+            _ => self.scale(value.abs()),
         };
-        format!(
-            "{} = {} {unit}",
-            self.symbol,
-            digits.typeset(factor * value)
-        )
-        .trim_end()
-        .to_owned()
+        let typeset = digits.typeset(factor * value);
+        let setting = format!("{} = {typeset} {unit}", self.symbol);
+        setting.trim_end().to_owned()
     }
 }
 
@@ -220,7 +169,7 @@ pub fn capitalised(text: &str) -> String {
     })
 }
 
-/// The significant digits with which people read the values of a column.
+/// The number of significant digits that readers see of the values of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Digits(usize);
 
@@ -231,10 +180,8 @@ impl Digits {
     /// At least as many, and enough that no two of these values look alike unless they are the same.
     pub fn distinguishing(self, values: &[f64]) -> Self {
         let distinct = |digits| {
-            let shown = values
-                .iter()
-                .map(|value| Self(digits).rounded(*value).to_bits());
-            shown.collect::<HashSet<_>>().len()
+            let shown = values.iter().map(|value| Self(digits).rounded(*value));
+            shown.map(f64::to_bits).collect::<HashSet<_>>().len()
         };
         let all = distinct(MAX_DIGITS);
         let enough = (self.0..MAX_DIGITS).find(|digits| distinct(*digits) == all);
@@ -256,7 +203,7 @@ impl Digits {
         }
     }
 
-    /// The same as in print: with a power of ten that is one, and a minus that is no hyphen.
+    /// The same as in print: with a raised power of ten, and a minus sign instead of a hyphen.
     pub fn typeset(self, value: f64) -> String {
         let number = self.number(value);
         let typeset = match number.split_once('e') {
@@ -272,9 +219,8 @@ impl Digits {
 pub fn power_of_ten(mantissa: f64, power: i32) -> String {
     const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let raised = |character: char| {
-        character
-            .to_digit(10)
-            .map_or('⁻', |digit| RAISED[digit as usize])
+        let digit = character.to_digit(10);
+        digit.map_or('⁻', |digit| RAISED[digit as usize])
     };
     let power: String = power.to_string().chars().map(raised).collect();
     if mantissa == 1.0 {
@@ -289,12 +235,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_labelled_is_a_column_and_every_number_has_words() {
-        let columns = SetRow::columns();
-        for (key, ..) in LABELS {
-            assert!(columns.iter().any(|column| column.name == key), "{key}");
-        }
-        for column in columns {
+    fn every_column_has_a_symbol_and_words_for_readers() {
+        for column in SetRow::columns() {
             let Label { symbol, what, unit } = label(&column.name);
             let is_plain = !what.contains('_') || Symbol::from_key(&column.name).is_some();
             let has_key = symbol.contains('_') && !matches!(&*symbol, "K_d" | "F_N");
@@ -304,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn times_and_lengths_are_told_in_the_unit_that_suits_the_largest() {
+    fn times_and_lengths_have_the_unit_that_suits_the_largest() {
         let scaled = |column: &str, largest| label(column).scale(largest);
         assert_eq!(
             (scaled("tau_mean", 0.1), scaled("tau_mean", 13.0)),

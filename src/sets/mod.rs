@@ -1,7 +1,10 @@
-//! What is known of a set: the columns of the reduced table of sets. Reduction fills them in; a sweep file may name those that
-//! are statistics.
+//! What is known of a set: the columns of the reduced table of sets, with their names in figures. Reduction fills them in; a
+//! sweep file may name those that are statistics. `label.rs`: columns and their values as figures write them.
 
-use super::rounds::{Precision, Target};
+mod label;
+
+pub use label::{Digits, Label, capitalised, first_clause, label, power_of_ten, symbol_of};
+
 use crate::model::Symbol;
 use crate::model::selected::{Selected, Selection};
 use crate::observe::Regime;
@@ -9,7 +12,10 @@ use crate::table::columns::{Column, Interval, Kind, Row, columns, tables};
 use std::borrow::Cow;
 use std::sync::LazyLock;
 
-/// All parameters but the seed, which a set has not.
+/// The column of 1/T, as which a swept period is shown.
+pub const FREQUENCY: &str = "frequency";
+
+/// All parameters of a set: a set has no seed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AllButSeed;
 
@@ -23,59 +29,59 @@ columns! {
     pub struct SetRow {
         set_id: String = "", "hash of all that defines a job but the seed";
         parameters: Selected<AllButSeed>;
-        frequency: Option<f64> = "Hz", "1/T; null without modulation";
-        eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
+        frequency: Option<f64> = "Hz", "1/T; null without modulation", "1/T" "Modulation frequency";
+        eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation", "η" "η = 2πΔ / (T V₀)";
         finished_jobs as "jobs": u64 = "", "jobs run to an end, one per seed";
         failed_jobs: u64 = "", "jobs that failed";
         is_control as "control": bool = "", "whether its jobs were run as a control alone (`control = true`), and not for themselves";
         jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
         jobs_cut: Option<u64> = "", "of the jobs run to an end, those that `max_time` ended: of their last interval nothing counts; null in reduced data of earlier versions";
-        regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
-        slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs";
+        regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ", "regime";
+        slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs", "slip share" "Share of time within slips";
         slip_share_interval as "slip_share": Option<Interval> = "", "lower end of its 95 % confidence interval, of jobs as units";
         slips: u64 = "", "slips of all seeds";
         intervals: u64 = "", "intervals between slips";
-        tau_mean: Option<f64> = "s", "mean interval";
+        tau_mean: Option<f64> = "s", "mean interval", "⟨τ⟩";
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_bound as "tau_mean_bound": Option<f64> = "s",
-            "what tau_mean is at least, if it is null since a job gave up; the time since its last slip counts as an interval";
+            "what tau_mean is at least, if it is null since a job gave up; the time since its last slip counts as an interval", "⟨τ⟩, at least" "Least mean interval";
         tau_off as "tau_mean_off": Option<f64> = "",
-            "about how much of tau_mean is missing where `max_time` cut intervals: -(tau_sd/tau_mean)^2 over the intervals of such a job; null if it cut none";
-        tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals";
+            "about how much of tau_mean is missing where `max_time` cut intervals: -(tau_sd/tau_mean)^2 over the intervals of such a job; null if it cut none", "tau mean off";
+        tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals", "σ(τ)" "S.d. of the intervals";
         tau_deviation_interval as "tau_sd": Option<Interval> = "s", "lower end of its 95 % confidence interval";
-        tau_05: Option<f64> = "s", "5 % quantile of the intervals";
-        tau_25: Option<f64> = "s", "25 % quantile of the intervals";
-        tau_50: Option<f64> = "s", "median of the intervals";
+        tau_05: Option<f64> = "s", "5 % quantile of the intervals", "τ(5 %)";
+        tau_25: Option<f64> = "s", "25 % quantile of the intervals", "τ(25 %)";
+        tau_50: Option<f64> = "s", "median of the intervals", "median τ";
         median_interval as "tau_50": Option<Interval> = "s", "lower end of its 95 % confidence interval";
-        tau_75: Option<f64> = "s", "75 % quantile of the intervals";
-        tau_95: Option<f64> = "s", "95 % quantile";
-        periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded";
-        locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods; null where `periods` is 0";
+        tau_75: Option<f64> = "s", "75 % quantile of the intervals", "τ(75 %)";
+        tau_95: Option<f64> = "s", "95 % quantile", "τ(95 %)" "95 % quantile of the intervals";
+        periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded", "n" "Periods per slip";
+        locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods; null where `periods` is 0", "locking" "Locking index of τ";
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
         locking_index_drive: Option<f64> = "",
-            "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control";
-        locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: what the slider adds";
+            "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control", "locking, drive" "Locking index by the drive alone";
+        locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: what the slider adds", "locking, excess" "Locking index beyond the drive's";
         locking_excess_interval as "locking_index_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        phase_mean: Option<f64> = "rad", "circular mean of the phase; if T is tau_mean or more, over whole cycles from the first onset of each job, and null below two of them a job";
+        phase_mean: Option<f64> = "rad", "circular mean of the phase; if T is tau_mean or more, over whole cycles from the first onset of each job, and null below two of them a job", "⟨φ⟩" "Mean phase";
         phase_interval as "phase_mean": Option<Interval> = "rad",
             "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
-        has_phase: bool = "", "whether directions are excluded: the interval of phase_mean is known, and narrower than 3/2 pi";
-        resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase";
+        has_phase: bool = "", "whether directions are excluded: the interval of phase_mean is known, and narrower than 3/2 pi", "has phase";
+        resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase", "R" "Resultant length of the phase";
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
         resultant_drive: Option<f64> = "",
-            "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control";
-        resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds";
+            "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control", "R, drive" "Resultant length by the drive alone";
+        resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds", "R, excess" "Resultant length beyond the drive's";
         resultant_excess_interval as "resultant_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        drop_mean: Option<f64> = "N", "mean stress drop";
+        drop_mean: Option<f64> = "N", "mean stress drop", "⟨ΔF⟩";
         drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
-        drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
+        drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop", "σ(ΔF)" "S.d. of the stress drop";
         drop_deviation_interval as "drop_sd": Option<Interval> = "N", "lower end of its 95 % confidence interval";
-        peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips";
+        peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips", "⟨F⟩ at onsets" "Mean peak force";
         peak_force_interval as "peak_force_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
-        mean_friction: Option<f64> = "N", "shear force, over the time of all jobs";
+        mean_friction: Option<f64> = "N", "shear force, over the time of all jobs", "⟨Fₛ⟩" "Mean friction";
         mean_friction_interval as "mean_friction": Option<Interval> = "N",
             "lower end of its 95 % confidence interval, of jobs as units";
-        friction_coefficient: Option<f64> = "", "mean_friction over the normal force FN";
+        friction_coefficient: Option<f64> = "", "mean_friction over the normal force FN", "μ" "Friction coefficient";
         friction_coefficient_interval as "friction_coefficient": Option<Interval> = "", "lower end of its 95 % confidence interval";
     }
 }
@@ -92,26 +98,6 @@ impl SetRow {
         self.cells(&mut |cell| numbers.push(cell.number()));
         numbers.swap_remove(place)
     }
-
-    /// The half-width of the interval of the least precise statistic over its target: 1 or less if all are as precise as
-    /// is wanted. `None` if none of them has a value.
-    pub fn error_over_target(&self, precision: &Precision) -> Option<f64> {
-        let errors = precision.statistics.iter().filter_map(|statistic| {
-            let value = self.number(statistic.key)?;
-            let ends = ["low", "high"].map(|end| self.number(&format!("{}_{end}", statistic.key)));
-            let half = match ends {
-                [Some(low), Some(high)] => 0.5 * (high - low),
-                _ => f64::INFINITY,
-            };
-            let target = match precision.target {
-                Target::Relative(share) => share * value.abs(),
-                Target::Absolute(target) => target,
-            };
-            // Nothing is known better than exactly.
-            Some(if half == 0.0 { 0.0 } else { half / target })
-        });
-        errors.reduce(f64::max)
-    }
 }
 
 /// A column of a set that a sweep file may name.
@@ -120,33 +106,29 @@ pub struct Statistic {
     pub key: &'static str,
     /// Its SI unit; empty for a pure number or a word.
     pub unit: &'static str,
-    /// A number, or what tells kinds of sets apart: a flag, a word or a count.
+    /// Kind of its values: a real number, or a flag, word or count that distinguishes sets.
     pub kind: Kind,
     pub has_interval: bool,
 }
 
-/// All that a sweep file may name, in the order of the table.
+/// All that a sweep file may name, in the order of the table: measured quantities with a symbol.
 pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
     let columns = SetRow::columns();
     let has_interval = |key: &str| {
-        columns
-            .iter()
-            .any(|column| column.name.strip_suffix("_low") == Some(key))
+        let low = format!("{key}_low");
+        columns.iter().any(|column| column.name == low)
     };
     let statistic = |column: &Column| {
-        // The ends of an interval have names of their own. What is never missing counts jobs or slips, but for flags;
-        // parameters tell nothing of a set.
         let Cow::Borrowed(key) = column.name else {
             return None;
         };
+        let is_given = key == FREQUENCY || Symbol::from_key(key).is_some();
+        // Counts of jobs, slips and intervals are never missing.
         let is_measured = column.nullable || column.kind == Kind::Flag;
-        let is_given =
-            Symbol::from_key(key).is_some() || ["control", "frequency", "jobs_cut"].contains(&key);
-        let Column { unit, kind, .. } = *column;
-        (is_measured && !is_given).then_some(Statistic {
+        (is_measured && !is_given && !column.symbol.is_empty()).then(|| Statistic {
             key,
-            unit,
-            kind,
+            unit: column.unit,
+            kind: column.kind,
             has_interval: has_interval(key),
         })
     };
@@ -159,8 +141,8 @@ impl Statistic {
         self.unit == "rad"
     }
 
-    /// Whether the population has a value of it, with an error that leaving out seeds shows: quantiles jump, numbers of
-    /// values and bounds change with their number, and angles have no order.
+    /// Whether it can cross a threshold: the population has a value of it, whose error a jackknife over seeds gives. Quantiles
+    /// jump, bounds change with the number of values, and angles have no order.
     pub fn can_cross(self) -> bool {
         let is_of_sample =
             self.key.starts_with("tau_") && !["tau_mean", "tau_sd"].contains(&self.key);
@@ -185,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn statistics_are_what_jobs_and_slips_tell_of_a_set() {
+    fn statistics_are_what_jobs_and_slips_say_of_a_set() {
         let of = |key: &str| {
             Statistic::from_key(key).map(|known| (known.unit, known.kind, known.has_interval))
         };

@@ -1,8 +1,8 @@
-//! A sweep that decides for itself: its virtual grid, its sets, and its first round.
+//! An adaptive sweep: its virtual grid, its sets, and its first round.
 //!
 //! The seed axis of the grid has as many seeds as a set may get, and a refined axis is as fine as is wanted. A round runs
-//! some of its points. The first follows from the sweep; each later one from the rows of those before it, see `rounds/`. A
-//! set is named by the number of its point with the first seed.
+//! some of its points. The first round follows from the sweep; each later one from the rows of earlier rounds, see `rounds/`.
+//! A set is named by the number of its point with the first seed.
 
 use super::axes::Axis;
 use super::grid::{Sweep, find_rows};
@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
 
 impl Sweep {
-    /// What it decides by itself; none for a sweep that runs its whole grid.
+    /// How it runs in rounds; `None` for a sweep that runs its whole grid.
     pub const fn rounds(&self) -> Option<&Rounds> {
         self.rounds.as_ref()
     }
@@ -53,7 +53,7 @@ impl Sweep {
         self.axes.iter().map(Axis::len).collect()
     }
 
-    /// Key and value of an axis of one quantity at a row; `None` of a word, or of several quantities.
+    /// Key and value of an axis of one quantity at a row; `None` for a word, or for several quantities.
     pub fn value_at(&self, axis: usize, row: u64) -> Option<(&'static str, f64)> {
         let mut point = Point {
             parameters: self.base.clone(),
@@ -113,10 +113,8 @@ impl Sweep {
         if let Some(axis) = self.seed_axis() {
             spacing[axis] = self.axes[axis].len();
         }
-        let counts: Vec<u64> = self
-            .axes
-            .iter()
-            .zip(&spacing)
+        let counts = self.axes.iter().zip(&spacing);
+        let counts: Vec<u64> = counts
             .map(|(axis, spacing)| axis.len().div_ceil(*spacing))
             .collect();
         let mut rows = vec![0; counts.len()];
@@ -133,13 +131,10 @@ impl Sweep {
     /// What its rounds may add up to; `None` for a sweep without.
     pub fn bounds(&self) -> Option<Bounds> {
         let rounds = self.rounds.as_ref()?;
-        let costs: Vec<f64> = self
-            .first_sets()
-            .into_iter()
-            .flat_map(|set| self.jobs_at(set..set + 1))
-            .map(|job| job.cost)
-            .collect();
-        let dearest = costs.iter().copied().fold(0.0, f64::max);
+        let sets = self.first_sets().into_iter();
+        let jobs = sets.flat_map(|set| self.jobs_at(set..set + 1));
+        let costs: Vec<f64> = jobs.map(|job| job.cost).collect();
+        let largest = costs.iter().copied().fold(0.0, f64::max);
         let known = costs.len() as u64;
         let (seeds, jobs) = match &rounds.refinement {
             None => (self.seed_count(), known * self.seed_count()),
@@ -147,15 +142,13 @@ impl Sweep {
         };
         let sets = jobs / seeds;
         let predicted_cost =
-            costs.iter().sum::<f64>() * seeds as f64 + (jobs - known * seeds) as f64 * dearest;
-        let controls = self
-            .controls
-            .as_ref()
-            .map_or(0, |controls| controls.point_count().min(jobs));
+            costs.iter().sum::<f64>() * seeds as f64 + (jobs - known * seeds) as f64 * largest;
+        let controls = self.controls.as_ref();
+        let controls = controls.map_or(0, |controls| controls.point_count().min(jobs));
         Some(Bounds {
             sets,
             jobs: jobs + controls,
-            predicted_cost: predicted_cost + controls as f64 * dearest,
+            predicted_cost: predicted_cost + controls as f64 * largest,
         })
     }
 
@@ -163,13 +156,11 @@ impl Sweep {
     pub fn first_round(&self) -> Option<Round> {
         let seeds = *self.rounds.as_ref()?.seeds.start();
         let sets = self.first_sets();
-        let points = self.with_controls(
-            sets.iter()
-                .flat_map(|&set| self.points_of_set(set, 0..seeds))
-                .collect(),
-        );
+        let points = sets
+            .iter()
+            .flat_map(|&set| self.points_of_set(set, 0..seeds));
         Some(Round {
-            points,
+            points: self.with_controls(points.collect()),
             standing: Standing {
                 sets_open: sets.len() as u64,
                 ..Standing::default()

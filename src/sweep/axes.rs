@@ -75,10 +75,9 @@ impl Axis {
                 later: later as usize,
             });
         }
-        let sorted = ranked.into_iter().map(|(.., row)| row).collect();
         Ok(Self::Table(Table {
             columns,
-            sorted,
+            sorted: ranked.into_iter().map(|(.., row)| row).collect(),
             is_first,
         }))
     }
@@ -124,11 +123,9 @@ impl Axis {
         let Self::Table(table) = self else {
             return None;
         };
-        let column = table
-            .columns
-            .iter()
-            .find(|column| column.quantity == quantity);
-        column.map(|column| &*column.values)
+        let mut columns = table.columns.iter();
+        let column = columns.find(|column| column.quantity == quantity)?;
+        Some(&column.values)
     }
 
     /// The seeds of the rows that can lead to these parameters but for the seed; `None` if it does not move the seed.
@@ -142,17 +139,17 @@ impl Axis {
                 first,
                 count,
             } => {
+                let seeds = *first..first + count;
                 return (*symbol == Symbol::Seed)
-                    .then(|| Box::new(*first..first + count) as Box<dyn Iterator<Item = u64>>);
+                    .then(|| Box::new(seeds) as Box<dyn Iterator<Item = u64>>);
             }
             Self::Table(table) => table,
         };
         let seeds = table.columns.iter().find(|column| column.is_seed())?;
         let order = move |row: &u32| table.compare_but_seed(*row, wanted);
         let begin = table.sorted.partition_point(|row| order(row).is_lt());
-        let found = table.sorted[begin..]
-            .iter()
-            .take_while(move |row| order(row).is_eq());
+        let found = table.sorted[begin..].iter();
+        let found = found.take_while(move |row| order(row).is_eq());
         let seed = |row: &u32| match seeds.values[*row as usize] {
             Value::Count(seed) => Some(seed),
             _ => None,
@@ -172,17 +169,13 @@ impl Axis {
                 _ => None,
             },
             Self::Table(table) => {
-                let begin = table
-                    .sorted
-                    .partition_point(|&row| table.compare(row, wanted).is_lt());
-                let mut found = table.sorted[begin..]
-                    .iter()
-                    .take_while(|&&row| table.compare(row, wanted).is_eq());
-                let is_counted =
-                    |row: u32| wanted.modulation_period.is_some() || table.is_first[row as usize];
-                found
-                    .find(|&&row| is_counted(row))
-                    .map(|&row| u64::from(row))
+                let order = |row: &u32| table.compare(*row, wanted);
+                let begin = table.sorted.partition_point(|row| order(row).is_lt());
+                let found = table.sorted[begin..].iter();
+                let mut found = found.take_while(|row| order(row).is_eq());
+                let is_modulated = wanted.modulation_period.is_some();
+                let row = found.find(|row| is_modulated || table.is_first[**row as usize]);
+                row.map(|&row| u64::from(row))
             }
         }
     }
@@ -190,30 +183,27 @@ impl Axis {
 
 /// The columns that fix neither the seed nor the period.
 fn but_seed(columns: &[Column]) -> impl Iterator<Item = &Column> {
-    columns
-        .iter()
-        .filter(|column| !column.is_seed() && !column.quantity.is_period())
+    let columns = columns.iter();
+    columns.filter(|column| !column.is_seed() && !column.quantity.is_period())
 }
 
 impl Table {
-    /// Where a row stands among the sorted ones, against one that leads to these parameters.
+    /// Where a row stands among the sorted rows, compared with a row that leads to these parameters.
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
-        let of = |is_last: fn(&Column) -> bool| {
-            let mut last = self.columns.iter().filter(move |column| is_last(column));
-            last.next()
-                .map_or(Ordering::Equal, |column| column.compare(row, wanted))
-        };
+        let seed = self.columns.iter().find(|column| column.is_seed());
+        let mut columns = self.columns.iter();
+        let period = columns.find(|column| column.quantity.is_period());
+        let of = |column: &Column| column.compare(row, wanted);
         self.compare_but_seed(row, wanted)
-            .then_with(|| of(Column::is_seed))
-            .then_with(|| of(|column| column.quantity.is_period()))
+            .then_with(|| seed.map_or(Ordering::Equal, of))
+            .then_with(|| period.map_or(Ordering::Equal, of))
     }
 
-    /// The same, whatever seed and period.
+    /// The same without seed and period.
     fn compare_but_seed(&self, row: u32, wanted: &Parameters) -> Ordering {
-        but_seed(&self.columns)
-            .map(|column| column.compare(row, wanted))
-            .find(|order| order.is_ne())
-            .unwrap_or(Ordering::Equal)
+        let mut orders = but_seed(&self.columns).map(|column| column.compare(row, wanted));
+        let order = orders.find(|order| order.is_ne());
+        order.unwrap_or(Ordering::Equal)
     }
 }
 

@@ -7,12 +7,12 @@
 use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
-use super::rounds::Rounds;
-use super::set::Statistic;
+use super::rounds::{MAX_SETS, Rounds};
 use super::source::{Refused, Section, Source};
 use crate::model::Symbol;
 use crate::model::theory::typical_interval;
 use crate::observe::Recording;
+use crate::sets::Statistic;
 use crate::solver::{Resolve, Solver};
 use crate::table::value::Shortest;
 use std::ops::RangeInclusive;
@@ -44,8 +44,10 @@ impl<'a> Places<'a> {
             place.quantity == quantity || (place.quantity.is_period() && quantity.is_period())
         };
         if let Some(place) = self.set.iter().find(clash) {
-            let (key, other) = (quantity.key(), place.quantity.key());
-            let (there, line) = (place.section, self.source.line(place.at));
+            let key = quantity.key();
+            let other = place.quantity.key();
+            let there = place.section;
+            let line = self.source.line(place.at);
             let problem = if place.quantity == quantity {
                 format!("{key} in {section}: is set in {there}, too (line {line}); keep one")
             } else {
@@ -71,12 +73,9 @@ impl<'a> Places<'a> {
             other => other,
         };
         let place = |quantity| self.set.iter().find(|place| place.quantity == quantity);
-        self.source.refuse(
-            place(quantity)
-                .or_else(|| place(bound))
-                .map_or(0, |place| place.at),
-            problem,
-        )
+        let place = place(quantity).or_else(|| place(bound));
+        self.source
+            .refuse(place.map_or(0, |place| place.at), problem)
     }
 }
 
@@ -129,7 +128,7 @@ pub(super) fn whole(
         ));
     };
     let Recording { time, max_time, .. } = sweep.recording;
-    if let (Some(time), Some(max_time)) = (time, max_time)
+    if let Some((time, max_time)) = time.zip(max_time)
         && max_time <= time
     {
         let problem = format!(
@@ -139,15 +138,9 @@ pub(super) fn whole(
         );
         return Err(file.source.refuse(file.place_of("record"), problem));
     }
-    if sweep.recording.energies
-        && matches!(
-            sweep.solver,
-            Solver::EventDriven {
-                resolve: Resolve::Grid,
-                ..
-            }
-        )
-    {
+    let is_on_grid =
+        matches!(sweep.solver, Solver::EventDriven { resolve, .. } if resolve == Resolve::Grid);
+    if sweep.recording.energies && is_on_grid {
         let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
         return Err(file.source.refuse(file.place_of("record"), problem));
     }
@@ -162,66 +155,70 @@ pub(super) fn whole(
         .map_err(|error| file.source.refuse(time_step, error.to_string()))
 }
 
+/// An adaptive sweep has not too many sets, and jobs for its first round.
+pub(super) fn rounds(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
+    let Some(rounds) = &sweep.rounds else {
+        return Ok(());
+    };
+    let sets = sweep.first_sets().len() as u64;
+    if sets > MAX_SETS {
+        let problem = format!(
+            "[axes]: {sets} sets; a sweep with rounds has at most {MAX_SETS}; take several sweeps"
+        );
+        return Err(file.source.refuse(file.place_of("axes"), problem));
+    }
+    let min_jobs = sets * rounds.seeds.start();
+    let refine = file
+        .entry("refine")
+        .and_then(|refine| refine.section("[refine]"));
+    match (
+        &rounds.refinement,
+        refine.and_then(|refine| refine.entry("jobs")),
+    ) {
+        (Some(refinement), Some(jobs)) if refinement.max_jobs < min_jobs => {
+            Err(jobs.must_be(&format!("at least the {min_jobs} of the first round")))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Drive velocity in m/s from which a slip of microseconds would be driven through: micrometres per second were meant.
 const FAST: f64 = 0.1;
-/// η where there is something to see: far below, the load hardly swings; far above, a cycle gains less than a slip's inertia
+/// η for which locking is expected: far below, the load hardly swings; far above, a cycle gains less than a slip's inertia
 /// hides.
 const USUAL_ETA: RangeInclusive<f64> = 1e-3..=1e5;
-/// Most points that are looked at for warnings.
+/// Most points that are examined for warnings.
 const MAX_LOOKED_AT: usize = 100_000;
 
 impl Sweep {
-    /// What is allowed but hardly meant.
+    /// What is allowed, but hardly intended.
     pub fn warnings(&self) -> Vec<String> {
         let points: Vec<Point> = self.points_of_one_seed().take(MAX_LOOKED_AT).collect();
-        let worst = |quantity: Quantity, is_odd: &dyn Fn(f64) -> bool| {
-            points
-                .iter()
-                .map(|point| point.number(quantity))
-                .find(|number| is_odd(*number))
-        };
-        let fast = worst(Quantity::Parameter(Symbol::V0), &|velocity| {
-            velocity >= FAST
-        });
-        let odd = worst(Quantity::Eta, &|eta| {
-            eta != 0.0 && !USUAL_ETA.contains(&eta)
-        });
+        let values = |quantity| points.iter().map(move |point| point.number(quantity));
+        let fast = values(Quantity::Parameter(Symbol::V0)).find(|velocity| *velocity >= FAST);
         let fast = fast.map(|velocity| {
             format!(
                 "V0 = {} m/s is far too fast for stick-slip; 100 micrometres per second are V0 = 1e-4",
                 Shortest(velocity)
             )
         });
-        let odd = odd.map(|eta| {
-            let (low, high) = (USUAL_ETA.start(), USUAL_ETA.end());
+        let unusual = values(Quantity::Eta).find(|eta| *eta != 0.0 && !USUAL_ETA.contains(eta));
+        let unusual = unusual.map(|eta| {
+            let low = USUAL_ETA.start();
+            let high = USUAL_ETA.end();
             format!(
-                "eta = {eta:.3e} at a point; from {low:e} to {high:e} there is locking to see: check Delta, T and V0"
+                "eta = {eta:.3e} at a point; locking is expected only for eta from {low:e} to {high:e}: check Delta, T and V0"
             )
         });
-        let few = self
-            .rounds
-            .as_ref()
-            .filter(|rounds| rounds.asked < *rounds.seeds.start());
+        let rounds = self.rounds.iter();
+        let few = rounds.filter(|rounds| rounds.asked < *rounds.seeds.start());
         let few = few.map(|Rounds { asked, seeds, .. }| {
             format!(
                 "seeds: from = {asked} is raised to {}: intervals of fewer seeds are not trusted",
                 seeds.start()
             )
         });
-        let discard = self.recording.discard;
-        let start_up = points
-            .iter()
-            .map(|point| discard as f64 * typical_interval(&point.parameters))
-            .fold(0.0, f64::max);
-        let early = self.recording.time.filter(|time| *time < start_up);
-        let early = early.map(|time| {
-            format!(
-                "time = {} s: start-up of {discard} slips takes up to some {start_up:.3} s, and a job records one slip after it",
-                Shortest(time)
-            )
-        });
-        let odd = odd.into_iter().chain(early);
-        fast.into_iter().chain(odd).chain(few).collect()
+        fast.into_iter().chain(unusual).chain(few).collect()
     }
 }
 
@@ -242,34 +239,31 @@ fn modulation(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<
         }
         _ => {}
     }
-    if sweep.controls.is_some() {
+    if sweep.controls.is_some() && !is_modulated {
         let problem =
             "control: has no effect while Delta = 0; set Delta > 0 (m), or remove control";
-        return if is_modulated {
-            Ok(())
-        } else {
-            Err(file.source.refuse(file.place_of("record"), problem))
-        };
+        return Err(file.source.refuse(file.place_of("record"), problem));
     }
-    let Some(Rounds {
-        precision,
-        refinement,
-        ..
-    }) = &sweep.rounds
-    else {
-        return Ok(());
+    match &sweep.rounds {
+        Some(rounds) if sweep.controls.is_none() => without_controls(rounds, file),
+        _ => Ok(()),
+    }
+}
+
+/// Statistics of what the drive alone explains are refused in a sweep without controls.
+fn without_controls(rounds: &Rounds, file: &Section<'_>) -> Result<(), Refused> {
+    let precise = rounds.precision.iter();
+    let precise = precise.flat_map(|precision| &precision.statistics);
+    let refined = rounds.refinement.iter();
+    let refined = refined.flat_map(|refinement| &refinement.by);
+    let section = if rounds.refinement.is_some() {
+        "refine"
+    } else {
+        "precision"
     };
-    let precise = precision
-        .iter()
-        .flat_map(|precision| &precision.statistics)
-        .map(|by| ("precision", by));
-    let refined = refinement
-        .iter()
-        .flat_map(|refinement| &refinement.by)
-        .map(|by| ("refine", by));
-    match precise.chain(refined).find(|(_, by)| by.needs_control()) {
+    match precise.chain(refined).find(|by| by.needs_control()) {
         None => Ok(()),
-        Some((section, Statistic { key, .. })) => {
+        Some(Statistic { key, .. }) => {
             let problem =
                 format!("[{section}]: {key} needs controls; set control = true in [record]");
             Err(file.source.refuse(file.place_of(section), problem))

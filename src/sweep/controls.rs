@@ -1,28 +1,20 @@
 //! Controls: the same jobs without modulation, from which follows what the drive alone explains (`control = true`).
 //!
 //! They are points of the sweep, after those of its grid: its axes but for those of the modulation, and the conditions that
-//! name none of them, as far as a modulated job needs them. What is a job of the grid anyway is no control; and what any
-//! grid of a directory has had is none there, whatever the seeds.
+//! name none of them, as far as a modulated job needs them. A job of the grid is no control, nor is a set that the grid of
+//! any sweep in the directory has.
 
 use super::axes::{Axis, Column};
 use super::grid::Sweep;
 use super::plan::Plan;
-use super::quantity::{Point, Quantity};
+use super::quantity::Point;
 use super::rounds::merged;
-use crate::model::{Parameters, Symbol};
+use crate::model::Parameters;
 use std::collections::{BTreeSet, HashSet};
 use std::ops::RangeInclusive;
 
 /// The version of the plan from which controls that no job needs are left out.
 const ONLY_NEEDED: u32 = 7;
-
-impl Quantity {
-    /// Whether it means nothing without modulation, or is the amplitude.
-    pub(super) fn is_of_modulation(self) -> bool {
-        use Symbol::{Delta, DeltaTo, RampTime, TTo};
-        self.is_period() || matches!(self, Self::Parameter(Delta | DeltaTo | TTo | RampTime))
-    }
-}
 
 impl Axis {
     /// What is left of it without modulation; `None` if nothing is.
@@ -30,11 +22,10 @@ impl Axis {
         let Self::Table(table) = self else {
             return Some(self.clone());
         };
-        let kept = table
-            .columns
-            .iter()
-            .filter(|column| !column.quantity.is_of_modulation());
-        let kept: Vec<&Column> = kept.collect();
+        let columns = table.columns.iter();
+        let kept: Vec<&Column> = columns
+            .filter(|column| !column.quantity.is_of_modulation())
+            .collect();
         let rows = kept.first()?.values.len();
         let mut seen = HashSet::new();
         let row = |row: usize| {
@@ -55,12 +46,9 @@ impl Axis {
 impl Sweep {
     /// The sweep of its controls.
     pub(super) fn unmodulated(&self) -> Self {
-        let conditions = self.conditions.iter();
-        let conditions = conditions.filter(|condition| {
-            !condition
-                .names()
-                .into_iter()
-                .any(|name| name.is_of_modulation())
+        let conditions = self.conditions.iter().filter(|condition| {
+            let mut names = condition.names().into_iter();
+            !names.any(|name| name.is_of_modulation())
         });
         let mut controls = Self {
             base: self.base.without_modulation(),
@@ -99,26 +87,13 @@ impl Sweep {
             return merged(points);
         }
         let control = |point| {
-            self.find(
-                &self
-                    .point(&self.rows(point))
-                    .canonical()
-                    .parameters
-                    .without_modulation(),
-            )
+            let job = self.point(&self.rows(point)).canonical().parameters;
+            self.find(&job.without_modulation())
         };
-        let controls: Vec<u64> = points
-            .iter()
-            .cloned()
-            .flatten()
-            .filter_map(control)
-            .collect();
-        merged(
-            points
-                .into_iter()
-                .chain(controls.into_iter().map(|point| point..=point))
-                .collect(),
-        )
+        let jobs = points.iter().cloned().flatten();
+        let controls: Vec<u64> = jobs.filter_map(control).collect();
+        let controls = controls.into_iter().map(|point| point..=point);
+        merged(points.into_iter().chain(controls).collect())
     }
 }
 
@@ -219,7 +194,8 @@ mod tests {
                 .map(|job| (job.parameters.drive_velocity, job.parameters.seed))
                 .collect()
         };
-        let (slow, fast) = ([(1e-5, 3), (1e-5, 4)], [(1e-4, 3), (1e-4, 4)]);
+        let slow = [(1e-5, 3), (1e-5, 4)];
+        let fast = [(1e-4, 3), (1e-4, 4)];
         let all = [slow, fast].concat();
         for condition in [
             "V0 * eta < 1.5e-4",

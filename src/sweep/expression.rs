@@ -42,6 +42,7 @@ const COMPARISON: u8 = 3;
 const SUM: u8 = 4;
 const PRODUCT: u8 = 5;
 
+/// Sign, precedence and value of an operator.
 const fn operator(sign: &'static str, precedence: u8, combine: fn(f64, f64) -> f64) -> Operator {
     Operator {
         sign,
@@ -218,32 +219,25 @@ impl<'a, N> Reader<'a, N> {
     }
 
     fn operator(&self) -> Option<Operator> {
-        OPERATORS
-            .into_iter()
-            .find(|operator| operator.sign == self.peek())
+        let word = self.peek();
+        OPERATORS.into_iter().find(|operator| operator.sign == word)
     }
 
     /// Reads an expression whose operators have at least this precedence.
     fn expression(&mut self, min: u8) -> Result<Expression<N>, ExpressionError> {
         let start = self.position();
         let mut left = self.factor()?;
-        while let Some(operator) = self
-            .operator()
-            .filter(|operator| operator.precedence >= min)
-        {
+        let binds = |operator: &Operator| operator.precedence >= min;
+        while let Some(operator) = self.operator().filter(binds) {
             let joins_conditions = operator.precedence < COMPARISON;
             let demanded = left.demanded(joins_conditions, start)?;
             self.advance();
             let position = self.position();
-            let right = self
-                .expression(operator.precedence + 1)?
-                .demanded(joins_conditions, position)?;
+            let right = self.expression(operator.precedence + 1)?;
+            let right = right.demanded(joins_conditions, position)?;
             left = Expression::Combined(Box::new((demanded, operator, right)));
-            if [
-                operator.precedence,
-                self.operator().map_or(0, |next| next.precedence),
-            ] == [COMPARISON; 2]
-            {
+            let next = self.operator().map(|next| next.precedence);
+            if operator.precedence == COMPARISON && next == Some(COMPARISON) {
                 return Err(
                     self.error("a second comparison; write a < b and b < c instead of a < b < c")
                 );
@@ -263,9 +257,8 @@ impl<'a, N> Reader<'a, N> {
         }
         if self.accept("-") {
             let start = self.position();
-            return Ok(Expression::Negative(Box::new(
-                self.factor()?.demanded(false, start)?,
-            )));
+            let number = self.factor()?.demanded(false, start)?;
+            return Ok(Expression::Negative(Box::new(number)));
         }
         if self.accept("(") {
             let inside = self.expression(OR)?;

@@ -8,12 +8,12 @@
 use super::axes::Axis;
 use super::cost::predicted_cost;
 use super::expression::Expression;
-use super::job::{Identity, Job, settings};
+use super::job::{Identity, Job, settings, solver_settings};
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
 use crate::model::theory::to_twelve_digits;
-use crate::model::{Parameters, Symbol};
-use crate::observe::Recording;
+use crate::model::{Parameters, Symbol, Value};
+use crate::observe::{Recording, RecordingKey};
 use crate::solver::Solver;
 use std::ops::Range;
 
@@ -34,7 +34,7 @@ pub struct Sweep {
     pub(super) rounds: Option<Rounds>,
     /// The sweep of its controls; see `controls.rs`.
     pub(super) controls: Option<Box<Self>>,
-    /// Of a sweep of controls, its sets that are run, in order; `None`: all.
+    /// In a sweep of controls, the sets that are run, in order; `None`: all.
     pub(super) needed: Option<Vec<u64>>,
     /// The version of the plan by which it is read.
     pub(super) plan_version: u32,
@@ -81,11 +81,9 @@ impl Sweep {
 
     /// Numbers of the points of the grid, and of the controls after them.
     pub(super) fn points(&self) -> Range<u64> {
-        0..self.point_count()
-            + self
-                .controls
-                .as_ref()
-                .map_or(0, |controls| controls.point_count())
+        let controls = self.controls.as_ref();
+        let controls = controls.map_or(0, |controls| controls.point_count());
+        0..self.point_count() + controls
     }
 
     /// The jobs in grid order, then their controls.
@@ -103,22 +101,16 @@ impl Sweep {
         let count = self.point_count();
         let of_grid = self.admitted(points.start.min(count)..points.end.min(count));
         let others = points.start.max(count) - count..points.end.max(count) - count;
-        let controls = self
-            .controls
-            .iter()
-            .flat_map(move |controls| controls.admitted(others.clone()));
+        let controls = self.controls.iter();
+        let controls = controls.flat_map(move |controls| controls.admitted(others.clone()));
         let controls = controls.map(move |(number, point)| (count + number, point));
         let is_own = |(_, point): &(u64, Point)| self.find_in_grid(&point.parameters).is_none();
-        of_grid
-            .chain(controls.filter(is_own))
-            .map(|(point, Point { parameters, .. })| {
-                let cost = predicted_cost(&parameters, &self.recording, self.solver);
-                Job {
-                    point,
-                    parameters,
-                    cost,
-                }
-            })
+        let points = of_grid.chain(controls.filter(is_own));
+        points.map(|(point, Point { parameters, .. })| Job {
+            point,
+            cost: predicted_cost(&parameters, &self.recording, self.solver),
+            parameters,
+        })
     }
 
     /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
@@ -133,7 +125,7 @@ impl Sweep {
         self.find_in_grid(parameters).or_else(control)
     }
 
-    /// Number of the point of a job with these canonical parameters, whatever its seed.
+    /// Number of the point of a job with these canonical parameters and any seed.
     pub fn find_set(&self, parameters: &Parameters) -> Option<u64> {
         let control =
             || Some(self.point_count() + self.controls.as_ref()?.find_set_in_grid(parameters)?);
@@ -141,36 +133,29 @@ impl Sweep {
     }
 
     fn find_in_grid(&self, parameters: &Parameters) -> Option<u64> {
-        let rows: Vec<u64> = self
-            .axes
-            .iter()
-            .map(|axis| axis.find(parameters))
-            .collect::<Option<_>>()?;
+        let rows = self.axes.iter().map(|axis| axis.find(parameters));
+        let rows: Vec<u64> = rows.collect::<Option<_>>()?;
         let point = self.point(&rows).canonical();
-        let number = || {
-            self.axes
-                .iter()
-                .zip(rows)
-                .fold(0, |number, (axis, row)| number * axis.len() + row)
-        };
-        let is_job = point.parameters == *parameters && self.admits(&point);
-        is_job.then(number).filter(|&number| self.is_needed(number))
+        if point.parameters != *parameters || !self.admits(&point) {
+            return None;
+        }
+        let rows = self.axes.iter().zip(rows);
+        let number = rows.fold(0, |number, (axis, row)| number * axis.len() + row);
+        Some(number).filter(|&number| self.is_needed(number))
     }
 
-    /// Number of a point of the grid with these canonical parameters, whatever the seed.
+    /// Number of a point of the grid with these canonical parameters and any seed.
     pub(super) fn find_set_in_grid(&self, parameters: &Parameters) -> Option<u64> {
         // Where no condition reads the seed, all seeds are jobs or none is.
         let tried = if self.reads_seed() { usize::MAX } else { 1 };
         let seeds = self.axes.iter().find_map(|axis| axis.seeds(parameters));
-        seeds
-            .unwrap_or_else(|| Box::new(std::iter::once(self.base.seed)))
-            .take(tried)
-            .find_map(|seed| {
-                self.find_in_grid(&Parameters {
-                    seed,
-                    ..parameters.clone()
-                })
-            })
+        let seeds = seeds.unwrap_or_else(|| Box::new(std::iter::once(self.base.seed)));
+        let with_seed = |seed| Parameters {
+            seed,
+            ..parameters.clone()
+        };
+        let mut jobs = seeds.take(tried).map(with_seed);
+        jobs.find_map(|job| self.find_in_grid(&job))
     }
 
     /// Whether a condition reads the seed.
@@ -192,50 +177,81 @@ impl Sweep {
         self.identity.set(parameters)
     }
 
-    /// The same with the ids that a program of other versions gave.
+    /// This sweep with the ids that a program of other versions gave.
     pub fn with_ids_of(mut self, model_version: u32, rng_scheme: &str) -> Self {
         self.identity =
             Identity::of_versions(model_version, rng_scheme, self.solver, &self.recording);
         self
     }
 
-    /// In what another sweep differs besides axes and conditions: name, model, recording, solver, each as section and key
+    /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
+    /// that read back to the same bits.
+    pub fn command(&self, job: &Job) -> String {
+        let mut words = vec!["stickslip simulate".to_owned()];
+        let defaults = Parameters::default();
+        for symbol in Symbol::ALL {
+            let value = job.parameters.get(symbol);
+            if value != defaults.get(symbol) && value != Value::Null {
+                words.push(format!("--set {}={value}", symbol.key()));
+            }
+        }
+        // `simulate` has another default.
+        words.extend(self.recording.slips.map(|slips| format!("--slips {slips}")));
+        // A single job has no control.
+        let defaults = Recording {
+            slips: self.recording.slips,
+            control: self.recording.control,
+            ..Recording::default()
+        };
+        for key in RecordingKey::ALL {
+            let value = self.recording.get(key);
+            if value != defaults.get(key) {
+                words.push(format!("--record {}={value}", key.key()));
+            }
+        }
+        let defaults = solver_settings(Solver::default());
+        let mut settings = solver_settings(self.solver);
+        settings.retain(|setting| !defaults.contains(setting));
+        words.extend(
+            settings
+                .iter()
+                .map(|(key, value)| format!("--set {key}={value}")),
+        );
+        words.join(" ")
+    }
+
+    /// How another sweep differs besides axes and conditions: name, model, recording, solver, each as section and key
     /// with the value before and after. Parameters that an axis of either sets are left out, as an axis may be added,
     /// changed or dropped.
     pub fn differences(&self, other: &Self) -> Vec<String> {
-        let moved = |symbol| self.moves(symbol) || other.moves(symbol);
-        let values = |sweep: &Self| {
-            let model = Symbol::ALL
-                .into_iter()
-                .filter(|symbol| !moved(*symbol))
-                .map(|symbol| {
-                    (
-                        format!("model.{}", symbol.key()),
-                        sweep.base.get(symbol).to_string(),
-                    )
-                });
-            let name = std::iter::once(("name".to_owned(), sweep.name.clone()));
-            name.chain(model)
-                .chain(settings(sweep.solver, &sweep.recording))
-                .collect::<Vec<_>>()
-        };
-        let (before, after) = (values(self), values(other));
+        let before = self.settings_beside(other);
+        let after = other.settings_beside(self);
         let value = |values: &[(String, String)], key: &str| {
-            values
-                .iter()
-                .find(|(other, _)| other == key)
-                .map_or_else(|| "none".to_owned(), |(_, value)| value.clone())
+            let known = values.iter().find(|(other, _)| other == key);
+            known.map_or_else(|| "none".to_owned(), |(_, value)| value.clone())
         };
-        let added = after
-            .iter()
-            .filter(|(key, _)| before.iter().all(|(other, _)| other != key));
-        before
-            .iter()
-            .chain(added)
-            .map(|(key, _)| (key, value(&before, key), value(&after, key)))
-            .filter(|(_, before, after)| before != after)
-            .map(|(key, before, after)| format!("{key}: {before} -> {after}"))
-            .collect()
+        let is_new = |(key, _): &&(String, String)| before.iter().all(|(other, _)| other != key);
+        let keys = before.iter().chain(after.iter().filter(is_new));
+        let change = |(key, _): &(String, String)| {
+            let old = value(&before, key);
+            let new = value(&after, key);
+            (old != new).then(|| format!("{key}: {old} -> {new}"))
+        };
+        keys.filter_map(change).collect()
+    }
+
+    /// Keys and values of name, model, solver and recording, without the parameters that an axis of either sweep sets.
+    fn settings_beside(&self, other: &Self) -> Vec<(String, String)> {
+        let parameter = |symbol: Symbol| {
+            let value = self.base.get(symbol).to_string();
+            (format!("model.{}", symbol.key()), value)
+        };
+        let is_fixed = |symbol: &Symbol| !self.moves(*symbol) && !other.moves(*symbol);
+        let name = ("name".to_owned(), self.name.clone());
+        let mut values = vec![name];
+        values.extend(Symbol::ALL.into_iter().filter(is_fixed).map(parameter));
+        values.extend(settings(self.solver, &self.recording));
+        values
     }
 
     /// Whether an axis sets a parameter; T also through η or the frequency.
@@ -275,12 +291,8 @@ impl Sweep {
         points.filter_map(move |number| {
             find_rows(number, &counts, &mut rows);
             let point = self.point(&rows);
-            let is_first = || {
-                self.axes
-                    .iter()
-                    .zip(&rows)
-                    .all(|(axis, &row)| axis.is_first(row))
-            };
+            let mut axes = self.axes.iter().zip(&rows);
+            let mut is_first = || axes.all(|(axis, &row)| axis.is_first(row));
             (point.is_modulated() || is_first()).then(|| (number, point.canonical()))
         })
     }
@@ -308,9 +320,8 @@ impl Sweep {
                 number
             }
         };
-        self.conditions
-            .iter()
-            .all(|condition| condition.evaluate(&number) == 1.0)
+        let mut conditions = self.conditions.iter();
+        conditions.all(|condition| condition.evaluate(&number) == 1.0)
     }
 }
 

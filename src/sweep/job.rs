@@ -1,13 +1,13 @@
-//! A job: the names by which results know it, and the command line that does the same, so that one that fails can be looked
-//! at alone.
+//! A job, and the names by which results know it.
 //!
 //! An id is the first half of SHA-256 over the model version, the scheme of random numbers, and all of solver, recording
-//! and parameters that is not at its default, parameters with their exact bits: never over the place in a grid. So what is
-//! added later changes no id. Contract: pinned by known-answer tests, and so are the defaults.
+//! and parameters that is not at its default, parameters with their exact bits: never over the place in a grid. So keys that
+//! are added later change no id. Contract: pinned by known-answer tests, and so are the defaults.
 
-use super::grid::Sweep;
+use crate::model::selected::Selection;
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
+use crate::sets::AllButSeed;
 use crate::solver::Solver;
 use crate::table::checksum::hexadecimal;
 use crate::table::value::Shortest;
@@ -27,7 +27,7 @@ pub struct Job {
 const ID_BYTES: usize = 16;
 
 /// Keys and values of the solver, as a sweep file writes them: they read back to the same bits.
-fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
+pub(super) fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
     match solver {
         Solver::EventDriven { tolerance, resolve } => vec![
             ("method", "event-driven".to_owned()),
@@ -43,69 +43,26 @@ fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
     }
 }
 
-impl Sweep {
-    /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
-    /// that read back to the same bits.
-    pub fn command(&self, job: &Job) -> String {
-        let mut words = vec!["stickslip simulate".to_owned()];
-        let defaults = Parameters::default();
-        let parameters = Symbol::ALL
-            .into_iter()
-            .map(|symbol| (symbol, job.parameters.get(symbol)));
-        let parameters = parameters
-            .filter(|(symbol, value)| *value != defaults.get(*symbol) && *value != Value::Null);
-        words.extend(parameters.map(|(symbol, value)| format!("--set {}={value}", symbol.key())));
-        // Its default is another there.
-        words.extend(self.recording.slips.map(|slips| format!("--slips {slips}")));
-        // A single job has no control.
-        let defaults = Recording {
-            slips: self.recording.slips,
-            control: self.recording.control,
-            ..Recording::default()
-        };
-        let recording = RecordingKey::ALL
-            .into_iter()
-            .filter(|&key| self.recording.get(key) != defaults.get(key));
-        words.extend(
-            recording.map(|key| format!("--record {}={}", key.key(), self.recording.get(key))),
-        );
-        let defaults = solver_settings(Solver::default());
-        let settings = solver_settings(self.solver)
-            .into_iter()
-            .filter(|setting| !defaults.contains(setting));
-        words.extend(settings.map(|(key, value)| format!("--set {key}={value}")));
-        words.join(" ")
-    }
-}
-
-/// Those of the solver and the recording, but for the longest time, the budget of events and the controls: they change no
-/// job that ends by itself, and always count as the default.
+/// Keys and values of the solver and the recording. The longest time, the budget of events and the controls count as the
+/// default: they change no job that ends by itself.
 pub(super) fn settings(
     solver: Solver,
     recording: &Recording,
 ) -> impl Iterator<Item = (String, String)> + use<> {
     let default = Recording::default();
-    let Recording {
-        max_time,
-        max_events,
-        control,
-        ..
-    } = default;
     let recording = Recording {
-        max_time,
-        max_events,
-        control,
+        max_time: default.max_time,
+        max_events: default.max_events,
+        control: default.control,
         ..*recording
     };
-    let solver = solver_settings(solver)
-        .into_iter()
-        .map(|(key, value)| (format!("solver.{key}"), value));
-    solver.chain(RecordingKey::ALL.map(|key| {
-        (
-            format!("record.{}", key.key()),
-            recording.get(key).to_string(),
-        )
-    }))
+    let solver = solver_settings(solver).into_iter();
+    let solver = solver.map(|(key, value)| (format!("solver.{key}"), value));
+    let record = RecordingKey::ALL.map(|key| {
+        let value = recording.get(key).to_string();
+        (format!("record.{}", key.key()), value)
+    });
+    solver.chain(record)
 }
 
 /// Gives jobs their ids, of 32 hexadecimal characters: all that they share is hashed once.
@@ -130,9 +87,8 @@ impl Identity {
         let mut shared = Sha256::new();
         shared.update(format!("model={model_version}\nrng={rng_scheme}\n"));
         let defaults: Vec<_> = settings(Solver::default(), &Recording::default()).collect();
-        for (key, value) in
-            settings(solver, recording).filter(|setting| !defaults.contains(setting))
-        {
+        let others = settings(solver, recording).filter(|setting| !defaults.contains(setting));
+        for (key, value) in others {
             shared.update(format!("{key}={value}\n"));
         }
         Self { shared }
@@ -145,14 +101,12 @@ impl Identity {
 
     /// The id of the set that such a job belongs to.
     pub fn set(&self, parameters: &Parameters) -> String {
-        self.hash(
-            parameters,
-            Symbol::ALL.split_last().map_or(&[], |(_, others)| others),
-        )
+        self.hash(parameters, AllButSeed::SYMBOLS)
     }
 
     fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> String {
-        let (mut hasher, defaults) = (self.shared.clone(), Parameters::default());
+        let mut hasher = self.shared.clone();
+        let defaults = Parameters::default();
         for &symbol in symbols {
             let value = parameters.get(symbol);
             if value != defaults.get(symbol) {

@@ -4,17 +4,16 @@
 //! sweep file ->  axes, conditions -> points -> jobs -> parts
 //! source.rs      read_axes.rs        grid.rs   job.rs   plan.rs
 //! read.rs        axes.rs                       cost.rs
-//! checks.rs      expression.rs                 memory.rs
+//! checks.rs      expression.rs
 //! controls.rs: the same jobs without modulation
-//! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
-//! set.rs: what is known of a set; labels.rs: how it is called before people
+//! read_rounds.rs -> rounds.rs -> adaptive.rs: an adaptive sweep, which runs in rounds
 //! twins.rs: values that differ in the last digits alone
 //! variation.rs: a file with other values, as text
 //! ```
 //!
-//! Nothing here runs or writes anything. A plan is a function of texts and of what was done before them: the same jobs in
-//! the same order, the same ids, the same parts on every machine. Points are never held: a sweep walks through them, and looks one up
-//! without walking.
+//! Nothing here runs or writes anything. A plan is a function of texts and of the jobs that were done earlier: the same jobs in
+//! the same order, the same ids, the same parts on every machine. Points are never held: a sweep walks through them, and looks
+//! one up without walking.
 
 mod adaptive;
 mod axes;
@@ -24,8 +23,6 @@ mod cost;
 mod expression;
 mod grid;
 mod job;
-mod labels;
-mod memory;
 mod plan;
 mod quantity;
 mod read;
@@ -33,25 +30,23 @@ mod read_axes;
 mod read_rounds;
 mod rounds;
 mod samples;
-mod set;
 mod source;
+mod spelling;
 #[cfg(test)]
 mod tests;
 mod twins;
 mod variation;
 
-pub use cost::predicted_cost;
+pub use cost::{LARGE, certain_memory, predicted_cost, predicted_memory};
 pub use expression::{Expression, ExpressionError};
 pub use grid::Sweep;
 pub use job::{Identity, Job};
-pub use labels::{Digits, Label, capitalised, label, power_of_ten, symbol_of};
-pub use memory::{LARGE, certain_memory, predicted_memory};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{
     Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
 };
-pub use set::{AllButSeed, STATISTICS, SetRow, Statistic};
-pub use source::{Mistake, SweepError, nearest};
+pub use source::{Mistake, SweepError};
+pub use spelling::nearest;
 pub use variation::{Change, varied};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,

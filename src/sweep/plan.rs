@@ -1,19 +1,20 @@
 //! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
 //!
 //! Each sweep that is run in a directory opens an *extension*, which owns its jobs but for those that earlier extensions
-//! keep: what they had done by then. Each round of a sweep that decides for itself is one, too. A *part* is a run of consecutive jobs of an extension, committed together. Parts are
-//! small, so that many workers can share them and little is lost with one, but not many: see [`Extension::new`].
+//! keep: what they had done by then. Each round of an adaptive sweep is one, too. A *part* is a run of consecutive jobs of an
+//! extension, committed together. Parts are small, so that many workers can share them and little is lost with one, but not
+//! many: see [`Extension::new`].
 //! Contract: parts are a function of the texts of the sweeps, of what was done when each began, and of [`PLAN_VERSION`].
 //! Memory: one part. The outlines of all parts, from which single parts are built again, take some 60 bytes each.
 
+use super::cost::{MEMORY_OF_A_SLIP, predicted_memory};
 use super::grid::Sweep;
 use super::job::Job;
-use super::memory::{OF_A_SLIP, predicted_memory};
 use super::rounds::{Round, contains};
 use crate::model::theory::typical_interval;
 use std::ops::{Deref, Range, RangeInclusive};
 
-/// Predicted CPU time of a part, in s, where neither few nor many parts ask for another: little is lost with one.
+/// Predicted CPU time of a part, in s, unless parts would be too few or too many: little is lost with one.
 pub const PART_COST: f64 = 5.0;
 /// Least number of parts of a sweep with jobs of equal cost, if it has as many jobs: enough for some dozens of workers.
 const MIN_PARTS: f64 = if cfg!(test) { 2.0 } else { 64.0 };
@@ -38,7 +39,7 @@ pub struct Extension {
     /// Where in the grid the jobs lie that it keeps, as first and last points of its parts; `None` for the last extension,
     /// which owns all that no earlier one keeps.
     pub kept: Option<Vec<RangeInclusive<u64>>>,
-    /// The round that it is, of a sweep that decides for itself; the jobs of another are all points.
+    /// Its round in an adaptive sweep; in any other sweep, all points are jobs.
     pub round: Option<Round>,
 }
 
@@ -48,7 +49,7 @@ pub struct Plan<'a> {
     extensions: &'a [Extension],
 }
 
-/// A part without its jobs: where they lie, and what they add up to.
+/// A part without its jobs: where they lie, and their sums.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
     /// Number of the extension, from 0.
@@ -82,7 +83,7 @@ impl Deref for Part {
     }
 }
 
-/// What a plan adds up to.
+/// The sums of a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
     pub jobs: u64,
@@ -98,7 +99,7 @@ pub struct Totals {
 
 impl Extension {
     /// Begins an extension. Its parts have a 64th of its predicted cost at most, and mostly 5 s; where that would be too
-    /// many, a 20,000th. A dear job is a part of its own.
+    /// many, a 20,000th. An expensive job is a separate part.
     pub fn new(sweep: &Sweep, earlier: &[Self]) -> Self {
         Self::in_round(sweep, earlier, sweep.first_round())
     }
@@ -110,18 +111,11 @@ impl Extension {
             kept: None,
             round,
         };
-        let total: f64 = own_jobs(&own, earlier, &sweep.points())
-            .map(|job| job.cost)
-            .sum();
-        let least = if own.round.is_some() {
-            ROUND_PART_COST
-        } else {
-            0.0
-        };
-        own.part_cost = PART_COST
-            .max(total / MANY_PARTS)
-            .min(least.max(total / MIN_PARTS))
-            * (1.0 + ROUNDING);
+        let jobs = own_jobs(&own, earlier, &sweep.points());
+        let total: f64 = jobs.map(|job| job.cost).sum();
+        let min = own.round.as_ref().map_or(0.0, |_| ROUND_PART_COST);
+        let max = min.max(total / MIN_PARTS);
+        own.part_cost = PART_COST.max(total / MANY_PARTS).min(max) * (1.0 + ROUNDING);
         own
     }
 
@@ -129,12 +123,10 @@ impl Extension {
         let Some(round) = &self.round else {
             return vec![among.clone()];
         };
-        let from = round
-            .points
-            .partition_point(|range| *range.end() < among.start);
-        let ranges = round.points[from..]
-            .iter()
-            .take_while(|range| *range.start() < among.end);
+        let points = &round.points;
+        let from = points.partition_point(|range| *range.end() < among.start);
+        let ranges = points[from..].iter();
+        let ranges = ranges.take_while(|range| *range.start() < among.end);
         ranges
             .map(|range| among.start.max(*range.start())..among.end.min(range.end() + 1))
             .collect()
@@ -154,15 +146,11 @@ fn own_jobs<'a>(
     among: &Range<u64>,
 ) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
     let is_kept = |extension: &Extension, job: &Job| {
-        extension
-            .sweep
-            .find(&job.parameters)
-            .is_some_and(|point| extension.keeps(point))
+        let point = extension.sweep.find(&job.parameters);
+        point.is_some_and(|point| extension.keeps(point))
     };
-    let jobs = own
-        .points(among)
-        .into_iter()
-        .flat_map(|points| own.sweep.jobs_at(points));
+    let points = own.points(among).into_iter();
+    let jobs = points.flat_map(|points| own.sweep.jobs_at(points));
     jobs.filter(move |job| !earlier.iter().any(|extension| is_kept(extension, job)))
 }
 
@@ -174,18 +162,19 @@ impl<'a> Plan<'a> {
 
     /// The sweeps, those of rounds once.
     pub fn sweeps(self) -> impl Iterator<Item = &'a Sweep> + use<'a> {
-        self.extensions
-            .chunk_by(|left, right| left.sweep.text() == right.sweep.text())
-            .filter_map(|rounds| Some(&rounds.first()?.sweep))
+        let is_same = |left: &Extension, right: &Extension| left.sweep.text() == right.sweep.text();
+        let sweeps = self.extensions.chunk_by(is_same);
+        sweeps.filter_map(|rounds| Some(&rounds.first()?.sweep))
     }
 
     /// The parts of an extension, in order.
     pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
         let own = &self.extensions[extension];
-        let mut source =
-            own_jobs(own, &self.extensions[..extension], &own.sweep.points()).peekable();
+        let earlier = &self.extensions[..extension];
+        let mut source = own_jobs(own, earlier, &own.sweep.points()).peekable();
         let parts = (0..).map_while(move |index| {
-            let (mut jobs, mut cost) = (Vec::new(), 0.0);
+            let mut jobs = Vec::new();
+            let mut cost = 0.0;
             let fits = |jobs: &[Job], cost: f64| {
                 jobs.is_empty() || (jobs.len() < PART_JOBS && cost <= own.part_cost)
             };
@@ -217,17 +206,15 @@ impl<'a> Plan<'a> {
         (0..self.extensions.len()).flat_map(move |extension| self.parts_of(extension))
     }
 
-    /// The outlines of all parts, in order. Each is to be kept: the next time takes as long.
+    /// The outlines of all parts, in order. The caller keeps them: computing them again takes as long.
     pub fn outlines(self) -> impl Iterator<Item = Outline> + Send + use<'a> {
         self.parts().map(|part| part.outline)
     }
 
     /// The part of an outline, whose points alone are walked through.
     pub fn part(self, outline: &Outline) -> Part {
-        let (own, earlier) = (
-            &self.extensions[outline.extension],
-            &self.extensions[..outline.extension],
-        );
+        let own = &self.extensions[outline.extension];
+        let earlier = &self.extensions[..outline.extension];
         let points = *outline.points.start()..outline.points.end() + 1;
         Part {
             outline: outline.clone(),
@@ -235,7 +222,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Where in the grid those parts of an extension lie that are to be kept.
+    /// Where in the grid the parts of an extension lie that are to be kept.
     pub fn ranges(
         self,
         extension: usize,
@@ -255,16 +242,18 @@ impl<'a> Plan<'a> {
         ranges
     }
 
-    /// Walks through the plan and adds up.
+    /// Walks through the plan and sums it up.
     pub fn totals(self) -> Totals {
         self.parts().fold(Totals::default(), |totals, part| {
             let recording = self.extensions[part.extension].sweep.recording();
-            let slips = part
+            let intervals = part
                 .jobs
                 .iter()
-                .map(|job| recording.expected_slips(typical_interval(&job.parameters)));
-            let slips: f64 = slips.sum();
-            let memory_of_slips = OF_A_SLIP * slips;
+                .map(|job| typical_interval(&job.parameters));
+            let slips: f64 = intervals
+                .map(|interval| recording.expected_slips(interval))
+                .sum();
+            let memory_of_slips = MEMORY_OF_A_SLIP * slips;
             Totals {
                 jobs: totals.jobs + part.job_count as u64,
                 parts: totals.parts + 1,

@@ -3,7 +3,7 @@
 //! T = 2πΔ/(η V0) and T = 1/f. Contract: a value that passed [`Quantity::checked`] is canonical, so that equal values
 //! have equal bits.
 
-use super::source::hint;
+use super::spelling::hint;
 use crate::model::{Parameters, Symbol, Value};
 use crate::table::value::Kind;
 use std::f64::consts::TAU;
@@ -35,17 +35,15 @@ impl Quantity {
     }
 
     pub fn all() -> impl Iterator<Item = Self> {
-        Symbol::ALL
-            .into_iter()
-            .map(Self::Parameter)
-            .chain([Self::Eta, Self::Frequency])
+        let parameters = Symbol::ALL.into_iter().map(Self::Parameter);
+        parameters.chain([Self::Eta, Self::Frequency])
     }
 
     pub fn from_key(key: &str) -> Option<Self> {
         Self::all().find(|quantity| quantity.key() == key)
     }
 
-    /// That of a name in a condition.
+    /// The quantity of a name in a condition.
     pub fn comparable(name: &str) -> Result<Self, String> {
         match Self::from_key(name) {
             Some(Self::BREAK_ON) => Err(
@@ -54,7 +52,8 @@ impl Quantity {
             Some(quantity) => Ok(quantity),
             None => {
                 let numbers = Self::all().filter(|quantity| *quantity != Self::BREAK_ON);
-                let hint = hint(name, &numbers.map(Self::key).collect::<Vec<_>>());
+                let keys: Vec<&str> = numbers.map(Self::key).collect();
+                let hint = hint(name, &keys);
                 Err(format!("\"{name}\" is not a known quantity; {hint}"))
             }
         }
@@ -66,6 +65,14 @@ impl Quantity {
             self,
             Self::Parameter(Symbol::T) | Self::Eta | Self::Frequency
         )
+    }
+
+    /// Whether it belongs to the modulation.
+    pub const fn is_of_modulation(self) -> bool {
+        match self {
+            Self::Parameter(symbol) => symbol.is_of_modulation(),
+            Self::Eta | Self::Frequency => true,
+        }
     }
 
     /// The period T in s that a value of a quantity that fixes it leads to. Monotonic in the value.
@@ -97,10 +104,10 @@ impl Quantity {
     pub fn checked(self, value: Value) -> Option<Value> {
         match self {
             Self::Parameter(symbol) => symbol.checked(value),
-            Self::Eta | Self::Frequency => value
-                .number()
-                .filter(|number| DERIVABLE.contains(number))
-                .map(Value::Real),
+            Self::Eta | Self::Frequency => {
+                let number = value.number()?;
+                DERIVABLE.contains(&number).then_some(Value::Real(number))
+            }
         }
     }
 }
@@ -141,45 +148,34 @@ impl Point {
 
     /// Whether every quantity behind a derived period, and the period, is far from the ends of the doubles.
     pub fn period_is_derivable(&self) -> bool {
-        let Parameters {
-            modulation_amplitude,
-            drive_velocity,
-            modulation_period,
-            ..
-        } = self.parameters;
-        match (self.fixes_period, modulation_period) {
+        let parameters = &self.parameters;
+        match (self.fixes_period, parameters.modulation_period) {
             (Some((Quantity::Eta, _)), Some(period)) => {
-                [modulation_amplitude, drive_velocity, period]
-                    .iter()
-                    .all(|value| DERIVABLE.contains(value))
+                DERIVABLE.contains(&period)
+                    && DERIVABLE.contains(&parameters.modulation_amplitude)
+                    && DERIVABLE.contains(&parameters.drive_velocity)
             }
             _ => true,
         }
     }
 
-    /// A quantity of a canonical point as a number, not one for a word. Without modulation η and the frequency are 0 and
-    /// T is infinite. What an axis set is given back as it was set.
+    /// A quantity of a canonical point as a number; NaN for a word. Without modulation η and the frequency are 0 and T is
+    /// infinite. What an axis has set is returned unchanged.
     pub fn number(&self, quantity: Quantity) -> f64 {
+        let parameters = &self.parameters;
         match (quantity, self.fixes_period) {
             (_, Some((fixing, value))) if fixing == quantity && self.is_modulated() => value,
             (Quantity::Eta, _) => {
-                let Parameters {
-                    modulation_amplitude,
-                    drive_velocity,
-                    ..
-                } = self.parameters;
-                self.parameters.modulation_frequency() * modulation_amplitude / drive_velocity
+                parameters.modulation_frequency() * parameters.modulation_amplitude
+                    / parameters.drive_velocity
             }
-            (Quantity::Frequency, _) => self
-                .parameters
+            (Quantity::Frequency, _) => parameters
                 .modulation_period
                 .map_or(0.0, |period| 1.0 / period),
             (Quantity::Parameter(Symbol::T), _) => {
-                self.parameters.modulation_period.unwrap_or(f64::INFINITY)
+                parameters.modulation_period.unwrap_or(f64::INFINITY)
             }
-            (Quantity::Parameter(symbol), _) => {
-                self.parameters.get(symbol).number().unwrap_or(f64::NAN)
-            }
+            (Quantity::Parameter(symbol), _) => parameters.get(symbol).number().unwrap_or(f64::NAN),
         }
     }
 }

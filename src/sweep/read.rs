@@ -1,7 +1,7 @@
 //! Sweep files: strict TOML in, a valid [`Sweep`] out.
 //!
 //! Whatever is unknown, impossible, contradictory or without effect is refused with file, line, key, value and the way
-//! out. Sections and entries are all read, whatever was refused before; the sweep as a whole is checked if nothing was.
+//! out. All sections and entries are read, whatever was refused before; the sweep as a whole is checked if nothing was.
 //! Contract: every job of a sweep that was read has valid parameters (see `checks.rs`), and there is at least one.
 
 use super::axes::{Axis, Column};
@@ -13,7 +13,7 @@ use super::plan::PLAN_VERSION;
 use super::quantity::Quantity;
 use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
-use super::rounds::{MAX_SETS, Rounds};
+use super::rounds::Rounds;
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
 use crate::model::Parameters;
 use crate::observe::{Recording, RecordingKey};
@@ -51,7 +51,18 @@ impl Sweep {
     }
 }
 
-/// Reads all of a file, as far as it goes.
+const SECTIONS: [&str; 8] = [
+    "name",
+    "where",
+    "model",
+    "axes",
+    "record",
+    "solver",
+    "precision",
+    "refine",
+];
+
+/// Reads the whole file, also past mistakes.
 fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, Refused> {
     let table = source.table()?;
     let file = Section {
@@ -60,125 +71,105 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         at: 0,
         table: &table,
     };
-    file.only(&[
-        "name",
-        "where",
-        "model",
-        "axes",
-        "record",
-        "solver",
-        "precision",
-        "refine",
-    ])
-    .ok();
-    let name = read_name(&file);
+    file.only(&SECTIONS).ok();
     let mut places = Places::new(source);
-    let model = read_section(&file, "model", "[model]", |model| {
-        read_model(model, &mut places)
-    });
-    let wanted = read_section(&file, "refine", "[refine]", |refine| {
-        read_refinement(refine).map(Some)
-    });
-    let axes = read_section(&file, "axes", "[axes]", |axes| {
-        read_axes::read(axes, &mut places)
-    });
-    let precision = read_section(&file, "precision", "[precision]", |precision| {
-        read_precision(precision).map(Some)
-    });
-    let (key, title) = if file.entry("refine").is_some() {
-        ("refine", "[refine]")
-    } else {
-        ("precision", "[precision]")
-    };
-    let seeds = read_section(&file, key, title, |section| {
-        read_seeds(section, &mut places).map(Some)
-    });
-    if let (Some(_), Some(precision)) = (file.entry("refine"), file.entry("precision")) {
-        let problem = "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
-        source.refuse(precision.at, problem);
-    }
-    let rounds = file.entry(key).filter(|_| is_new).map(|_| title);
+    let name = read_name(&file);
+    let model = read_section(&file, "[model]", |model| read_model(model, &mut places));
+    let axes = read_section(&file, "[axes]", |axes| read_axes::read(axes, &mut places));
+    let recording = read_section(&file, "[record]", read_recording);
+    let solver = read_section(&file, "[solver]", read_solver);
+    let (base, period) = model.unwrap_or_default();
+    let mut axes = axes.map(|axes| period.into_iter().chain(axes).collect::<Vec<Axis>>());
+    let rounds = read_rounds(&file, &mut axes, &mut places);
+    let title = rounds_title(&file).filter(|_| is_new);
     let conditions = file
         .entry("where")
-        .map_or(Ok(Vec::new()), |entry| read_conditions(&entry, rounds));
-    let recording = read_section(&file, "record", "[record]", read_recording);
-    let solver = read_section(&file, "solver", "[solver]", read_solver);
+        .map_or(Ok(Vec::new()), |entry| read_conditions(&entry, title));
     source.passed()?;
-    let ((base, period), recording, solver) = (model?, recording?, solver?);
-    let (wanted, precision) = (wanted?, precision?);
-    let mut axes: Vec<Axis> = period.into_iter().chain(axes?).collect();
-    let swept = || file.entry("axes").and_then(|entry| entry.section("[axes]"));
-    let refinement = wanted
-        .as_ref()
-        .map(|wanted| wanted.over(&mut axes, swept()))
-        .transpose()?;
-    let rounds = |(seeds, asked, axis)| {
-        (
-            Rounds {
-                seeds,
-                asked,
-                precision,
-                refinement,
-            },
-            axis,
-        )
-    };
-    let (rounds, seeds) = seeds?.map(rounds).unzip();
-    let axes = axes.into_iter().chain(seeds).collect();
-    let identity = Identity::new(solver, &recording);
-    let (name, conditions, text) = (name?, conditions?, source.text.to_owned());
+    let recording = recording?;
+    let solver = solver?;
     let mut sweep = Sweep {
-        name,
-        text,
+        name: name?,
+        text: source.text.to_owned(),
         base,
-        axes,
-        conditions,
+        axes: axes?,
+        conditions: conditions?,
         recording,
         solver,
-        identity,
-        rounds,
+        identity: Identity::new(solver, &recording),
+        rounds: rounds?,
         controls: None,
         needed: None,
         plan_version,
     };
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places, is_new)?;
-    if let Some(Rounds { seeds, .. }) = &sweep.rounds {
-        let sets = sweep.first_sets().len() as u64;
-        if sets > MAX_SETS {
-            let problem = format!(
-                "[axes]: {sets} sets; a sweep with rounds has at most {MAX_SETS}; take several sweeps"
-            );
-            return Err(source.refuse(file.place_of("axes"), problem));
-        }
-        let least = sets * seeds.start();
-        if let Some(wanted) = wanted
-            .as_ref()
-            .filter(|wanted| wanted.refinement.max_jobs < least)
-        {
-            return Err(wanted
-                .jobs
-                .must_be(&format!("at least the {least} of the first round")));
-        }
-    }
+    checks::rounds(&sweep, &file)?;
     Ok(sweep)
+}
+
+/// The section that makes a sweep adaptive.
+fn rounds_title(file: &Section<'_>) -> Option<&'static str> {
+    let mut titles = ["[refine]", "[precision]"].into_iter();
+    titles.find(|title| file.entry(key_of(title)).is_some())
+}
+
+/// Reads `[precision]` or `[refine]`, and adds the axis of the seeds that it chooses.
+fn read_rounds(
+    file: &Section<'_>,
+    axes: &mut Result<Vec<Axis>, Refused>,
+    places: &mut Places<'_>,
+) -> Result<Option<Rounds>, Refused> {
+    let Some(title) = rounds_title(file) else {
+        return Ok(None);
+    };
+    let precision = optional_section(file, "[precision]", read_precision);
+    let refinement = optional_section(file, "[refine]", |refine| {
+        read_refinement(refine, file, axes)
+    });
+    let seeds = optional_section(file, title, |section| read_seeds(section, places))?;
+    if let (Some(_), Some(precision)) = (file.entry("refine"), file.entry("precision")) {
+        let problem = "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
+        return Err(file.source.refuse(precision.at, problem));
+    }
+    let Some((rounds, axis)) = seeds else {
+        return Ok(None);
+    };
+    if let Ok(axes) = axes {
+        axes.push(axis);
+    }
+    Ok(Some(Rounds {
+        precision: precision?,
+        refinement: refinement?,
+        ..rounds
+    }))
 }
 
 /// Reads a table of the file, or takes the default if there is none.
 fn read_section<'a, T: Default>(
     file: &Section<'a>,
-    key: &str,
     title: &'static str,
     read: impl FnOnce(&Section<'a>) -> Result<T, Refused>,
 ) -> Result<T, Refused> {
-    match file.entry(key) {
-        None => Ok(T::default()),
-        Some(entry) => read(
-            &entry
-                .section(title)
-                .ok_or_else(|| entry.must_be(&format!("a table {title}")))?,
-        ),
-    }
+    Ok(optional_section(file, title, read)?.unwrap_or_default())
+}
+
+/// The key of a table with this title.
+fn key_of(title: &str) -> &str {
+    title.trim_matches(['[', ']'])
+}
+
+fn optional_section<'a, T>(
+    file: &Section<'a>,
+    title: &'static str,
+    read: impl FnOnce(&Section<'a>) -> Result<T, Refused>,
+) -> Result<Option<T>, Refused> {
+    let Some(entry) = file.entry(key_of(title)) else {
+        return Ok(None);
+    };
+    let section = entry.section(title);
+    let section = section.ok_or_else(|| entry.must_be(&format!("a table {title}")))?;
+    read(&section).map(Some)
 }
 
 fn read_name(file: &Section<'_>) -> Result<String, Refused> {
@@ -217,7 +208,8 @@ fn read_model(
     places: &mut Places<'_>,
 ) -> Result<(Parameters, Option<Axis>), Refused> {
     let keys: Vec<&str> = Quantity::all().map(Quantity::key).collect();
-    let (mut parameters, mut period) = (Parameters::default(), None);
+    let mut parameters = Parameters::default();
+    let mut period = None;
     all(model.entries().iter().map(|entry| {
         let quantity =
             Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
@@ -293,7 +285,8 @@ fn read_solver(solver: &Section<'_>) -> Result<Solver, Refused> {
             let Solver::EventDriven { tolerance, resolve } = Solver::default() else {
                 unreachable!("the default is event-driven")
             };
-            let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
+            let min = TOLERANCES.start();
+            let max = TOLERANCES.end();
             let allowed = format!("a number from {min:e} to {max:e}, relative to fs/k");
             let fits = |tolerance| TOLERANCES.contains(&tolerance);
             let tolerance = solver

@@ -33,9 +33,8 @@ pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec
             "sobol" => ("[axes.sobol]", read_sample),
             _ => return Ok(vec![read_single(entry, places)?]),
         };
-        all(tables(entry, title)?
-            .iter()
-            .map(|table| read(table, places)))
+        let tables = tables(entry, title)?;
+        all(tables.iter().map(|table| read(table, places)))
     }));
     Ok(axes?.into_iter().flatten().collect())
 }
@@ -43,11 +42,8 @@ pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec
 /// One table, or the tables of a list.
 fn tables<'a>(entry: &Entry<'a>, title: &'static str) -> Result<Vec<Section<'a>>, Refused> {
     let entries = entry.list().unwrap_or_else(|| vec![*entry]);
-    let table = |entry: &Entry<'a>| {
-        entry
-            .section(title)
-            .ok_or_else(|| entry.must_be(&format!("a table {title} or several, [{title}]")))
-    };
+    let form = format!("a table {title} or several, [{title}]");
+    let table = |entry: &Entry<'a>| entry.section(title).ok_or_else(|| entry.must_be(&form));
     all(entries.iter().map(table))
 }
 
@@ -59,10 +55,8 @@ fn known(
     places: &mut Places<'_>,
 ) -> Result<Quantity, Refused> {
     let quantity = Quantity::from_key(entry.key).ok_or_else(|| {
-        let allowed: Vec<&str> = Quantity::all()
-            .map(Quantity::key)
-            .chain(also.iter().copied())
-            .collect();
+        let keys = Quantity::all().map(Quantity::key);
+        let allowed: Vec<&str> = keys.chain(also.iter().copied()).collect();
         entry.unknown(title, &allowed)
     })?;
     places.set(quantity, entry.at, title);
@@ -87,7 +81,8 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refus
     };
     Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
         let (value, at) = values[later];
-        let (earlier, later) = (earlier + 1, later + 1);
+        let earlier = earlier + 1;
+        let later = later + 1;
         let problem = format!(
             "{} = {value}: repeats value {earlier} of this axis as value {later}; keep one, or take fewer points",
             entry.key
@@ -107,30 +102,22 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
                 "an axis has at most {MAX_ROWS} listed values; split it into two axes"
             )));
         }
-        return list
-            .iter()
-            .map(|value| Ok((read_value(value, quantity)?, value.at)))
-            .collect();
+        let read = |value: &Entry<'_>| Ok((read_value(value, quantity)?, value.at));
+        return list.iter().map(read).collect();
     }
-    match read_count(entry, quantity)? {
-        Some((_, count)) if count > MAX_ROWS => {
+    if let Some((first, count)) = read_count(entry, quantity)? {
+        if count > MAX_ROWS {
             let key = quantity.key();
             return Err(entry.refuse(format!(
-                "a zip has at most {MAX_ROWS} rows; make {key} an axis of its own"
+                "a zip has at most {MAX_ROWS} rows; make {key} a separate axis"
             )));
         }
-        Some((first, count)) => {
-            return Ok((first..first + count)
-                .map(|value| (Value::Count(value), entry.at))
-                .collect());
-        }
-        None => {}
+        let values = (first..first + count).map(Value::Count);
+        return Ok(values.map(|value| (value, entry.at)).collect());
     }
     let (range, points) = read_spaced(entry, quantity)?;
-    Ok(range
-        .spaced(points)
-        .map(|value| (ranged(quantity, value), entry.at))
-        .collect())
+    let values = range.spaced(points).map(|value| ranged(quantity, value));
+    Ok(values.map(|value| (value, entry.at)).collect())
 }
 
 /// Reads a range of an axis, and the number of its values.
@@ -146,22 +133,18 @@ pub(super) fn read_spaced(entry: &Entry<'_>, quantity: Quantity) -> Result<(Rang
     let range = read_range(&table, quantity)?.ok_or_else(|| entry.must_be(AXIS_FORMS))?;
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.
-    let points = table
-        .required("points", &format!("write {RANGE_FORMS}"))?
-        .count(2, MAX_ROWS)?;
-    Ok((range, points))
+    let points = table.required("points", &format!("write {RANGE_FORMS}"))?;
+    Ok((range, points.count(2, MAX_ROWS)?))
 }
 
 /// The axis of a range with this many values; `None` if two of these are one.
 pub(super) fn spaced(range: &Range, points: u64, quantity: Quantity) -> Option<Axis> {
-    let values = range
-        .spaced(points)
-        .map(|value| ranged(quantity, value))
-        .collect();
+    let values = range.spaced(points).map(|value| ranged(quantity, value));
+    let values = values.collect();
     Axis::table(vec![Column { quantity, values }]).ok()
 }
 
-/// Reads the first of counted values and their number; none if the entry has another form.
+/// Reads the first of counted values and their number; `None` if the entry has another form.
 fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)>, Refused> {
     let Some(table) = entry.section("an axis") else {
         return Ok(None);
@@ -178,9 +161,8 @@ fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)
     // Far above any seed: the last value is checked below.
     let max = 1 << 53;
     let count = count.count(1, max)?;
-    let first = table
-        .entry("first")
-        .map_or(Ok(0), |first| first.count(0, max))?;
+    let first = table.entry("first");
+    let first = first.map_or(Ok(0), |first| first.count(0, max))?;
     for value in [first, first + count - 1] {
         if quantity.checked(Value::Count(value)).is_none() {
             let problem = format!(
@@ -196,15 +178,14 @@ fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)
 
 /// Reads one value of a quantity, as a list or `[model]` gives it.
 pub(super) fn read_value(entry: &Entry<'_>, quantity: Quantity) -> Result<Value, Refused> {
-    let hint = if entry.node.get_ref().is_array() || entry.node.get_ref().is_table() {
+    let node = entry.node.get_ref();
+    let hint = if node.is_array() || node.is_table() {
         "; several values belong in [axes]"
     } else {
         ""
     };
-    entry
-        .value()
-        .and_then(|value| quantity.checked(value))
-        .ok_or_else(|| entry.must_be(&format!("{}{hint}", quantity.allowed())))
+    let value = entry.value().and_then(|value| quantity.checked(value));
+    value.ok_or_else(|| entry.must_be(&format!("{}{hint}", quantity.allowed())))
 }
 
 fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, Refused> {
@@ -222,16 +203,11 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
         return Err(entry.refuse("break_on is a word and has no range; list its values"));
     }
     let end = |entry: &Entry<'_>| {
-        let problem = format!(
-            "must be {} ({} of {})",
-            quantity.allowed(),
-            entry.key,
-            quantity.key()
-        );
+        let allowed = quantity.allowed();
+        let problem = format!("must be {allowed} ({} of {})", entry.key, quantity.key());
         let value = entry.value().and_then(|value| quantity.checked(value));
-        value
-            .and_then(Value::number)
-            .ok_or_else(|| entry.refuse(problem))
+        let number = value.and_then(Value::number);
+        number.ok_or_else(|| entry.refuse(problem))
     };
     let range = Range {
         low: end(low)?,
@@ -261,21 +237,20 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
     let entries = table.entries();
     let columns = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &[], places)?;
-        let values = read_values(entry, quantity)?
-            .into_iter()
-            .map(|(value, _)| value)
-            .collect();
+        let values = read_values(entry, quantity)?.into_iter();
+        let values = values.map(|(value, _)| value).collect();
         Ok(Column { quantity, values })
     }))?;
     let [first, _, ..] = columns.as_slice() else {
-        let problem = "zip: needs at least two columns that move together; a single one is an axis of its own";
+        let problem =
+            "zip: needs at least two columns that move together; a single one is a separate axis";
         return Err(table.source.refuse(table.at, problem));
     };
-    let (key, expected) = (first.quantity.key(), first.values.len());
-    let lengths = entries
-        .iter()
-        .zip(columns.iter().map(|column| column.values.len()));
-    if let Some((entry, length)) = lengths.into_iter().find(|(_, length)| *length != expected) {
+    let key = first.quantity.key();
+    let expected = first.values.len();
+    let lengths = columns.iter().map(|column| column.values.len());
+    let mut lengths = entries.iter().zip(lengths);
+    if let Some((entry, length)) = lengths.find(|(_, length)| *length != expected) {
         let problem = format!(
             "has {length} values, {key} has {expected}: columns of a zip have equal length"
         );
@@ -288,24 +263,19 @@ fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Ref
     const SETTINGS: [&str; 2] = ["points", "seed"];
     let points = table.required("points", "the number of points of the sample");
     let points = points.and_then(|points| points.count(1, MAX_SAMPLE));
-    let seed = table
-        .entry("seed")
-        .map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)));
-    let entries: Vec<Entry<'_>> = table
-        .entries()
-        .into_iter()
-        .filter(|entry| !SETTINGS.contains(&entry.key))
-        .collect();
+    let seed = table.entry("seed");
+    let seed = seed.map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)));
+    let mut entries = table.entries();
+    entries.retain(|entry| !SETTINGS.contains(&entry.key));
     let ranges = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &SETTINGS, places)?;
+        let wrong_form = || entry.must_be(SAMPLE_FORMS);
         let form = entry
             .section("a range of a sample")
-            .ok_or_else(|| entry.must_be(SAMPLE_FORMS))?;
+            .ok_or_else(wrong_form)?;
         form.only(&["linear", "log"])?;
-        Ok((
-            quantity,
-            read_range(&form, quantity)?.ok_or_else(|| entry.must_be(SAMPLE_FORMS))?,
-        ))
+        let range = read_range(&form, quantity)?.ok_or_else(wrong_form)?;
+        Ok((quantity, range))
     }))?;
     if ranges.is_empty() {
         let problem = format!(
@@ -314,7 +284,9 @@ fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Ref
         );
         return Err(table.source.refuse(table.at, problem));
     }
-    let [points, seed] = [points?, seed?].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
+    let number = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
+    let points = number(points?);
+    let seed = number(seed?);
     let columns = (0..).zip(ranges).map(|(dimension, (quantity, range))| {
         let coordinates = sobol(dimension, points, seed);
         let values = coordinates.map(|x| ranged(quantity, range.at(x)));
@@ -329,9 +301,12 @@ fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Ref
 /// The axis of a zip or a sample.
 fn of_columns(table: &Section<'_>, columns: Vec<Column>) -> Result<Axis, Refused> {
     Axis::table(columns).map_err(|Repeated { earlier, later }| {
-        let (title, earlier, later) = (table.title, earlier + 1, later + 1);
-        let problem =
-            format!("{title}: row {later} repeats row {earlier} (counted from 1); keep one, or take fewer points");
+        let problem = format!(
+            "{}: row {} repeats row {} (counted from 1); keep one, or take fewer points",
+            table.title,
+            later + 1,
+            earlier + 1
+        );
         table.source.refuse(table.at, problem)
     })
 }

@@ -14,18 +14,18 @@
 //! jobs      = 4000                   at most
 //! ```
 //!
-//! When all is read, the axis of `[refine]` becomes as fine as it wants.
+//! The axis of `[refine]` becomes as fine as its `to`.
 
 use super::axes::{Axis, MAX_ROWS};
 use super::checks::Places;
 use super::quantity::Quantity;
 use super::read_axes::{read_spaced, spaced};
-use super::rounds::{MAX_JOBS, MIN_SEEDS, Precision, Refinement, Target};
-use super::set::{STATISTICS, Statistic};
-use super::source::{Entry, Refused, Section, all, hint};
+use super::rounds::{MAX_JOBS, MIN_SEEDS, Precision, Refinement, Rounds, Target};
+use super::source::{Entry, Refused, Section, all};
+use super::spelling::hint;
 use crate::model::Symbol;
+use crate::sets::{STATISTICS, Statistic};
 use crate::table::value::Shortest;
-use std::ops::RangeInclusive;
 
 /// Share of the intervals at which the edge of a tongue lies, if nothing is said.
 const HALF: f64 = 0.5;
@@ -33,17 +33,10 @@ const HALF: f64 = 0.5;
 /// Reads `[precision]` without its seeds.
 pub(super) fn read_precision(section: &Section<'_>) -> Result<Precision, Refused> {
     section.only(&["of", "relative", "absolute", "seeds"]).ok();
-    let of = section.required(
-        "of",
-        "the statistic that is to be precise, such as of = \"tau_mean\"",
-    );
-    let statistics = of.and_then(|of| {
-        read_statistics(
-            &of,
-            |known| known.has_interval,
-            "has no confidence interval; allowed are ",
-        )
-    });
+    let need = "the statistic that is to be precise, such as of = \"tau_mean\"";
+    let of = section.required("of", need);
+    let problem = "has no confidence interval; allowed are ";
+    let statistics = of.and_then(|of| read_statistics(&of, |known| known.has_interval, problem));
     let target = read_target(section, statistics.as_deref().unwrap_or_default());
     Ok(Precision {
         statistics: statistics?,
@@ -51,11 +44,11 @@ pub(super) fn read_precision(section: &Section<'_>) -> Result<Precision, Refused
     })
 }
 
-/// Seeds of a set in the first round and at most, those in the first round as they were asked for, and the axis of all.
-pub(super) type Seeds = (RangeInclusive<u64>, u64, Axis);
-
-/// Reads the seeds of `[precision]` or `[refine]`.
-pub(super) fn read_seeds(section: &Section<'_>, places: &mut Places<'_>) -> Result<Seeds, Refused> {
+/// Reads the seeds of `[precision]` or `[refine]`, and makes the axis of all of them.
+pub(super) fn read_seeds(
+    section: &Section<'_>,
+    places: &mut Places<'_>,
+) -> Result<(Rounds, Axis), Refused> {
     let form = "seeds of a set at first and at most, such as { from = 24, to = 256 }";
     let entry = section.required("seeds", "write seeds = { from = 24, to = 256 }")?;
     places.set(Quantity::SEED, entry.at, section.title);
@@ -63,22 +56,24 @@ pub(super) fn read_seeds(section: &Section<'_>, places: &mut Places<'_>) -> Resu
     table.only(&["first", "from", "to"])?;
     let asked = table.required("from", form)?.count(2, MAX_ROWS)?;
     let to = table.required("to", form)?;
-    let most = to.count(2, MAX_ROWS)?;
-    if most < asked {
+    let max = to.count(2, MAX_ROWS)?;
+    if max < asked {
         return Err(to.must_be(&format!("at least from, which is {asked}")));
     }
-    let first = table
-        .entry("first")
-        .map_or(Ok(0), |first| first.count(0, u64::from(u32::MAX)))?;
-    Ok((
-        asked.max(MIN_SEEDS.min(most))..=most,
+    let first = table.entry("first");
+    let first = first.map_or(Ok(0), |first| first.count(0, u64::from(u32::MAX)))?;
+    let rounds = Rounds {
+        seeds: asked.max(MIN_SEEDS.min(max))..=max,
         asked,
-        Axis::Counted {
-            symbol: Symbol::Seed,
-            first,
-            count: most,
-        },
-    ))
+        precision: None,
+        refinement: None,
+    };
+    let axis = Axis::Counted {
+        symbol: Symbol::Seed,
+        first,
+        count: max,
+    };
+    Ok((rounds, axis))
 }
 
 /// Reads a statistic that is allowed, or a list of such; `problem` is what is wrong with others, before those that are.
@@ -87,23 +82,17 @@ fn read_statistics(
     is_allowed: fn(Statistic) -> bool,
     problem: &str,
 ) -> Result<Vec<Statistic>, Refused> {
-    let known: Vec<&str> = STATISTICS
-        .iter()
-        .filter(|known| is_allowed(**known))
-        .map(|known| known.key)
-        .collect();
+    let allowed = STATISTICS.iter().filter(|known| is_allowed(**known));
+    let keys: Vec<&str> = allowed.map(|known| known.key).collect();
+    let list = keys.join(", ");
     let entries = entry.list().unwrap_or_else(|| vec![*entry]);
     let statistics = all(entries.iter().map(|entry| {
-        let word = entry.word().ok_or_else(|| {
-            entry.must_be(&format!(
-                "a statistic in quotes, or a list of them: {}",
-                known.join(", ")
-            ))
-        })?;
+        let form = format!("a statistic in quotes, or a list of them: {list}");
+        let word = entry.word().ok_or_else(|| entry.must_be(&form))?;
         match Statistic::from_key(word) {
             Some(statistic) if is_allowed(statistic) => Ok(statistic),
-            Some(_) => Err(entry.refuse(format!("{problem}{}", known.join(", ")))),
-            None => Err(entry.refuse(format!("is no statistic of a set; {}", hint(word, &known)))),
+            Some(_) => Err(entry.refuse(format!("{problem}{list}"))),
+            None => Err(entry.refuse(format!("is no statistic of a set; {}", hint(word, &keys)))),
         }
     }))?;
     if statistics.is_empty() {
@@ -139,63 +128,42 @@ fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refuse
                     "the statistics in of have different units; set relative, or keep one of them",
                 ));
             }
-            Ok(Target::Absolute(entry.positive(if unit.is_empty() {
+            let unit = if unit.is_empty() {
                 "the unit of a pure number"
             } else {
                 unit
-            })?))
+            };
+            Ok(Target::Absolute(entry.positive(unit)?))
         }
     }
 }
 
-/// `[refine]` without its seeds, before its axis is found.
-pub(super) struct Wanted<'a> {
-    quantity: Quantity,
-    axis: Entry<'a>,
-    to: Entry<'a>,
-    pub jobs: Entry<'a>,
-    pub refinement: Refinement,
-}
-
-pub(super) fn read_refinement<'a>(section: &Section<'a>) -> Result<Wanted<'a>, Refused> {
-    section
-        .only(&["axis", "by", "value", "threshold", "to", "seeds", "jobs"])
-        .ok();
-    let axis = section.required(
-        "axis",
-        "the axis along which edges are looked for, such as axis = \"Delta\"",
-    );
+/// Reads `[refine]` without its seeds, and makes its axis, one of these, as fine as is wanted.
+pub(super) fn read_refinement(
+    section: &Section<'_>,
+    file: &Section<'_>,
+    axes: &mut Result<Vec<Axis>, Refused>,
+) -> Result<Refinement, Refused> {
+    let keys = ["axis", "by", "value", "threshold", "to", "seeds", "jobs"];
+    section.only(&keys).ok();
+    let need = "the axis along which edges are looked for, such as axis = \"Delta\"";
+    let axis = section.required("axis", need);
     let quantity = axis.and_then(|entry| read_refinable(&entry));
-    let by = section.required(
-        "by",
-        "what crosses the threshold, such as by = \"resultant_length\"",
-    );
+    let need = "what crosses the threshold, such as by = \"resultant_length\"";
+    let by = section.required("by", need);
     let by = by.and_then(|entry| read_by(section, &entry));
-    let to_entry = section.required(
-        "to",
-        "the largest width of the interval of an edge, such as to = 0.03",
-    );
+    let need = "the largest width of the interval of an edge, such as to = 0.03";
+    let to_entry = section.required("to", need);
     let to = to_entry.and_then(|entry| entry.number("a finite number > 0", |to| to > 0.0));
     let jobs = section.required("jobs", "the most jobs of the sweep, such as jobs = 4000");
     let max_jobs = jobs.and_then(|entry| entry.count(1, MAX_JOBS));
-    let ((by, periods, threshold), to, max_jobs) = (by?, to?, max_jobs?);
-    let refinement = Refinement {
-        axis: 0,
-        levels: 0,
-        is_log: false,
-        by,
-        periods,
-        threshold,
-        to,
-        max_jobs,
+    let wanted = Refinement {
+        to: to?,
+        max_jobs: max_jobs?,
+        ..by?
     };
-    Ok(Wanted {
-        quantity: quantity?,
-        axis: axis?,
-        to: to_entry?,
-        jobs: jobs?,
-        refinement,
-    })
+    let axes = axes.as_mut().map_err(|refused| *refused)?;
+    refined(wanted, quantity?, axis?, to_entry?, file, axes)
 }
 
 fn read_refinable(entry: &Entry<'_>) -> Result<Quantity, Refused> {
@@ -214,102 +182,93 @@ fn read_refinable(entry: &Entry<'_>) -> Result<Quantity, Refused> {
     }
 }
 
-/// The statistics, the number of periods if their share is asked for, and the threshold.
-fn read_by(
-    section: &Section<'_>,
-    entry: &Entry<'_>,
-) -> Result<(Vec<Statistic>, Option<u64>, f64), Refused> {
+/// Reads the statistics, the number of periods if their share is asked for, and the threshold.
+fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<Refinement, Refused> {
     let threshold = section
         .entry("threshold")
         .map(|entry| entry.number("a finite number", |_| true))
         .transpose();
     if entry.word() == Some("periods") {
-        let value = section.required(
-            "value",
-            "the n of tau = n T, of which the share of intervals is taken",
-        );
+        let need = "the n of tau = n T, of which the share of intervals is taken";
+        let value = section.required("value", need);
         let value = value.and_then(|value| value.count(0, MAX_ROWS));
-        return Ok((
-            Statistic::from_key("periods").into_iter().collect(),
-            Some(value?),
-            threshold?.unwrap_or(HALF),
-        ));
+        return Ok(Refinement {
+            by: Statistic::from_key("periods").into_iter().collect(),
+            periods: Some(value?),
+            threshold: threshold?.unwrap_or(HALF),
+            ..Refinement::default()
+        });
     }
-    let statistics = read_statistics(
-        entry,
-        Statistic::can_cross,
-        "crosses no threshold; allowed are periods, ",
-    )?;
+    let problem = "crosses no threshold; allowed are periods, ";
+    let by = read_statistics(entry, Statistic::can_cross, problem)?;
     if let Some(value) = section.entry("value") {
         return Err(value.refuse("belongs to by = \"periods\"; remove it"));
     }
-    section.required(
-        "threshold",
-        "the value that is crossed, such as threshold = 0.5",
-    )?;
-    Ok((statistics, None, threshold?.unwrap_or_default()))
+    let need = "the value that is crossed, such as threshold = 0.5";
+    section.required("threshold", need)?;
+    Ok(Refinement {
+        by,
+        threshold: threshold?.unwrap_or_default(),
+        ..Refinement::default()
+    })
 }
 
-impl Wanted<'_> {
-    /// Finds its axis among these, which the section has, and makes it as fine as is wanted.
-    pub fn over(
-        &self,
-        axes: &mut [Axis],
-        section: Option<Section<'_>>,
-    ) -> Result<Refinement, Refused> {
-        let axis = axes
-            .iter()
-            .position(|axis| axis.quantities() == [self.quantity]);
-        let entry = section
-            .and_then(|axes| axes.entry(self.quantity.key()))
-            .filter(|entry| entry.list().is_none());
-        let Some((axis, entry)) = axis.zip(entry) else {
-            let problem = "has no range of its own in [axes], and only there are values in between; write it there as \
-                           { linear = [low, high], points = n }, or log";
-            return Err(self.axis.refuse(problem));
-        };
-        let (range, points) = read_spaced(&entry, self.quantity)?;
-        // Of an axis with 2^level steps in place of each.
-        let step = |level: u32| {
-            let steps = (points - 1) as f64 * f64::from(level).exp2();
-            if range.logarithmic {
-                libm::expm1(libm::log(range.high / range.low) / steps)
-            } else {
-                (range.high - range.low) / steps
-            }
-        };
-        let to = self.refinement.to;
-        if to >= step(0) {
-            let what = if range.logarithmic {
-                "as a share of the value"
-            } else {
-                "the step of the axis in [axes]"
-            };
-            return Err(self
-                .to
-                .must_be(&format!("finer than {}, {what}", Shortest(step(0)))));
-        }
-        let levels = (1..u64::BITS).find(|&level| step(level) <= to * (1.0 + ROUNDING));
-        let fine =
-            levels.and_then(|level| Some((level, (points - 1).checked_mul(1 << level)? + 1)));
-        let made = |(levels, points)| Some((levels, spaced(&range, points, self.quantity)?));
-        let Some((levels, fine)) = fine
-            .filter(|(_, points)| *points <= MAX_ROWS)
-            .and_then(made)
-        else {
-            return Err(self.to.refuse(format!(
-                "makes more than {MAX_ROWS} values of the axis; take a coarser one"
-            )));
-        };
-        axes[axis] = fine;
-        Ok(Refinement {
-            axis,
-            levels,
-            is_log: range.logarithmic,
-            ..self.refinement.clone()
-        })
-    }
-}
-
-/// What rounding may add to a step that was meant to be that of the file, halved some times.
+/// What rounding may add to a step of the file's axis that is halved several times.
 const ROUNDING: f64 = 1e-9;
+
+/// Finds the axis of a quantity among all, and puts one in its place that is as fine as is wanted.
+fn refined(
+    wanted: Refinement,
+    quantity: Quantity,
+    named: Entry<'_>,
+    to: Entry<'_>,
+    file: &Section<'_>,
+    axes: &mut [Axis],
+) -> Result<Refinement, Refused> {
+    let axis = axes.iter().position(|axis| axis.quantities() == [quantity]);
+    let section = file.entry("axes").and_then(|axes| axes.section("[axes]"));
+    let entry = section.and_then(|axes| axes.entry(quantity.key()));
+    let range = entry.filter(|entry| entry.list().is_none());
+    let Some((axis, entry)) = axis.zip(range) else {
+        let problem = "has no range of its own in [axes], and only there are values in between; write it there as \
+                       { linear = [low, high], points = n }, or log";
+        return Err(named.refuse(problem));
+    };
+    let (range, points) = read_spaced(&entry, quantity)?;
+    // Of an axis with 2^level steps in place of each.
+    let step = |level: u32| {
+        let steps = (points - 1) as f64 * f64::from(level).exp2();
+        if range.logarithmic {
+            libm::expm1(libm::log(range.high / range.low) / steps)
+        } else {
+            (range.high - range.low) / steps
+        }
+    };
+    if wanted.to >= step(0) {
+        let what = if range.logarithmic {
+            "as a share of the value"
+        } else {
+            "the step of the axis in [axes]"
+        };
+        return Err(to.must_be(&format!("finer than {}, {what}", Shortest(step(0)))));
+    }
+    let levels = (1..u64::BITS).find(|&level| step(level) <= wanted.to * (1.0 + ROUNDING));
+    let fine = levels.and_then(|levels| {
+        let points = (points - 1).checked_mul(1 << levels)? + 1;
+        let is_held = points <= MAX_ROWS;
+        let axis = is_held.then(|| spaced(&range, points, quantity))??;
+        Some((levels, axis))
+    });
+    let Some((levels, fine)) = fine else {
+        return Err(to.refuse(format!(
+            "makes more than {MAX_ROWS} values of the axis; take a coarser one"
+        )));
+    };
+    axes[axis] = fine;
+    Ok(Refinement {
+        axis,
+        levels,
+        is_log: range.logarithmic,
+        ..wanted
+    })
+}

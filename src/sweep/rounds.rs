@@ -1,6 +1,6 @@
 //! Rounds: what `[precision]` and `[refine]` ask for, and the points that one round runs.
 
-use super::set::Statistic;
+use crate::sets::Statistic;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::ops::RangeInclusive;
 
@@ -12,7 +12,7 @@ pub(super) const MAX_JOBS: u64 = 1_000_000;
 /// Seeds of a set below which its interval is not trusted, unless it may have no more: see `rounds/precision.rs`.
 pub const MIN_SEEDS: u64 = 24;
 
-/// What a sweep decides by itself: one of the two.
+/// What makes a sweep adaptive: precision or refinement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rounds {
     /// Seeds of a set in the first round, and at most.
@@ -41,7 +41,7 @@ pub enum Target {
 }
 
 /// Sets and seeds are added where a statistic crosses a threshold along an axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Refinement {
     pub axis: usize,
     /// How often the distance of two sets of the first round can be halved on it.
@@ -86,7 +86,7 @@ pub struct Standing {
 pub struct Bounds {
     pub sets: u64,
     pub jobs: u64,
-    /// Predicted CPU time of these jobs, in s; sets that are not known yet count as the dearest of the first round.
+    /// Predicted CPU time of these jobs, in s; sets that are not known yet count as the most expensive of the first round.
     pub predicted_cost: f64,
 }
 
@@ -97,20 +97,15 @@ impl Round {
 
     /// The same, or the end if all its points are among those that were chosen before.
     pub fn beyond(mut self, chosen: &Self) -> Self {
-        if self
-            .points
-            .iter()
-            .cloned()
-            .flatten()
-            .all(|point| chosen.has(point))
-        {
+        let mut points = self.points.iter().cloned().flatten();
+        if points.all(|point| chosen.has(point)) {
             self.points.clear();
             self.standing.sets_capped += std::mem::take(&mut self.standing.sets_open);
         }
         self
     }
 
-    /// Whether it says that the rounds are over.
+    /// Whether the rounds are over.
     pub const fn is_end(&self) -> bool {
         self.points.is_empty()
     }
@@ -142,10 +137,8 @@ fn write_ranges<S: Serializer>(
     ranges: &[RangeInclusive<u64>],
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
-    let words: Vec<String> = ranges
-        .iter()
-        .map(|range| format!("{}-{}", range.start(), range.end()))
-        .collect();
+    let word = |range: &RangeInclusive<u64>| format!("{}-{}", range.start(), range.end());
+    let words: Vec<String> = ranges.iter().map(word).collect();
     serializer.serialize_str(&words.join(" "))
 }
 

@@ -29,7 +29,8 @@ impl Range {
             return self.high;
         }
         let value = if self.logarithmic {
-            let (low, high) = (libm::log(self.low), libm::log(self.high));
+            let low = libm::log(self.low);
+            let high = libm::log(self.high);
             libm::exp(low + (high - low) * fraction)
         } else {
             // Two terms: the difference of the ends may overflow.

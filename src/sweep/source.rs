@@ -1,12 +1,14 @@
 //! The text of a sweep file: sections, entries and values that know their place, and errors that name it.
 //!
-//! An error is reported where it is made, and [`Refused`] says so from there on: a reader that meets one goes on with
-//! what does not depend on it, and all errors of a file are reported at once.
+//! A mistake is reported where it is found, and [`Refused`] says so from there on: the reader continues with what does not
+//! depend on it, and all mistakes of a file are reported at once.
 //!
 //! Reads TOML with spans (crate `toml`), so that every refusal says file, line, key and value as written. Not by serde's
 //! derive: the keys come from tables ([`fields!`](crate::model::fields)) or are open, and its errors name neither the
 //! value as written nor the way out.
 
+use super::quantity::Quantity;
+use super::spelling::{hint, nearest};
 use crate::model::{self, BreakOn};
 use crate::table::shown::{shown, shown_text};
 use crate::table::value::{Field, Value};
@@ -60,15 +62,12 @@ fn listed(path: &Path, mistakes: &[Mistake]) -> String {
         return shown(mistake);
     }
     let heading = format!("{path}: has {} mistakes:", mistakes.len());
-    let more = mistakes
-        .len()
-        .checked_sub(MAX_SHOWN)
-        .filter(|more| *more > 0)
-        .map(|more| format!("and {more} more"));
-    let lines = std::iter::once(heading)
-        .chain(mistakes.iter().take(MAX_SHOWN).map(shown))
-        .chain(more);
-    lines.collect::<Vec<_>>().join("\n  ")
+    let mut lines = vec![heading];
+    lines.extend(mistakes.iter().take(MAX_SHOWN).map(shown));
+    if mistakes.len() > MAX_SHOWN {
+        lines.push(format!("and {} more", mistakes.len() - MAX_SHOWN));
+    }
+    lines.join("\n  ")
 }
 
 /// Something was refused, and its [`Source`] has the mistake.
@@ -104,10 +103,9 @@ impl<'a> Source<'a> {
     }
 
     pub fn passed(&self) -> Result<(), Refused> {
-        if self.mistakes.borrow().is_empty() {
-            Ok(())
-        } else {
-            Err(Refused(()))
+        match self.mistakes.borrow()[..] {
+            [] => Ok(()),
+            _ => Err(Refused(())),
         }
     }
 
@@ -116,48 +114,40 @@ impl<'a> Source<'a> {
         mistakes.sort_unstable();
         // A misspelt key is met twice where it stands for one that must be there.
         mistakes.dedup();
-        let placed = mistakes.into_iter().map(|(at, problem)| Mistake {
+        let placed = |(at, problem)| Mistake {
             line: self.line(at),
             problem,
-        });
+        };
         SweepError::Invalid {
             path: self.path.to_owned(),
-            mistakes: placed.collect(),
+            mistakes: mistakes.into_iter().map(placed).collect(),
         }
     }
 
     /// The line of a byte of the text, counted from 1.
     pub fn line(&self, at: usize) -> usize {
-        self.text
-            .as_bytes()
-            .get(..at)
-            .unwrap_or_default()
-            .split(|byte| *byte == b'\n')
-            .count()
+        let before = self.text.as_bytes().get(..at).unwrap_or_default();
+        before.split(|byte| *byte == b'\n').count()
     }
 
     pub fn table(&self) -> Result<DeTable<'a>, Refused> {
-        // The errors of a parser that goes on after one mostly follow from it.
-        DeTable::parse(self.text)
-            .map(Spanned::into_inner)
-            .map_err(|error| {
-                let span = error.span().unwrap_or(self.text.len()..self.text.len());
-                // The end of the file lies on its last line, not below it.
-                let at = span.start.min(self.text.trim_end().len());
-                let written = match self.excerpt(span) {
-                    nothing if nothing.is_empty() => self
-                        .text
-                        .lines()
-                        .nth(self.line(at) - 1)
-                        .unwrap_or_default()
-                        .to_owned(),
-                    written => written,
-                };
-                self.refuse(
-                    at,
-                    format!("{written}: {}; the file must be TOML 1.0", error.message()),
-                )
-            })
+        // Only the first error: others mostly follow from it.
+        let parsed = DeTable::parse(self.text).map(Spanned::into_inner);
+        parsed.map_err(|error| {
+            let span = error.span().unwrap_or(self.text.len()..self.text.len());
+            // The end of the file lies on its last line, not below it.
+            let at = span.start.min(self.text.trim_end().len());
+            let mut written = self.excerpt(span);
+            if written.is_empty() {
+                let mut lines = self.text.lines();
+                written.push_str(lines.nth(self.line(at) - 1).unwrap_or_default());
+            }
+            let problem = error.message();
+            self.refuse(
+                at,
+                format!("{written}: {problem}; the file must be TOML 1.0"),
+            )
+        })
     }
 
     /// The first line of a stretch of text, shortened.
@@ -185,16 +175,13 @@ pub(super) struct Section<'a> {
 impl<'a> Section<'a> {
     /// The entries in the order of the file.
     pub fn entries(&self) -> Vec<Entry<'a>> {
-        let mut entries: Vec<_> = self
-            .table
-            .iter()
-            .map(|(key, node)| Entry {
-                source: self.source,
-                key: key.get_ref(),
-                at: key.span().start,
-                node,
-            })
-            .collect();
+        let entries = self.table.iter().map(|(key, node)| Entry {
+            source: self.source,
+            key: key.get_ref(),
+            at: key.span().start,
+            node,
+        });
+        let mut entries: Vec<_> = entries.collect();
         entries.sort_by_key(|entry| entry.at);
         entries
     }
@@ -210,27 +197,21 @@ impl<'a> Section<'a> {
 
     /// An entry that must be there, unless a misspelt one was meant; `need` says what it is for.
     pub fn required(&self, key: &str, need: &str) -> Result<Entry<'a>, Refused> {
+        let is_near = |entry: &Entry<'_>| nearest(entry.key, &[key]).is_some();
         self.entry(key).ok_or_else(|| {
-            match self
-                .entries()
-                .iter()
-                .find(|entry| nearest(entry.key, &[key]).is_some())
-            {
-                Some(misspelt) => misspelt.unknown(self.title, &[key]),
-                None => self.source.refuse(
-                    self.at,
-                    format!("{key} is missing in {}: {need}", self.title),
-                ),
+            if let Some(misspelt) = self.entries().into_iter().find(is_near) {
+                return misspelt.unknown(self.title, &[key]);
             }
+            let problem = format!("{key} is missing in {}: {need}", self.title);
+            self.source.refuse(self.at, problem)
         })
     }
 
     /// Refuses keys that are not allowed here.
     pub fn only(&self, allowed: &[&str]) -> Result<(), Refused> {
-        let unknown = self
-            .entries()
-            .into_iter()
-            .filter(|entry| !allowed.contains(&entry.key));
+        let mut unknown = self.entries();
+        unknown.retain(|entry| !allowed.contains(&entry.key));
+        let unknown = unknown.iter();
         all(unknown.map(|entry| Err(entry.unknown(self.title, allowed)))).map(|_: Vec<()>| ())
     }
 }
@@ -265,7 +246,7 @@ impl<'a> Entry<'a> {
     pub fn unknown(&self, title: &str, allowed: &[&str]) -> Refused {
         let hint = match self.key {
             "name" | "where" => format!("{} must stand above the first [section]", self.key),
-            key if title == "the file" && super::quantity::Quantity::from_key(key).is_some() => {
+            key if title == "the file" && Quantity::from_key(key).is_some() => {
                 "parameters belong in [model] or [axes]".to_owned()
             }
             key => hint(key, allowed),
@@ -275,17 +256,13 @@ impl<'a> Entry<'a> {
 
     /// The values of a list, each at its own place.
     pub fn list(&self) -> Option<Vec<Self>> {
-        let array = self.node.get_ref().as_array()?;
-        Some(
-            array
-                .iter()
-                .map(|node| Self {
-                    at: node.span().start,
-                    node,
-                    ..*self
-                })
-                .collect(),
-        )
+        let nodes = self.node.get_ref().as_array()?.iter();
+        let values = nodes.map(|node| Self {
+            at: node.span().start,
+            node,
+            ..*self
+        });
+        Some(values.collect())
     }
 
     pub fn section(&self, title: &'static str) -> Option<Section<'a>> {
@@ -306,18 +283,10 @@ impl<'a> Entry<'a> {
     pub fn value(&self) -> Option<model::Value> {
         match self.node.get_ref() {
             DeValue::Integer(integer) => {
-                let count = u64::from_str_radix(integer.as_str(), integer.radix())
-                    .ok()
-                    .map(Value::Count);
-                let real = || {
-                    integer
-                        .as_str()
-                        .parse()
-                        .ok()
-                        .filter(|_| integer.radix() == 10)
-                        .map(Value::Real)
-                };
-                count.or_else(real)
+                let digits = integer.as_str();
+                let count = u64::from_str_radix(digits, integer.radix()).ok();
+                let real = digits.parse().ok().filter(|_| integer.radix() == 10);
+                count.map(Value::Count).or(real.map(Value::Real))
             }
             DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
             DeValue::Boolean(flag) => Some(Value::Flag(*flag)),
@@ -328,17 +297,14 @@ impl<'a> Entry<'a> {
 
     /// A finite number that `fits`, as the words `allowed` say.
     pub fn number(&self, allowed: &str, fits: impl Fn(f64) -> bool) -> Result<f64, Refused> {
-        let number = self
-            .value()
-            .and_then(Value::number)
-            .filter(|number| number.is_finite() && fits(*number));
+        let number = self.value().and_then(Value::number);
+        let number = number.filter(|number| number.is_finite() && fits(*number));
         number.ok_or_else(|| self.must_be(allowed))
     }
 
     pub fn positive(&self, unit: &str) -> Result<f64, Refused> {
-        self.number(&format!("a finite number > 0, in {unit}"), |number| {
-            number > 0.0
-        })
+        let allowed = format!("a finite number > 0, in {unit}");
+        self.number(&allowed, |number| number > 0.0)
     }
 
     /// A whole number within bounds.
@@ -348,25 +314,4 @@ impl<'a> Entry<'a> {
             _ => Err(self.must_be(&format!("a whole number from {min} to {max}"))),
         }
     }
-}
-
-/// The hint for an unknown word: the nearest known one, or all.
-pub(super) fn hint(word: &str, known: &[&str]) -> String {
-    match nearest(word, known) {
-        Some(candidate) => format!("did you mean {candidate}?"),
-        None => format!("allowed are {}", known.join(", ")),
-    }
-}
-
-/// The known word that was probably meant by an unknown one.
-pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
-    let distance =
-        |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
-    // Half of a short word, two letters of a long one.
-    let max = (word.chars().count() / 2).min(2);
-    let near = known
-        .iter()
-        .copied()
-        .filter(|candidate| distance(candidate) <= max);
-    near.min_by_key(|candidate| distance(candidate))
 }

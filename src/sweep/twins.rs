@@ -1,5 +1,5 @@
-//! Twins: two values of a quantity that agree in twelve digits but not in all, such as 30 and 29.999999999999996. Each
-//! would be a set of its own with the same realisations, counted twice where rows are grouped by a column.
+//! Twins: two values of a quantity that agree in twelve digits but not in all, such as 30 and 29.999999999999996. Both
+//! would be sets with the same realisations, counted twice where rows are grouped by a column.
 
 use super::axes::Axis;
 use super::grid::Sweep;
@@ -27,7 +27,7 @@ fn problem(quantity: Quantity, value: f64, twin: f64) -> String {
 }
 
 impl Sweep {
-    /// What is wrong with twins among the values of an axis, of which the shorter is to be written.
+    /// What is wrong with twins among the values of an axis; the shorter of the two is to be written.
     pub(super) fn twins(&self) -> Option<(Quantity, String)> {
         let is_set = |quantity: &Quantity| *quantity != PERIOD || self.fixes_period_by().is_none();
         Quantity::all().filter(is_set).find_map(|quantity| {
@@ -59,8 +59,8 @@ impl Sweep {
         quantities.find(|quantity| matches!(quantity, Quantity::Eta | Quantity::Frequency))
     }
 
-    /// The values of a quantity, each once, ascending, also of the period where another fixes it; none of whole numbers and
-    /// words.
+    /// The values of a quantity, each once, ascending, also of the period where another quantity fixes it; empty for whole
+    /// numbers and words.
     fn reals(&self, quantity: Quantity) -> Vec<f64> {
         let of_axes = self.axes.iter().find_map(|axis| axis.values_of(quantity));
         let values = match (of_axes, quantity) {
@@ -125,7 +125,8 @@ mod tests {
                 continue;
             }
             tried += 1;
-            let (value, beside) = (0.007_f64, beside(quantity));
+            let value = 0.007_f64;
+            let beside = beside(quantity);
             let twin = value.next_up();
             for list in [
                 format!("{key} = [{value}, 0.008, {twin}]"),

@@ -1,7 +1,7 @@
-//! A sweep file with other values, as text. What is not changed stands as it was, with its comments.
+//! A sweep file with other values, as text. Everything else stays unchanged, with its comments.
 
 use super::quantity::Quantity;
-use super::source::nearest;
+use super::spelling::nearest;
 use crate::observe::RecordingKey;
 use toml_edit::{DocumentMut, Item, Value};
 
@@ -32,11 +32,8 @@ impl Change {
     /// A key with one value. The sweep file's reader refuses what is unknown, in the section of what it is nearest to.
     pub fn setting(key: &str, value: &str) -> Self {
         let recording = RecordingKey::ALL.map(RecordingKey::key);
-        let known: Vec<&str> = Quantity::all()
-            .map(Quantity::key)
-            .chain(recording)
-            .chain(SOLVER)
-            .collect();
+        let known = Quantity::all().map(Quantity::key);
+        let known: Vec<&str> = known.chain(recording).chain(SOLVER).collect();
         let section = match nearest(key, &known) {
             _ if matches!(key, "of" | "relative" | "absolute" | "seeds") => "precision",
             _ if matches!(key, "axis" | "by" | "value" | "threshold" | "to" | "jobs") => "refine",
@@ -65,15 +62,10 @@ impl Change {
             }
             ["count", count] => format!("{{ count = {} }}", scalar(count)),
             ["count", ..] => return Err("count:N, with the number of values"),
-            _ => format!(
-                "[{}]",
-                values
-                    .split(',')
-                    .map(str::trim)
-                    .map(scalar)
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            ),
+            _ => {
+                let list: Vec<String> = values.split(',').map(str::trim).map(scalar).collect();
+                format!("[{}]", list.join(", "))
+            }
         };
         value
             .parse::<Value>()
@@ -100,44 +92,35 @@ fn scalar(text: &str) -> String {
 }
 
 /// The text of a sweep file with these changes. A key leaves all other sections, so that an axis becomes a parameter, or the
-/// other way round; what fixes the period, a target or seeds takes the place of what else does; what has no effect at
-/// Delta = 0 goes with the modulation. A text that is no TOML stays as it is.
+/// other way round; a new key for the period, the target or the seeds replaces the one that is there; Delta = 0 removes all
+/// that has no effect without modulation. A text that is not TOML stays unchanged.
 pub fn varied(text: &str, changes: &[Change]) -> String {
     let Ok(mut document) = text.parse::<DocumentMut>() else {
         return text.to_owned();
     };
+    let is_zero = |change: &Change| matches!(change.value.parse(), Ok(0.0));
     let is_still = changes
         .iter()
-        .any(|change| change.key == "Delta" && matches!(change.value.parse(), Ok(0.0)));
-    let seeds_of = if document.contains_key("refine") {
-        "refine"
-    } else {
-        "precision"
-    };
-    let section_of = |change: &Change| {
-        if change.key == "seeds" {
-            seeds_of
-        } else {
-            change.section
-        }
+        .any(|change| change.key == "Delta" && is_zero(change));
+    let is_refined = document.contains_key("refine");
+    let section_of = |change: &Change| match &*change.key {
+        "seeds" if is_refined => "refine",
+        _ => change.section,
     };
     for section in SECTIONS {
         let Some(table) = document.get_mut(section).and_then(Item::as_table_like_mut) else {
             continue;
         };
-        let stays = |key: &str| {
-            changes
-                .iter()
-                .any(|change| section_of(change) == section && change.key == key)
+        let is_set_here =
+            |change: &Change, key: &str| section_of(change) == section && change.key == key;
+        let stays = |key: &str| changes.iter().any(|change| is_set_here(change, key));
+        let are_rivals = |new: &str, key: &str| {
+            let mut rivals = RIVALS.iter();
+            rivals.any(|keys| keys.contains(&new) && keys.contains(&key))
         };
         let goes = |key: &str| {
-            let replaces = |new| {
-                new == key
-                    || RIVALS
-                        .iter()
-                        .any(|keys| keys.contains(&new) && keys.contains(&key))
-            };
-            changes.iter().any(|change| replaces(&*change.key)) || is_still && is_of_modulation(key)
+            let replaces = |change: &Change| change.key == key || are_rivals(&change.key, key);
+            changes.iter().any(replaces) || is_still && is_of_modulation(key)
         };
         let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
         for key in keys.iter().filter(|key| goes(key) && !stays(key)) {
@@ -152,11 +135,8 @@ pub fn varied(text: &str, changes: &[Change]) -> String {
         };
         // The old comment may be about the old value.
         if table.is_table() {
-            value.decor_mut().set_suffix(if section == AXES {
-                "  # --axis"
-            } else {
-                "  # --set"
-            });
+            let flag = if section == AXES { "axis" } else { "set" };
+            value.decor_mut().set_suffix(format!("  # --{flag}"));
         }
         let Some(table) = table.as_table_like_mut() else {
             continue;

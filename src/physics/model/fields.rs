@@ -11,13 +11,14 @@
 //! }
 //! ```
 //!
-//! `Variant("key", "symbol") field: type = default, "unit", RANGE and "rule", "meaning";`
+//! `Variant("key", "symbol", "words") field: type = default, "unit", RANGE and "rule", "meaning";`
 //!
 //! | part | meaning |
 //! |---|---|
 //! | `Variant` | the field as a value of the enum behind `by` |
 //! | `"key"` | its name in files, flags and tables |
 //! | `"symbol"` | its symbol in the paper; may be left out, and figures name it in small print only away from its default |
+//! | `"words"` | what axes of figures call it; may be left out if the meaning begins so |
 //! | `type` | a [`Field`](crate::value::Field); an `Option` where the value may be missing |
 //! | `"unit"` | in SI; empty for a pure number, a flag or a word |
 //! | `RANGE` | one of [`Range`]: the values that the field can take by itself |
@@ -27,6 +28,7 @@
 //! Each row yields the field with its documentation, its default, its [`Description`], access by key, and a row of the
 //! table in `docs/`, which the tests write with `UPDATE_DOCS=1`.
 
+use crate::columns::Column;
 use crate::value::Kind;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
 
@@ -36,6 +38,8 @@ pub struct Description {
     pub key: &'static str,
     /// Symbol in the paper; empty if it has none.
     pub symbol: &'static str,
+    /// What axes of figures call it; empty if the meaning begins so.
+    pub words: &'static str,
     /// SI unit; empty for a pure number, a flag or a word.
     pub unit: &'static str,
     /// One line, without a full stop.
@@ -50,6 +54,19 @@ pub struct Description {
 }
 
 impl Description {
+    /// The field as a column of a table.
+    pub fn column(&self) -> Column {
+        Column {
+            name: self.key.into(),
+            unit: self.unit,
+            meaning: self.meaning,
+            symbol: self.symbol,
+            words: self.words,
+            kind: self.kind,
+            nullable: self.nullable,
+        }
+    }
+
     /// The values that the field can take by itself, with their unit.
     pub fn allowed(&self) -> String {
         if self.unit.is_empty() {
@@ -122,7 +139,7 @@ impl Range {
     }
 }
 
-/// Least integer of which a double does not tell its neighbour.
+/// Smallest integer that a double cannot tell from the next: 2^53.
 const TOO_LARGE: f64 = 9_007_199_254_740_992.0;
 
 /// Defines a struct and the enum of its fields, see the top of this file.
@@ -130,7 +147,7 @@ macro_rules! fields {
     (
         $(#[$about:meta])*
         pub struct $Struct:ident by $Key:ident {$(
-            $variant:ident($key:literal $(, $symbol:literal)?) $field:ident: $type:ty = $default:expr,
+            $variant:ident($key:literal $(, $symbol:literal $(, $words:literal)?)?) $field:ident: $type:ty = $default:expr,
                 $unit:tt, $range:ident $(and $rule:literal)?, $meaning:literal;
         )+}
     ) => {
@@ -162,6 +179,7 @@ macro_rules! fields {
                     Self::$variant => $crate::model::Description {
                         key: $key,
                         symbol: concat!($($symbol)?),
+                        words: concat!($($($words)?)?),
                         unit: $unit,
                         meaning: $meaning,
                         range: $crate::model::fields::Range::$range,
@@ -206,7 +224,7 @@ macro_rules! fields {
                 )+}
             }
 
-            /// Sets a field, in or out of its range; none if the kind of value does not fit.
+            /// Sets a field, in or out of its range; `None` if the kind of value does not fit.
             pub fn put(&mut self, field: $Key, value: $crate::value::Value<'_>) -> Option<()> {
                 match field {$(
                     $Key::$variant => self.$field = $crate::value::Field::from_value(value)?,

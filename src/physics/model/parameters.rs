@@ -40,7 +40,7 @@ fields! {
         Gamma("gamma", "γ") damping_rate: f64 = 6462.0, "1/s", NOT_NEGATIVE, "damping rate";
         V0("V0", "V0") drive_velocity: f64 = 1e-4, "m/s", POSITIVE and "not so low that slips are over 1e100 s apart",
             "drive velocity";
-        Delta("Delta", "Δ") modulation_amplitude: f64 = 0.0, "m", NOT_NEGATIVE,
+        Delta("Delta", "Δ", "Amplitude") modulation_amplitude: f64 = 0.0, "m", NOT_NEGATIVE,
             "amplitude of the modulation, 0 is off";
         T("T", "T") modulation_period: Option<f64> = None, "s", POSITIVE and "given when Delta > 0",
             "period of the modulation";
@@ -50,7 +50,7 @@ fields! {
         DeltaTo("Delta_to", "Δ_to") turning_amplitude: Option<f64> = None, "m",
             NOT_NEGATIVE and "given only with Delta > 0 and ramp_time > 0",
             "amplitude at the turning point of the ramp; null: not ramped";
-        RampTime("ramp_time") ramp_time: f64 = 0.0, "s",
+        RampTime("ramp_time", "", "Duration of the ramp") ramp_time: f64 = 0.0, "s",
             NOT_NEGATIVE and "at most 1e9 T and 1e9 T_to, above 0 only with T_to or Delta_to",
             "duration of the ramp to T_to and Delta_to, and of that back; 0 is off";
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
@@ -75,6 +75,14 @@ pub struct ParameterError {
     pub symbol: Symbol,
     /// The refused value, as given.
     pub value: String,
+}
+
+impl Symbol {
+    /// Whether it belongs to the modulation: without it, it is at its default.
+    pub const fn is_of_modulation(self) -> bool {
+        use Symbol::{Delta, DeltaTo, RampTime, T, TTo};
+        matches!(self, Delta | T | DeltaTo | TTo | RampTime)
+    }
 }
 
 impl Parameters {
@@ -191,7 +199,7 @@ impl Parameters {
         )
     }
 
-    /// The same without modulation, in canonical form.
+    /// These parameters without modulation, in canonical form: see [`Symbol::is_of_modulation`].
     pub fn without_modulation(&self) -> Self {
         Self {
             modulation_amplitude: 0.0,

@@ -1,6 +1,6 @@
 //! Parameters as columns of a row.
 
-use super::{Description, Parameters, Symbol};
+use super::{Parameters, Symbol};
 use crate::columns::{Column, FromRow, Row, Value, part};
 use std::marker::PhantomData;
 use std::ops::Deref;
@@ -39,24 +39,10 @@ impl<S> Deref for Selected<S> {
 
 impl<S: Selection> Row for Selected<S> {
     fn columns() -> Vec<Column> {
-        let column = |symbol: &Symbol| {
-            let Description {
-                key,
-                unit,
-                meaning,
-                kind,
-                nullable,
-                ..
-            } = symbol.description();
-            Column {
-                name: key.into(),
-                unit,
-                meaning,
-                kind,
-                nullable,
-            }
-        };
-        S::SYMBOLS.iter().map(column).collect()
+        let columns = S::SYMBOLS.iter();
+        columns
+            .map(|symbol| symbol.description().column())
+            .collect()
     }
 
     fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {

@@ -2,9 +2,10 @@
 
 use super::super::quantity::Quantity;
 use super::super::rounds::MAX_JOBS;
-use super::super::{SCHEMA, STATISTICS, Sweep};
+use super::super::{SCHEMA, Sweep};
 use crate::model::{BreakOn, Description, Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
+use crate::sets::STATISTICS;
 use crate::solver::{Resolve, TOLERANCES};
 use crate::table::value::Kind;
 use serde_json::{Value as Json, json};
