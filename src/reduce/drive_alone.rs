@@ -114,11 +114,8 @@ fn phases_of(
         Some(cycles) => cycles.within(&of_jobs, |(time, _)| *time),
     };
     let vectors = |job: &[(f64, [f64; 2])]| job.iter().map(|(_, vector)| *vector).collect();
-    passages
-        .keys()
-        .copied()
-        .zip(of_jobs.into_iter().map(vectors))
-        .collect()
+    let vectors = of_jobs.into_iter().map(vectors);
+    passages.keys().copied().zip(vectors).collect()
 }
 
 /// A resultant length by the drive alone, and the excess of what is seen.

@@ -81,11 +81,10 @@ impl<const D: usize> Sequences<D> {
         let jobs = self.jobs().filter(|job| !job.is_empty()).count();
         let parts = MIN_STRETCHES.div_ceil(jobs.max(1));
         let of_job = |job: &[[f64; D]]| {
-            (0..parts)
-                .map(|part| &job[job.len() * part / parts..job.len() * (part + 1) / parts])
-                .filter(|stretch| !stretch.is_empty())
-                .map(sum)
-                .collect()
+            let start = |part: usize| job.len() * part / parts;
+            let stretches = (0..parts).map(|part| &job[start(part)..start(part + 1)]);
+            let stretches = stretches.filter(|stretch| !stretch.is_empty());
+            stretches.map(sum).collect()
         };
         self.jobs().map(of_job).collect()
     }

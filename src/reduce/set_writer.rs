@@ -44,10 +44,8 @@ impl<'a> SetWriter<'a> {
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
         let sweep = results.sweep();
-        let mut left_out: Vec<_> = RoundOfSet::columns()
-            .into_iter()
-            .map(|column| column.name)
-            .collect();
+        let columns = RoundOfSet::columns().into_iter();
+        let mut left_out: Vec<_> = columns.map(|column| column.name).collect();
         if sweep.rounds().is_some() {
             left_out.clear();
         }

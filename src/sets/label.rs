@@ -54,10 +54,8 @@ pub fn label(column: &str) -> Label {
             unit: "",
         };
     }
-    let plain = column
-        .strip_suffix("_mean")
-        .unwrap_or(column)
-        .replace('_', " ");
+    let plain = column.strip_suffix("_mean").unwrap_or(column);
+    let plain = plain.replace('_', " ");
     let described = SetRow::columns()
         .into_iter()
         .find(|known| known.name == column);

@@ -91,9 +91,8 @@ tables! { SetRow = "sets", "One row per parameter set, all seeds together"; }
 impl SetRow {
     /// The number in a column of this name; `None` if it has none.
     pub fn number(&self, column: &str) -> Option<f64> {
-        let place = Self::columns()
-            .iter()
-            .position(|known| known.name == column)?;
+        let columns = Self::columns();
+        let place = columns.iter().position(|known| known.name == column)?;
         let mut numbers = Vec::new();
         self.cells(&mut |cell| numbers.push(cell.number()));
         numbers.swap_remove(place)
@@ -155,10 +154,8 @@ impl Statistic {
     }
 
     pub fn from_key(key: &str) -> Option<Self> {
-        STATISTICS
-            .iter()
-            .copied()
-            .find(|statistic| statistic.key == key)
+        let mut statistics = STATISTICS.iter().copied();
+        statistics.find(|statistic| statistic.key == key)
     }
 }
 

@@ -25,9 +25,8 @@ impl Sweep {
 
     /// Number of the axis of seeds, if they have one.
     pub fn seed_axis(&self) -> Option<usize> {
-        self.axes
-            .iter()
-            .position(|axis| axis.quantities() == [Quantity::SEED])
+        let mut axes = self.axes.iter();
+        axes.position(|axis| axis.quantities() == [Quantity::SEED])
     }
 
     /// Number of seeds of a set in the grid.
@@ -98,9 +97,8 @@ impl Sweep {
         seeds: Range<u64>,
     ) -> impl Iterator<Item = RangeInclusive<u64>> + use<> {
         let stride = self.seed_stride();
-        seeds
-            .map(move |seed| set + seed * stride)
-            .map(|point| point..=point)
+        let points = seeds.map(move |seed| set + seed * stride);
+        points.map(|point| point..=point)
     }
 
     /// The sets of the first round, in order: all combinations of the rows that the sweep file has.

@@ -90,15 +90,13 @@ pub(super) fn whole(
     places: &Places<'_>,
     is_new: bool,
 ) -> Result<(), Refused> {
-    let points = sweep
-        .axes
-        .iter()
-        .try_fold(1_u64, |points, axis| points.checked_mul(axis.len()));
+    let mut rows = sweep.axes.iter().map(Axis::len);
+    let points = rows.try_fold(1_u64, u64::checked_mul);
     if points.is_none_or(|points| points > MAX_POINTS) {
-        let points = points.map_or_else(
-            || "2^64 points or more".to_owned(),
-            |points| format!("{points} points"),
-        );
+        let points = match points {
+            Some(points) => format!("{points} points"),
+            None => "2^64 points or more".to_owned(),
+        };
         let problem = format!(
             "[axes]: {points}; a sweep has at most {MAX_POINTS}, before conditions. Take fewer, or a sample \
              ([axes.sobol]), or several sweeps"
@@ -149,10 +147,8 @@ pub(super) fn whole(
         .entry("solver")
         .and_then(|entry| entry.section("[solver]"));
     let time_step = solver.map_or(0, |solver| solver.place_of("dt"));
-    sweep
-        .solver
-        .check(&first.parameters)
-        .map_err(|error| file.source.refuse(time_step, error.to_string()))
+    let checked = sweep.solver.check(&first.parameters);
+    checked.map_err(|error| file.source.refuse(time_step, error.to_string()))
 }
 
 /// An adaptive sweep has not too many sets, and jobs for its first round.
@@ -308,14 +304,13 @@ fn too_slow(point: &Point, recording: &Recording) -> Option<(Quantity, String)> 
 
 /// Where a point lies on the axes, and the way out.
 fn place(sweep: &Sweep, point: &Point) -> String {
-    let quantities = sweep
-        .axes
-        .iter()
-        .flat_map(Axis::quantities)
-        .filter(|quantity| *quantity != Quantity::BREAK_ON);
-    let moved: Vec<String> = quantities
-        .map(|quantity| format!("{} = {}", quantity.key(), Shortest(point.number(quantity))))
-        .collect();
+    let mut quantities: Vec<Quantity> = sweep.axes.iter().flat_map(Axis::quantities).collect();
+    quantities.retain(|quantity| *quantity != Quantity::BREAK_ON);
+    let value = |quantity: &Quantity| {
+        let number = Shortest(point.number(*quantity));
+        format!("{} = {number}", quantity.key())
+    };
+    let moved: Vec<String> = quantities.iter().map(value).collect();
     if moved.is_empty() {
         return String::new();
     }

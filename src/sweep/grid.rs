@@ -68,10 +68,8 @@ impl Sweep {
 
     /// Keys of all axes.
     pub fn swept(&self) -> impl Iterator<Item = String> {
-        self.axes
-            .iter()
-            .flat_map(Axis::quantities)
-            .map(|quantity| quantity.key().to_owned())
+        let quantities = self.axes.iter().flat_map(Axis::quantities);
+        quantities.map(|quantity| quantity.key().to_owned())
     }
 
     /// Number of points of the grid, before the conditions drop some.

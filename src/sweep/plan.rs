@@ -246,10 +246,8 @@ impl<'a> Plan<'a> {
     pub fn totals(self) -> Totals {
         self.parts().fold(Totals::default(), |totals, part| {
             let recording = self.extensions[part.extension].sweep.recording();
-            let intervals = part
-                .jobs
-                .iter()
-                .map(|job| typical_interval(&job.parameters));
+            let jobs = part.jobs.iter();
+            let intervals = jobs.map(|job| typical_interval(&job.parameters));
             let slips: f64 = intervals
                 .map(|interval| recording.expected_slips(interval))
                 .sum();

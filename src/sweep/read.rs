@@ -175,12 +175,8 @@ fn optional_section<'a, T>(
 fn read_name(file: &Section<'_>) -> Result<String, Refused> {
     // A name within a section is refused as misplaced; it is not missing, too.
     let misplaced = |table: Entry<'_>| {
-        Some(
-            table
-                .section("")?
-                .entry("name")?
-                .unknown(&format!("[{}]", table.key), &[]),
-        )
+        let name = table.section("")?.entry("name")?;
+        Some(name.unknown(&format!("[{}]", table.key), &[]))
     };
     if file.entry("name").is_none()
         && let Some(refused) = file.entries().into_iter().find_map(misplaced)
@@ -195,11 +191,8 @@ fn read_name(file: &Section<'_>) -> Result<String, Refused> {
             && !name.starts_with('-')
     };
     let name = entry.word().filter(allowed).map(str::to_owned);
-    name.ok_or_else(|| {
-        entry.must_be(&format!(
-            "1 to {MAX_NAME} letters, digits, _ and - in quotes, not with - in front"
-        ))
-    })
+    let form = format!("1 to {MAX_NAME} letters, digits, _ and - in quotes, not with - in front");
+    name.ok_or_else(|| entry.must_be(&form))
 }
 
 /// Reads the parameters, and η or the frequency as an axis of one value.
@@ -222,11 +215,8 @@ fn read_model(
                     .ok_or_else(|| entry.must_be(&symbol.description().allowed()))?;
             }
             Quantity::Eta | Quantity::Frequency => {
-                period = Axis::table(vec![Column {
-                    quantity,
-                    values: vec![value],
-                }])
-                .ok();
+                let values = vec![value];
+                period = Axis::table(vec![Column { quantity, values }]).ok();
             }
         }
         Ok(())
@@ -246,18 +236,13 @@ fn read_conditions(
         )),
         (quantity, _) => Ok(quantity),
     };
-    all(entry
-        .list()
-        .unwrap_or_else(|| vec![*entry])
-        .iter()
-        .map(|entry| {
-            let text = entry.word().ok_or_else(|| {
-                entry.must_be(
-                    "a condition in quotes, or a list of them, such as where = \"frequency < 500\"",
-                )
-            })?;
-            Expression::condition(text, &quantity).map_err(|error| entry.refuse(error.to_string()))
-        }))
+    let form = "a condition in quotes, or a list of them, such as where = \"frequency < 500\"";
+    let entries = entry.list().unwrap_or_else(|| vec![*entry]);
+    all(entries.iter().map(|entry| {
+        let text = entry.word().ok_or_else(|| entry.must_be(form))?;
+        let condition = Expression::condition(text, &quantity);
+        condition.map_err(|error| entry.refuse(error.to_string()))
+    }))
 }
 
 fn read_recording(record: &Section<'_>) -> Result<Recording, Refused> {
@@ -289,9 +274,10 @@ fn read_solver(solver: &Section<'_>) -> Result<Solver, Refused> {
             let max = TOLERANCES.end();
             let allowed = format!("a number from {min:e} to {max:e}, relative to fs/k");
             let fits = |tolerance| TOLERANCES.contains(&tolerance);
+            let read_tolerance = |entry: Entry<'_>| entry.number(&allowed, fits);
             let tolerance = solver
                 .entry("tolerance")
-                .map_or(Ok(tolerance), |entry| entry.number(&allowed, fits));
+                .map_or(Ok(tolerance), read_tolerance);
             let resolve = solver.entry("resolve").map_or(Ok(resolve), |entry| {
                 let word = entry.word().and_then(Resolve::from_word);
                 word.ok_or_else(|| entry.must_be("\"auto\", \"grid\" or \"taylor\""))
@@ -303,9 +289,8 @@ fn read_solver(solver: &Section<'_>) -> Result<Solver, Refused> {
         }
         Some("fixed-step") => {
             solver.only(&["method", "dt"]).ok();
-            let time_step = solver
-                .required("dt", "the fixed step in s, such as dt = 1e-6")?
-                .positive("s")?;
+            let time_step = solver.required("dt", "the fixed step in s, such as dt = 1e-6")?;
+            let time_step = time_step.positive("s")?;
             Ok(Solver::FixedStep { time_step })
         }
         _ => Err(solver

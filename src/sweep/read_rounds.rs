@@ -184,10 +184,9 @@ fn read_refinable(entry: &Entry<'_>) -> Result<Quantity, Refused> {
 
 /// Reads the statistics, the number of periods if their share is asked for, and the threshold.
 fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<Refinement, Refused> {
-    let threshold = section
-        .entry("threshold")
-        .map(|entry| entry.number("a finite number", |_| true))
-        .transpose();
+    let threshold = section.entry("threshold");
+    let threshold = threshold.map(|entry| entry.number("a finite number", |_| true));
+    let threshold = threshold.transpose();
     if entry.word() == Some("periods") {
         let need = "the n of tau = n T, of which the share of intervals is taken";
         let value = section.required("value", need);

@@ -14,9 +14,7 @@ pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
         |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
     // Half of a short word, two letters of a long one.
     let max = (word.chars().count() / 2).min(2);
-    let near = known
-        .iter()
-        .copied()
-        .filter(|candidate| distance(candidate) <= max);
+    let known = known.iter().copied();
+    let near = known.filter(|candidate| distance(candidate) <= max);
     near.min_by_key(|candidate| distance(candidate))
 }

@@ -29,9 +29,8 @@ pub fn hexadecimal(hash: &[u8]) -> String {
 
 /// Where the hash stands in bytes that end a file.
 fn place(end: &[u8]) -> Option<usize> {
-    let mark = end
-        .windows(ENCODED_KEY.len())
-        .position(|bytes| bytes == ENCODED_KEY)?;
+    let mut windows = end.windows(ENCODED_KEY.len());
+    let mark = windows.position(|bytes| bytes == ENCODED_KEY)?;
     let place = mark + ENCODED_KEY.len();
     (place + PLACEHOLDER.len() <= end.len()).then_some(place)
 }
@@ -52,13 +51,10 @@ pub fn check(bytes: &[u8]) -> Result<(), &'static str> {
     let (Some(rest), true) = (bytes.len().checked_sub(END), bytes.ends_with(MAGIC)) else {
         return Err(CUT);
     };
-    let length = bytes[rest..]
-        .first_chunk()
-        .map_or(0, |length| u32::from_le_bytes(*length));
-    let footer = rest
-        .checked_sub(length as usize)
-        .filter(|begin| *begin >= MAGIC.len())
-        .ok_or(CUT)?;
+    let length = bytes[rest..].first_chunk();
+    let length = length.map_or(0, |length| u32::from_le_bytes(*length));
+    let footer = rest.checked_sub(length as usize);
+    let footer = footer.filter(|begin| *begin >= MAGIC.len()).ok_or(CUT)?;
     let place = footer + place(&bytes[footer..]).ok_or("it has no checksum")?;
     let (before, rest) = bytes.split_at(place);
     let (written, after) = rest.split_at(PLACEHOLDER.len());
