@@ -211,7 +211,7 @@ mod tests {
             for &phase in phases {
                 set.push(0, &slip(None, Some(phase)));
             }
-            backbone.push(&set.finish(jobs));
+            backbone.push(&set.finish(&jobs));
         };
         // All in the bin 5.6 to 10; the third is all over the circle.
         push(0.01, &[-1.0; 20]);
@@ -237,7 +237,7 @@ mod tests {
             for &phase in phases {
                 set.push(seed, &slip(None, Some(phase)));
             }
-            backbone.push(&set.finish(jobs));
+            backbone.push(&set.finish(&jobs));
         }
         backbone.finish()[0]
     }
@@ -307,7 +307,7 @@ mod tests {
                         set.push(seed, &slip(None, Some(phase)));
                     }
                 }
-                backbone.push(&set.finish(jobs));
+                backbone.push(&set.finish(&jobs));
             }
             let bin = backbone.finish()[0];
             let holds =

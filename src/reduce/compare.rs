@@ -31,8 +31,10 @@ struct JobSums {
     phase: Sum,
 }
 
+type SumOf = fn(&JobSums) -> Sum;
+
 /// What is compared: columns of the sets, and their sums.
-const STATISTICS: [(&str, fn(&JobSums) -> Sum); 3] = [
+const STATISTICS: [(&str, SumOf); 3] = [
     ("tau_mean", |job| job.interval),
     ("mean_friction", |job| job.friction),
     ("resultant_length", |job| job.phase),
@@ -111,7 +113,7 @@ struct Pair<'a> {
 
 impl Pair<'_> {
     /// The interval of a difference B - A, less the difference itself.
-    fn error(&self, sum: fn(&JobSums) -> Sum) -> Option<Interval> {
+    fn error(&self, sum: SumOf) -> Option<Interval> {
         let added = |set: &Set| {
             let sums = self.seeds.iter().map(|seed| sum(&set.jobs[seed]));
             Sum::added(&sums.collect::<Vec<_>>())
@@ -133,7 +135,7 @@ fn rows_of(
     };
     let mut rows = HashMap::new();
     Gathering::of_jobs(results, &is_wanted)?.each_set(MAX_SLIPS, u64::MAX, |set, _| {
-        let row = set.slips.finish(set.jobs).row;
+        let row = set.slips.finish(&set.jobs).row;
         rows.insert(row.set_id.clone(), row);
         Ok(())
     })?;

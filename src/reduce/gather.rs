@@ -237,7 +237,7 @@ impl Gathered {
     }
 
     pub(super) fn finish_with(self, explained: &Explained) -> (FinishedSet, Vec<(u64, Point)>) {
-        let mut set = self.slips.finish(self.jobs);
+        let mut set = self.slips.finish(&self.jobs);
         explained.add_to(&mut set);
         (set, self.points)
     }

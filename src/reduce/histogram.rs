@@ -56,7 +56,7 @@ mod tests {
         for step in 0..500_u32 {
             set.push(0, &slip(Some(0.1 + 0.001 * f64::from(step % 37)), None));
         }
-        let set = set.finish(jobs(0.0, 1.0));
+        let set = set.finish(&jobs(0.0, 1.0));
         let bins = histogram(&set.row, &set.intervals);
         assert_eq!(bins.iter().map(|bin| bin.count).sum::<u64>(), 500);
         let integral: f64 = bins

@@ -79,7 +79,7 @@ impl SetSlips {
         (!all.is_empty()).then(|| nearest as f64 / all.len() as f64)
     }
 
-    pub(super) fn finish(self, jobs: SetJobs) -> FinishedSet {
+    pub(super) fn finish(self, jobs: &SetJobs) -> FinishedSet {
         let by_job: Vec<&[SlipStats]> = self.jobs.values().map(Vec::as_slice).collect();
         let tau = Intervals::new(&by_job, |slip| slip.interval, &jobs.running);
         let in_periods = Intervals::new(&by_job, |slip| slip.periods, &jobs.running);
@@ -359,7 +359,7 @@ pub(super) mod tests {
         }
     }
 
-    fn reduced(jobs: SetJobs, slips: impl IntoIterator<Item = Slip>) -> SetRow {
+    fn reduced(jobs: &SetJobs, slips: impl IntoIterator<Item = Slip>) -> SetRow {
         let mut set = SetSlips::default();
         let mut seed = 0;
         for slip in slips {
@@ -377,20 +377,20 @@ pub(super) mod tests {
             ..slip(Some(n * period), Some(-1.2))
         };
         let row = reduced(
-            jobs(1e-6, period),
+            &jobs(1e-6, period),
             [3.0, 4.0, 4.0, 5.0, 400.0].map(|n| slip(n, period)),
         );
         assert!(row.locking_index.unwrap() > 1.0 - 1e-9);
         assert_eq!(row.periods, Some(4));
         assert!((row.phase_mean.unwrap() + 1.2).abs() < 1e-12);
         let halves = reduced(
-            jobs(1e-6, period),
+            &jobs(1e-6, period),
             [3.0, 3.5, 4.0, 4.5].map(|n| slip(n, period)),
         );
         assert!(halves.locking_index.unwrap() < 1e-9);
         // On a ramp, of the periods at the onsets.
         let ramped = reduced(
-            jobs(1e-6, period),
+            &jobs(1e-6, period),
             [0.03, 0.0313, 0.0371].map(|period| slip(4.0, period)),
         );
         assert!(ramped.locking_index.unwrap() > 1.0 - 1e-9 && ramped.periods == Some(4));
@@ -417,7 +417,7 @@ pub(super) mod tests {
             }
             slip(None, Some(low))
         });
-        let row = reduced(jobs, phases);
+        let row = reduced(&jobs, phases);
         assert!((row.resultant_length.unwrap() - 0.5 * eta).abs() < 1e-3);
     }
 
@@ -425,7 +425,7 @@ pub(super) mod tests {
     fn a_set_has_a_phase_if_its_slips_exclude_a_direction() {
         let at = |phases: &[f64]| {
             reduced(
-                jobs(1e-6, 0.01),
+                &jobs(1e-6, 0.01),
                 phases.iter().map(|&phase| slip(None, Some(phase))),
             )
         };
@@ -458,7 +458,7 @@ pub(super) mod tests {
         );
         assert!(!at(&turn(15, 5)).has_phase, "the same of 15");
         let still = reduced(
-            jobs(0.0, 1.0),
+            &jobs(0.0, 1.0),
             [slip(Some(0.1), None), slip(Some(0.2), None)],
         );
         assert_eq!(
@@ -496,7 +496,7 @@ pub(super) mod tests {
             for (seed, &(time, friction)) in (0..).zip(jobs) {
                 set.push(seed, &facts(JobOutcome::Done, time, friction, None));
             }
-            reduced(set, [])
+            reduced(&set, [])
         };
         let equal = of(&[(2.0, 430.0), (2.0, 434.0)]);
         assert!((equal.mean_friction.unwrap() - 432.0).abs() < 1e-9);
@@ -526,7 +526,7 @@ pub(super) mod tests {
             set.push(seed, &facts(outcome, 1.0, 430.0, Some(interval)));
         }
         let slips = [0.1, 0.3, 0.5].map(|interval| slip(Some(interval), None));
-        reduced(set, slips)
+        reduced(&set, slips)
     }
 
     fn assert_close(value: Option<f64>, expected: f64) {
@@ -594,7 +594,7 @@ pub(super) mod tests {
                 .flat_map(|_| 0..slips)
                 .map(|number| slip(number, &mut draws))
                 .collect();
-            let row = reduced(jobs(1e-6, period), all);
+            let row = reduced(&jobs(1e-6, period), all);
             for statistic in STATISTICS.iter().filter(|statistic| statistic.has_interval) {
                 let end = |end: &str| row.number(&format!("{}{end}", statistic.key));
                 let (Some(value), Some(low), Some(high)) = (end(""), end("_low"), end("_high"))
@@ -637,7 +637,7 @@ pub(super) mod tests {
                     last = phase;
                 }
             }
-            let row = reduced(jobs(3e-6, PERIOD), all);
+            let row = reduced(&jobs(3e-6, PERIOD), all);
             let Interval { low, high } = row.tau_interval.unwrap();
             let mean = PERIOD * (1.0 + share);
             low <= mean && mean <= high
@@ -665,7 +665,7 @@ pub(super) mod tests {
                 ..slip(Some(0.1 + 0.3 * own), Some(-1.0 - own))
             })
         };
-        let row = reduced(jobs(1e-6, 0.01), (0..20).flat_map(of_job));
+        let row = reduced(&jobs(1e-6, 0.01), (0..20).flat_map(of_job));
         let mean = row.phase_mean.unwrap();
         let interval = row.phase_interval.unwrap();
         assert!(interval.low < mean && mean < interval.high);
