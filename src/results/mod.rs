@@ -13,20 +13,20 @@
 //!   deaths.rs                 at what workers died
 //!   events.rs                 what happens, and its log
 //!   verify.rs                 what is damaged, and its repair
-//!   controls.rs               which rows belong to controls
+//!   joined.rs                 tables with columns of their jobs
 //!   export.rs                 a few large files for other tools
 //! destination.rs              files and folders outside of it, which a command writes
 //! ```
 
 pub mod claims;
 pub mod commit;
-pub mod controls;
 pub mod deaths;
 pub mod destination;
 pub mod directory;
 pub mod events;
 pub mod export;
 mod extension_file;
+pub mod joined;
 pub mod layout;
 pub mod parts;
 pub mod pending;
