@@ -1,11 +1,10 @@
 //! Reduced tables, column by column: a reader of the page needs each column as a whole, and columns compress best.
 
-use crate::model::Parameters;
 use crate::observe::Regime;
 use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, swept};
 use crate::results::ResultsError;
 use crate::results::layout::Layout;
-use crate::sweep::{Job, Label, Sweep, label};
+use crate::sweep::{Label, Sweep, label};
 use crate::table::columns::{Column, Row, Table, Value, columns};
 use crate::table::file::Dataset;
 use crate::table::value::floored;
@@ -190,7 +189,7 @@ impl Sets {
         let mut sets = Self {
             columns: Columns::of::<SetRow>(|_| true),
             commands: Vec::new(),
-            command_end: String::new(),
+            command_end: sweep.command_end(),
             histograms: Vec::new(),
             swept: Vec::new(),
             places: HashMap::new(),
@@ -227,31 +226,12 @@ impl Sets {
     }
 
     fn push(&mut self, sweep: &Sweep, row: &SetRow) {
-        let [begin, end] = command(sweep, &row.parameters.parameters);
-        self.commands.push(begin);
-        self.command_end = end;
+        let parameters = &row.parameters.parameters;
+        self.commands.push(sweep.command_of_set(parameters));
         self.histograms.push(Vec::new());
         self.columns.push(row);
         self.places.insert(row.set_id.clone(), self.places.len());
     }
-}
-
-/// The `simulate` command of a job up to its seed and from there on. The end is the same for all jobs of a sweep.
-fn command(sweep: &Sweep, parameters: &Parameters) -> [String; 2] {
-    // The seed stands last among the parameters, and in the command if it is not the default.
-    let seeded = Parameters {
-        seed: 1,
-        ..parameters.clone()
-    };
-    let command = sweep.command(&Job {
-        point: 0,
-        parameters: seeded,
-        cost: 0.0,
-    });
-    let (begin, end) = command
-        .rsplit_once("--set seed=1")
-        .unwrap_or((&command, ""));
-    [begin.trim_end().to_owned(), end.trim_start().to_owned()]
 }
 
 pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
@@ -265,7 +245,6 @@ pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn a_number_keeps_five_digits_and_a_value_that_is_none_is_null() {
@@ -273,22 +252,6 @@ mod tests {
         assert_eq!(json(Value::Real(1e-300)), 1e-300);
         assert_eq!(json(Value::Real(f64::INFINITY)), Json::Null);
         assert_eq!(json(Value::Real(f64::NAN)), Json::Null);
-    }
-
-    #[test]
-    fn the_two_ends_of_a_command_and_a_seed_are_that_of_the_job() {
-        let text =
-            "name = \"a\"\n[axes]\nV0 = [1e-5, 2e-5]\nseed = { count = 3 }\n[record]\nslips = 7\n";
-        let sweep = Sweep::parse(text, Path::new("a.toml")).unwrap();
-        for job in sweep.jobs() {
-            let [begin, end] = command(&sweep, &job.parameters);
-            let put_together = format!("{begin} --set seed={} {end}", job.parameters.seed);
-            // The default seed need not be said.
-            assert_eq!(
-                put_together.replace(" --set seed=0", ""),
-                sweep.command(&job)
-            );
-        }
     }
 
     #[test]

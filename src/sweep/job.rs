@@ -47,15 +47,34 @@ impl Sweep {
     /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
     /// that read back to the same bits.
     pub fn command(&self, job: &Job) -> String {
+        let mut words = vec![self.command_of_set(&job.parameters)];
+        let seed = job.parameters.seed;
+        if seed != Parameters::default().seed {
+            words.push(format!("--set seed={seed}"));
+        }
+        words.push(self.command_end());
+        words.retain(|word| !word.is_empty());
+        words.join(" ")
+    }
+
+    /// The beginning of the command of a job, which all jobs of its set have in common.
+    pub fn command_of_set(&self, parameters: &Parameters) -> String {
         let mut words = vec!["stickslip simulate".to_owned()];
         let defaults = Parameters::default();
-        let parameters = Symbol::ALL
-            .into_iter()
-            .map(|symbol| (symbol, job.parameters.get(symbol)));
-        let parameters = parameters
-            .filter(|(symbol, value)| *value != defaults.get(*symbol) && *value != Value::Null);
-        words.extend(parameters.map(|(symbol, value)| format!("--set {}={value}", symbol.key())));
-        // Its default is another there.
+        for symbol in Symbol::ALL {
+            let value = parameters.get(symbol);
+            let is_default = value == defaults.get(symbol) || value == Value::Null;
+            if symbol != Symbol::Seed && !is_default {
+                words.push(format!("--set {}={value}", symbol.key()));
+            }
+        }
+        words.join(" ")
+    }
+
+    /// The end of the command of a job, behind its seed, which all jobs of the sweep have in common.
+    pub fn command_end(&self) -> String {
+        let mut words = Vec::new();
+        // `simulate` has another default.
         words.extend(self.recording.slips.map(|slips| format!("--slips {slips}")));
         // A single job has no control.
         let defaults = Recording {
