@@ -7,7 +7,7 @@ use crate::observe::{
     Recording, SlipObserver, Trace, TraceRow,
 };
 use crate::solver::{self, Observer, SimulationError};
-use crate::sweep::{Change, Job, Mistake, Sweep};
+use crate::sweep::{Change, Job, Sweep};
 use crate::table::columns::tables;
 use std::sync::atomic::AtomicBool;
 
@@ -55,20 +55,6 @@ pub fn sweep_text(changes: &[Change]) -> String {
     };
     let [model, record, solver] = ["model", "record", "solver"].map(of);
     format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
-}
-
-/// The mistakes in the text of a sweep, as those in what it was made from, which has no lines, nor `[model]`.
-pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
-    let problems = mistakes.iter().map(|Mistake { problem, .. }| {
-        let (start, end) = problem.split_once(" (line ").unwrap_or((problem, ""));
-        let end = end.split_once(')').map_or("", |(_, rest)| rest);
-        format!("{start}{end}").replace(" in [model]", "")
-    });
-    let between = if mistakes.len() > 1 { "\n  " } else { " " };
-    format!(
-        "in the {source}:{between}{}",
-        problems.collect::<Vec<_>>().join(between)
-    )
 }
 
 /// The job of a sweep that has one.

@@ -1,6 +1,6 @@
 //! One job.
 
-use crate::errors::{Error, in_text};
+use crate::errors::Error;
 use crate::keys::{hint, section};
 use crate::table::Table;
 use crate::watched::watched;
@@ -42,10 +42,11 @@ pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
 
 /// Reads a sweep: a file, or a text that was made of something.
 pub fn read_sweep(file: Option<&Path>, text: &str, source: &str) -> Result<Sweep, Error> {
-    match file {
-        Some(file) => Ok(Sweep::from_file(file)?),
-        None => Sweep::parse(text, Path::new(source)).map_err(|error| in_text(error, source)),
-    }
+    let sweep = match file {
+        Some(file) => Sweep::from_file(file),
+        None => Sweep::parse_made(text, source),
+    };
+    Ok(sweep?)
 }
 
 /// A row of the jobs table, the text of the sweep, warnings, and tables by name.

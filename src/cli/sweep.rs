@@ -172,19 +172,15 @@ pub fn vary(sweep: Sweep, changes: &[Change]) -> Result<Sweep> {
     }
 }
 
-/// Reads a text that flags were made into; mistakes are those of the flags.
+/// Reads a text that flags were made into.
 fn of_flags(text: &str) -> Result<Sweep> {
-    Sweep::parse(text, Path::new("flags")).map_err(|error| match error {
-        SweepError::Invalid { mistakes, .. } => {
-            let problem = single::mistakes_in("flags", &mistakes);
-            let hint = if problem.contains("[axes.") {
-                IN_THE_FILE
-            } else {
-                ""
-            };
-            UsageError(problem + hint).into()
+    Sweep::parse_made(text, "flags").map_err(|error| {
+        let problem = error.to_string();
+        if problem.contains("[axes.") {
+            UsageError(problem + IN_THE_FILE).into()
+        } else {
+            error.into()
         }
-        unreadable => unreadable.into(),
     })
 }
 
