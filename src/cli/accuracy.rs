@@ -122,9 +122,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         output::plain_json(&accuracy::to_json(&study, &findings))?;
     } else {
         output::print(&study_text(&study, &findings))?;
-        files
-            .iter()
-            .try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
+        output::lines(files.iter().map(|file| shown(file).to_string()))?;
     }
     Ok(Exit::Done)
 }
@@ -187,46 +185,24 @@ fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
         .collect();
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     let mut columns = Columns::default();
-    let mut add = |is_worded: bool, head: &str, cell: &dyn Fn(&MethodRow) -> String| {
-        columns.add(
-            is_worded,
-            std::iter::once(head.to_owned())
-                .chain(rows.iter().map(|row| cell(row)))
-                .collect(),
-        );
-    };
-    add(true, "   solver", &|row| {
-        format!(
-            "{} {}",
-            if row.solver == study.own.into() {
-                "->"
-            } else {
-                "  "
-            },
-            row.solver
-        )
+    columns.words("   solver", &rows, |row| {
+        let is_own = row.solver == study.own.into();
+        format!("{} {}", if is_own { "->" } else { "  " }, row.solver)
     });
-    add(false, "ms/slip", &|row| {
-        format!(
-            "{:.3}{}",
-            1e3 * row.cost.per_slip,
-            if row.cost.is_extrapolated() { "*" } else { "" }
-        )
+    columns.numbers("ms/slip", &rows, |row| {
+        let mark = if row.cost.is_extrapolated() { "*" } else { "" };
+        format!("{:.3}{mark}", 1e3 * row.cost.per_slip)
     });
-    add(
-        false,
-        "break times (s)",
-        &|MethodRow { break_times, .. }| {
-            let times = break_times.median.zip(break_times.largest);
-            or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
-        },
-    );
+    columns.numbers("break times (s)", &rows, |row| {
+        let times = row.break_times.median.zip(row.break_times.largest);
+        or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
+    });
     let intervals = findings
         .biases
         .iter()
         .filter(|row| row.quantity == "interval");
     let comparisons = intervals.count();
-    add(false, "interval (%)", &|row| {
+    columns.numbers("interval (%)", &rows, |row| {
         or_none(findings.bias_of(row, "interval").and_then(|row| {
             let scale = 100.0 / row.reference_mean.abs();
             let bias = scale * row.bias.of_mean;

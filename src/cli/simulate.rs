@@ -13,10 +13,11 @@ use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
 use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
 use crate::simulate::{self as single, Request};
-use crate::sweep::Change;
+use crate::sweep::{Change, Digits};
 use crate::table::file::Footer;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -60,9 +61,6 @@ struct JobFlags {
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
     #[arg(long, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
-    /// How the event-driven solver resolves motion: on a grid, in Taylor steps, or whichever is better
-    #[arg(long, value_name = "auto|grid|taylor")]
-    resolve: Option<String>,
     /// Step of the fixed-step solver, in s [default: 1e-6]
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
@@ -226,7 +224,13 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     tables.write(files.contacts.as_deref(), contacts)?;
     tables.write(files.slip_table.as_deref(), slips)?;
     write_pictures(arguments, parameters, &recorded, &result.slips)?;
-    report(arguments.json, &label.0.job_id, &result, wall)?;
+    let report = Report::new(&label.0.job_id, &result, wall);
+    if arguments.json {
+        output::json(FORMAT, &report)?;
+    } else {
+        output::print(&table_of_slips(&result.slips))?;
+        report.print()?;
+    }
     Ok(Exit::Done)
 }
 
@@ -239,7 +243,6 @@ impl JobFlags {
             ("max_time", &self.time),
             ("method", &self.solver),
             ("tolerance", &self.tolerance),
-            ("resolve", &self.resolve),
             (
                 "dt",
                 &self
@@ -266,91 +269,106 @@ fn as_json(parameters: &Parameters) -> String {
     serde_json::Value::Object(entries.collect()).to_string()
 }
 
-fn report(in_json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Result<()> {
-    let (slips, summary, averages) = (&measured.slips, &measured.summary, measured.averages);
-    let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
-    let mean =
-        (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
-    let (outcome, regime) = (
-        JobOutcome::of(measured).word(),
-        measured.regime().map(Regime::word),
-    );
-    let friction = averages.map(|averages| averages.friction);
-    let slip_share = averages.map(|averages| averages.slip_share);
-    if in_json {
-        let report = json!({
-            "job_id": job_id,
-            "simulated_seconds": summary.end_time,
-            "slips": slips.len(),
-            "mean_interval_seconds": mean,
-            "outcome": outcome,
-            "regime": regime,
-            "mean_friction_newtons": friction,
-            "attached_fraction": averages.map(|averages| averages.attached_fraction),
-            "slip_share": slip_share,
-            "breaks": summary.breaks,
-            "reattachments": summary.reattachments,
-            "ruptures": measured.ruptures,
-            "steps": summary.steps,
-            "leaps": summary.leaps,
-            "wall_seconds": wall,
-        });
-        return output::json(FORMAT, &report);
-    }
-    let mut columns = Columns::default();
-    let mut add = |head: &str, cell: &dyn Fn(&Slip) -> String| {
-        columns.add(
-            false,
-            std::iter::once(head.to_owned())
-                .chain(slips.iter().map(cell))
-                .collect(),
-        );
-    };
-    add("slip", &|slip| slip.number.to_string());
-    add("onset (s)", &|slip| format!("{:.6}", slip.onset));
-    add("interval (s)", &|slip| {
-        slip.interval
-            .map_or_else(|| "-".to_owned(), |interval| format!("{interval:.6}"))
-    });
-    add("phase (rad)", &|slip| {
-        slip.phase
-            .map_or_else(|| "-".to_owned(), |phase| format!("{phase:.4}"))
-    });
-    add("peak (N)", &|slip| format!("{:.2}", slip.peak_force));
-    add("drop (N)", &|slip| format!("{:.2}", slip.drop));
-    add("precursors", &|slip| slip.precursors.to_string());
-    if !slips.is_empty() {
-        output::print(&columns.to_string())?;
-    }
-    let or_none = |value: Option<f64>, unit: &str| {
-        value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"))
-    };
-    let regime = match regime.zip(slip_share) {
-        None => "none".to_owned(),
-        Some((regime, _)) if slips.is_empty() => regime.to_owned(),
-        Some((regime, share)) => {
-            format!("{regime}, {:.3} % of the time within slips", 100.0 * share)
+/// What is printed of a job.
+#[derive(Serialize)]
+struct Report<'a> {
+    job_id: &'a str,
+    simulated_seconds: f64,
+    slips: usize,
+    mean_interval_seconds: Option<f64>,
+    outcome: &'static str,
+    regime: Option<&'static str>,
+    mean_friction_newtons: Option<f64>,
+    attached_fraction: Option<f64>,
+    slip_share: Option<f64>,
+    breaks: u64,
+    reattachments: u64,
+    ruptures: u64,
+    steps: u64,
+    leaps: u64,
+    wall_seconds: f64,
+}
+
+impl<'a> Report<'a> {
+    fn new(job_id: &'a str, measured: &Measurements, wall_seconds: f64) -> Self {
+        let Measurements {
+            slips,
+            summary,
+            averages,
+            ruptures,
+            ..
+        } = measured;
+        let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
+        let mean = intervals.iter().sum::<f64>() / intervals.len() as f64;
+        Self {
+            job_id,
+            simulated_seconds: summary.end_time,
+            slips: slips.len(),
+            mean_interval_seconds: Some(mean).filter(|mean| mean.is_finite()),
+            outcome: JobOutcome::of(measured).word(),
+            regime: measured.regime().map(Regime::word),
+            mean_friction_newtons: averages.map(|averages| averages.friction),
+            attached_fraction: averages.map(|averages| averages.attached_fraction),
+            slip_share: averages.map(|averages| averages.slip_share),
+            breaks: summary.breaks,
+            reattachments: summary.reattachments,
+            ruptures: *ruptures,
+            steps: summary.steps,
+            leaps: summary.leaps,
+            wall_seconds,
         }
-    };
-    output::pairs(&[
-        ("job", job_id.to_owned()),
-        ("simulated time", format!("{:.6} s", summary.end_time)),
-        ("slips", slips.len().to_string()),
-        ("outcome", outcome.to_owned()),
-        ("regime", regime),
-        ("mean interval", or_none(mean, "s")),
-        ("mean friction", or_none(friction, "N")),
-        (
-            "contacts",
-            format!(
-                "{} breaks, {} reattachments",
-                summary.breaks, summary.reattachments
-            ),
-        ),
-        (
-            "steps",
-            format!("{}, of which {} leaps", summary.steps, summary.leaps),
-        ),
-        ("wall time", output::duration(wall)),
-    ])
+    }
+
+    fn print(&self) -> Result<()> {
+        // A mean of few slips is not better known.
+        let mean = |value: Option<f64>, unit: &str| {
+            let number = value.map(|value| Digits::FOUR.number(value));
+            number.map_or_else(|| "none".to_owned(), |number| format!("{number} {unit}"))
+        };
+        let regime = match self.regime.zip(self.slip_share) {
+            None => "none".to_owned(),
+            Some((regime, _)) if self.slips == 0 => regime.to_owned(),
+            Some((regime, share)) => {
+                format!("{regime}, {:.3} % of the time within slips", 100.0 * share)
+            }
+        };
+        let contacts = format!(
+            "{} breaks, {} reattachments",
+            self.breaks, self.reattachments
+        );
+        let steps = format!("{}, of which {} leaps", self.steps, self.leaps);
+        output::pairs(&[
+            ("job", self.job_id.to_owned()),
+            ("simulated time", format!("{:.6} s", self.simulated_seconds)),
+            ("slips", self.slips.to_string()),
+            ("outcome", self.outcome.to_owned()),
+            ("regime", regime),
+            ("mean interval", mean(self.mean_interval_seconds, "s")),
+            ("mean friction", mean(self.mean_friction_newtons, "N")),
+            ("contacts", contacts),
+            ("steps", steps),
+            ("wall time", output::duration(self.wall_seconds)),
+        ])
+    }
+}
+
+/// A line for each slip; empty without slips.
+fn table_of_slips(slips: &[Slip]) -> String {
+    if slips.is_empty() {
+        return String::new();
+    }
+    let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    let mut columns = Columns::default();
+    columns.numbers("slip", slips, |slip| slip.number.to_string());
+    columns.numbers("onset (s)", slips, |slip| format!("{:.6}", slip.onset));
+    columns.numbers("interval (s)", slips, |slip| {
+        or_none(slip.interval.map(|interval| format!("{interval:.6}")))
+    });
+    columns.numbers("phase (rad)", slips, |slip| {
+        or_none(slip.phase.map(|phase| format!("{phase:.4}")))
+    });
+    columns.numbers("peak (N)", slips, |slip| format!("{:.2}", slip.peak_force));
+    columns.numbers("drop (N)", slips, |slip| format!("{:.2}", slip.drop));
+    columns.numbers("precursors", slips, |slip| slip.precursors.to_string());
+    columns.to_string()
 }

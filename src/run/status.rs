@@ -5,7 +5,7 @@ use crate::results::events::RunEvent;
 use crate::results::pending::{Again, Overview, Pending, Retry};
 use crate::results::rounds::RoundsSoFar;
 use crate::results::tables::{JOBS, JobOutcome};
-use crate::results::workers::{Living, Worker};
+use crate::results::workers::Living;
 use crate::results::{Results, ResultsError};
 use crate::run::reasons::Reasons;
 use crate::sweep::{Extension, Outline};
@@ -42,9 +42,11 @@ pub struct Status {
 /// A worker that is there.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Present {
-    #[serde(flatten)]
-    pub worker: Worker,
-    /// Time since its last beat, in s; beside the clock of the file system, that of this host is read.
+    pub host: String,
+    pub process: u32,
+    pub threads: usize,
+    pub jobs_per_second: f64,
+    /// Time since its last beat, in s, by the clocks of the file system and of this host.
     pub last_beat: f64,
 }
 
@@ -141,13 +143,16 @@ pub fn status_with(results: &Results<'_>, max_failures: u64) -> Result<Status, R
         _ => (),
     })?;
     let now = SystemTime::now();
-    let present = |Living { worker, beat, .. }| {
-        let last_beat = now.duration_since(beat).unwrap_or_default().as_secs_f64();
-        Present { worker, last_beat }
+    let present = |Living { worker, beat, .. }| Present {
+        host: worker.host,
+        process: worker.process,
+        threads: worker.threads,
+        jobs_per_second: worker.jobs_per_second,
+        last_beat: now.duration_since(beat).unwrap_or_default().as_secs_f64(),
     };
     let living = results.layout().living(now)?;
     let workers: Vec<Present> = living.into_values().map(present).collect();
-    let threads = workers.iter().map(|present| present.worker.threads);
+    let threads = workers.iter().map(|worker| worker.threads);
     let threads = threads.reduce(usize::saturating_add).or(last_threads);
     let pace = (predicted > 0.0).then(|| measured / predicted);
     Ok(Status {

@@ -85,9 +85,7 @@ fn the_parts_of_a_killed_process_are_taken_over_and_the_status_shows_who_is_ther
     let workers = status["workers"].as_array().unwrap();
     assert_eq!(workers.len(), 2, "{status}");
     assert!(
-        workers
-            .iter()
-            .all(|worker| worker["threads"] == 1 && worker["sweep"] == workers[0]["sweep"]),
+        workers.iter().all(|worker| worker["threads"] == 1),
         "{status}"
     );
     folder.ends(3, "status r --check");

@@ -287,8 +287,7 @@ fn jobs_without_slips_are_told_with_a_command_that_shows_one() {
         "name = \"fast\"\n[model]\nN = 5\nNs = 5\n[axes]\nV0 = [1e-4, 1]\nseed = { count = 2 }\n[record]\nslips = 4\ngive_up_after = 0.5\n",
     );
     let run = folder.ends(0, "run fast.toml --out out").stdout;
-    let note =
-        "2 jobs of 1 set ended as no further slip came: they slide, or give_up_after is too short";
+    let note = "2 jobs of 1 set ended because no further slip came: the slider slides, or give_up_after is too short";
     assert!(
         run.contains(&format!(
             "{note}; a job of one such set: stickslip simulate "
