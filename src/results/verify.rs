@@ -77,6 +77,8 @@ impl<'a> Results<'a> {
         for problem in &verification.problems {
             match problem.part.as_deref().and_then(PartName::parse) {
                 None => move_away(layout, &problem.path)?,
+                // Its first problem has moved the whole part.
+                Some(_) if problem.jobs.is_empty() => (),
                 // Jobs first: a part without them is not done.
                 Some(part) => results.tables().rev().try_for_each(|table| {
                     move_away(layout, &layout.table(table).join(part.file()))

@@ -958,7 +958,7 @@ fn what_was_done_since_it_was_looked_up_is_counted_whoever_did_it() {
 }
 
 #[test]
-fn a_job_that_takes_long_is_told_while_it_runs() {
+fn a_job_that_takes_long_is_reported_while_it_runs() {
     let root = tempfile::tempdir().unwrap();
     let text = "name = \"test\"\n[axes]\nseed = [7]\n[record]\nslips = 1\ndiscard = 0\n";
     let sweep = Sweep::parse(text, Path::new("test.toml")).unwrap();
