@@ -6,7 +6,7 @@ use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
 use crate::run::take::{PartJob, Taken, Work};
 use crate::run::walltime::Walltime;
-use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, cpu, memory};
+use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, memory, threads};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
 use std::any::Any;
@@ -383,7 +383,7 @@ fn run_job(
     };
     let key = (job.of.part.extension, job.of.part.index, job.position);
     locked(under_way).insert(key, long);
-    let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
+    let (cpu, outcome) = threads::timed(|| outcome(task, kernel, interrupt));
     locked(under_way).remove(&key);
     let wall = begin.elapsed().as_secs_f64();
     let time = JobTime { cpu, wall };

@@ -13,13 +13,10 @@
 //! job in flight.
 
 mod collect;
-pub mod cpu;
 mod memory;
-mod reasons;
 mod shard;
 mod status;
 mod take;
-mod tally;
 #[cfg(test)]
 mod tests;
 pub mod threads;
@@ -27,10 +24,8 @@ mod walltime;
 
 pub use crate::results::events::{RunEvent, RunReport};
 pub use crate::results::pending::Overview;
-pub use reasons::Reasons;
 pub use shard::Shard;
-pub use status::{Failure, MAX_FAILURES, Present, Status, status, status_with};
-pub use tally::Tally;
+pub use status::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status, status_with};
 
 use crate::observe::Measurements;
 use crate::results::claims::{Claims, Standing};

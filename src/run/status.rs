@@ -1,4 +1,4 @@
-//! The status of a directory: what is done, what is missing, and how long that will take.
+//! How far a directory is, and how far a run is: jobs done and missing, failures by reason, time left.
 
 use crate::results::deaths::Marked;
 use crate::results::events::RunEvent;
@@ -7,10 +7,11 @@ use crate::results::rounds::RoundsSoFar;
 use crate::results::tables::{JOBS, JobOutcome};
 use crate::results::workers::Living;
 use crate::results::{Results, ResultsError};
-use crate::run::reasons::Reasons;
 use crate::sweep::{Extension, Outline};
 use crate::table::columns::columns;
 use serde::Serialize;
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::time::SystemTime;
 
 /// Failed jobs that [`status`] lists one by one, at most.
@@ -32,9 +33,9 @@ pub struct Status {
     pub failures: Vec<Failure>,
     pub failure_reasons: Reasons,
     pub cut: Cut,
-    /// Parts that are not done and at which workers died.
+    /// Unfinished parts at which workers died.
     pub marked: Vec<Marked>,
-    /// How far the rounds are, of a sweep that decides for itself.
+    /// How far the rounds of an adaptive sweep are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rounds: Option<RoundsSoFar>,
 }
@@ -92,16 +93,14 @@ impl Cut {
     }
 }
 
-/// Of the jobs of parts that are done, those that the sweep which was asked for last does not have.
+/// Jobs of finished parts that the current sweep does not have.
 fn jobs_kept(pending: &Pending<'_>) -> u64 {
     let last = pending.results.extensions().len() - 1;
-    let earlier = pending
-        .parts
-        .iter()
-        .filter(|part| part.extension < last && pending.done.has(part));
-    let jobs = earlier.flat_map(|part| pending.part(part).jobs);
-    jobs.filter(|job| !pending.results.sweep().contains(&job.parameters))
-        .count() as u64
+    let is_earlier = |part: &&Outline| part.extension < last && pending.done.has(part);
+    let parts = pending.parts.iter().filter(is_earlier);
+    let jobs = parts.flat_map(|part| pending.part(part).jobs);
+    let kept = jobs.filter(|job| !pending.results.sweep().contains(&job.parameters));
+    kept.count() as u64
 }
 
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
@@ -169,4 +168,122 @@ pub fn status_with(results: &Results<'_>, max_failures: u64) -> Result<Status, R
         marked: pending.marked(),
         rounds: results.rounds_so_far(),
     })
+}
+
+/// Numbers of failed jobs by reason. The numbers in a reason, which differ from job to job, are left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Reasons(BTreeMap<String, u64>);
+
+impl Reasons {
+    /// Counts a job; returns how many there are now.
+    pub fn add(&mut self, reason: &str) -> u64 {
+        *self.0.entry(without_numbers(reason)).or_default() += 1;
+        self.0.values().sum()
+    }
+
+    /// The most frequent first.
+    pub fn sorted(&self) -> Vec<(&str, u64)> {
+        let all = self.0.iter().map(|(reason, jobs)| (reason.as_str(), *jobs));
+        let mut reasons: Vec<(&str, u64)> = all.collect();
+        reasons.sort_by_key(|(_, jobs)| Reverse(*jobs));
+        reasons
+    }
+}
+
+fn without_numbers(reason: &str) -> String {
+    let words = reason.split(' ').map(|word| {
+        let number = word.trim_matches([',', ';', ':', '.', '(', ')']);
+        if number.parse::<f64>().is_ok() {
+            word.replace(number, "…")
+        } else {
+            word.to_owned()
+        }
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// How far a run is, by its events: jobs of all workers since it began, and their predicted cost.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    /// Jobs that are to be run, those of later rounds as these begin.
+    pub jobs: u64,
+    pub jobs_done: u64,
+    /// Of those done, jobs of other workers.
+    pub jobs_of_others: u64,
+    predicted: f64,
+    predicted_own: f64,
+    predicted_others: f64,
+}
+
+impl Tally {
+    pub fn note(&mut self, event: &RunEvent) {
+        match event {
+            RunEvent::Started {
+                jobs,
+                predicted_cost,
+                ..
+            }
+            | RunEvent::RoundBegun {
+                jobs,
+                predicted_cost,
+                ..
+            } => {
+                self.jobs += jobs;
+                self.predicted += predicted_cost;
+            }
+            RunEvent::JobDone { predicted_cost, .. }
+            | RunEvent::JobFailed { predicted_cost, .. } => {
+                self.jobs_done += 1;
+                self.predicted_own += predicted_cost;
+            }
+            RunEvent::OthersDone {
+                jobs,
+                predicted_cost,
+            } => {
+                self.jobs_done = self.jobs_done + jobs - self.jobs_of_others;
+                self.jobs_of_others = *jobs;
+                self.predicted_others = *predicted_cost;
+            }
+            _ => {}
+        }
+    }
+
+    /// Share of the predicted cost that is done; exactly 1 at the end, in whatever order costs were summed.
+    pub fn share(&self) -> f64 {
+        let done = self.predicted_own + self.predicted_others;
+        if self.jobs_done < self.jobs && self.predicted > 0.0 {
+            (done / self.predicted).min(1.0)
+        } else {
+            1.0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jobs_are_counted_by_reason_without_its_numbers_and_the_most_frequent_comes_first() {
+        let mut reasons = Reasons::default();
+        assert_eq!(reasons.sorted(), []);
+        assert_eq!(reasons.add("index 99 out of bounds"), 1);
+        for events in 10..14 {
+            reasons.add(&format!(
+                "at t = {events}.5e-3 s: {events} events, the shortest of 1/omega_max (s.d. {events})"
+            ));
+        }
+        assert_eq!(reasons.add("index 7 out of bounds"), 6);
+        assert_eq!(
+            reasons.sorted(),
+            [
+                (
+                    "at t = … s: … events, the shortest of 1/omega_max (s.d. …)",
+                    4
+                ),
+                ("index … out of bounds", 2)
+            ]
+        );
+    }
 }
