@@ -25,7 +25,7 @@ use std::time::Duration;
 /// What to do about a table that cannot be read.
 const ADVICE: &str = "`stickslip verify` says what to do about damage";
 
-/// The report of a directory as HTML. Reduces the tables first unless the reduced data are theirs.
+/// The report of a directory as HTML. Reduces the tables first if the reduced data are out of date.
 ///
 /// With `refresh`, the page says that a run goes on, and reloads itself after about this time.
 pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> {
@@ -35,7 +35,8 @@ pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> 
 
 /// Writes the report of a directory to `report.html` in it, over an earlier one, and returns its path.
 pub fn write(results: &Results<'_>, refresh: Option<Duration>) -> Result<PathBuf> {
-    let (layout, page) = (results.layout(), page(results, refresh)?);
+    let layout = results.layout();
+    let page = page(results, refresh)?;
     let _alone = exclusive_lock(layout, WRITER)?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     commit.stage_bytes(&layout.report(), page.as_bytes())?;
