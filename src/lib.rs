@@ -12,7 +12,7 @@
 //! Imports run one way: `physics` <- `table` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
 //! `reduce` <- `figure`; `run`, `figure` <- `report`.
 //! `physics/` is a crate of its own, which others can depend on: model, solvers and measurements, with the columns of their
-//! rows; it knows no file. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from
+//! rows; it knows no file. `single_job` runs one job with all its records. `accuracy` holds the solvers against each other, from
 //! the model to figures. Only `cli` prints, which is the command line; `python/` makes a Python module of the library.
 //!
 //! | word | meaning |
@@ -44,7 +44,7 @@ pub mod report;
 pub mod results;
 pub mod rounds;
 pub mod run;
-pub mod simulate;
+pub mod single_job;
 pub mod sweep;
 pub mod table;
 

@@ -4,7 +4,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use stickslip::run::threads::ThreadsError;
-use stickslip::simulate::RequestError;
+use stickslip::single_job::RequestError;
 
 create_exception!(
     stickslip,

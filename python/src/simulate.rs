@@ -12,7 +12,7 @@ use stickslip::observe::ContactRow;
 use stickslip::results::tables::{
     All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label, relabel,
 };
-use stickslip::simulate::{self as single, Records, Request, only_job};
+use stickslip::single_job::{self, Records, Request, only_job};
 use stickslip::sweep::{Change, Sweep};
 use stickslip::table::columns::{Row, Value};
 
@@ -34,7 +34,7 @@ pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
         }
     }
     if unknown.is_empty() {
-        Ok(single::sweep_text(&changes))
+        Ok(single_job::sweep_text(&changes))
     } else {
         Err(Error::Sweep(unknown.join("\n")).into())
     }
@@ -91,7 +91,7 @@ pub fn simulate<'py>(
     let (row, tables) = watched::<_, ()>(
         py,
         |stop, _| {
-            let (measured, records) = single::simulate(&sweep, &parameters, request, stop)?;
+            let (measured, records) = single_job::simulate(&sweep, &parameters, request, stop)?;
             let names = label::<DriveAndSeed>(&sweep, &parameters);
             let row: JobRow = (relabel::<_, All>(&names), JobRecord::new(Ok(&measured)));
             let Records {

@@ -1,24 +1,28 @@
 //! `stickslip simulate`: one job, everything visible.
 //!
-//! The job is that of a sweep with one point, a file or the text that flags make: values, messages and the id of the job
-//! are the same.
+//! The job is the only one of a sweep: of a file, or of the text that flags make. So values, messages and the id of the job
+//! are those of a sweep.
 
-mod outputs;
-
-use self::outputs::{Tables, check_outputs, write_pictures};
 use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
+use super::plot::picture_file;
+use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
+use crate::figure::simulation;
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
+use crate::results::destination::{Destination, Kind};
 use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
-use crate::simulate::{self as single, Request};
-use crate::sweep::{Change, Digits};
-use crate::table::file::Footer;
+use crate::single_job::{self, Records, Request};
+use crate::sweep::{Change, Digits, Sweep};
+use crate::table::columns::Table;
+use crate::table::file::{Footer, TableWriter};
+use crate::table::shown::shown;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::json;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -46,13 +50,13 @@ pub struct Arguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "The job")]
 struct JobFlags {
-    /// Set a parameter of the model, or what else a sweep file has; repeatable
+    /// Set a parameter of the model, or a key of [record] or [solver]; repeatable
     #[arg(long = "set", visible_alias = "record", value_name = "KEY=VALUE")]
     settings: Vec<String>,
     /// Slips to record after start-up [default: that of the file; without one 20, unless --time is given]
     #[arg(long, allow_negative_numbers = true, value_name = "N")]
     slips: Option<String>,
-    /// Model time at which the job ends even without its slips, in s: `max_time` of [record], where `time` waits for a slip
+    /// Longest model time, in s: `max_time` of [record], where `time` waits for a slip
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     time: Option<String>,
     /// Method [default: event-driven]
@@ -143,6 +147,24 @@ impl Arguments {
 }
 
 impl PlotFlags {
+    fn check(&self, longest: f64) -> Result<(), String> {
+        let from = self.from;
+        if !(from >= 0.0 && from.is_finite()) {
+            return Err(format!("--from {from}: must be a finite number >= 0, in s"));
+        }
+        if from >= longest {
+            return Err(format!(
+                "--from {from}: must lie before the end, {longest} s"
+            ));
+        }
+        match self.until {
+            Some(until) if !(until > from && until.is_finite()) => Err(format!(
+                "--until {until}: must be a finite number > {from}, the first instant, in s"
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether there is a plot with this panel.
     fn draws(&self, panel: Panel) -> bool {
         !self.files.is_empty() && (self.panel == panel || self.panel == Panel::Both)
@@ -190,66 +212,158 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
         arguments.preset.preset,
         &changes,
     )?;
-    let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
+    let job = single_job::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
-    check_outputs(arguments, &sweep, parameters)?;
+    arguments.check(&sweep, parameters)?;
     output::warn(&sweep.warnings());
     let begin = Instant::now();
     let never = AtomicBool::new(false);
-    let waiting = output::waiting(format!(
-        "simulating; about {} predicted",
-        output::duration(job.cost)
-    ));
-    let (result, recorded) = single::simulate(&sweep, parameters, arguments.request(), &never)?;
+    let predicted = output::duration(job.cost);
+    let waiting = output::waiting(format!("simulating; about {predicted} predicted"));
+    let request = arguments.request();
+    let (measured, records) = single_job::simulate(&sweep, parameters, request, &never)?;
     drop(waiting);
     let wall = begin.elapsed().as_secs_f64();
 
-    let footer = Footer::default()
-        .with_sweep(sweep.name(), sweep.text())
-        .with("parameters", &as_json(parameters));
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
-    let slips = result
-        .slips
-        .iter()
-        .map(|slip| -> SlipRow<'_> { (&label, slip) });
-    let tables = Tables {
-        footer: &footer,
-        left_out: &sweep.recording().left_out(),
-    };
+    let slips = (measured.slips.iter()).map(|slip| -> SlipRow<'_> { (&label, slip) });
+    let contacts = records.contacts.iter().map(ContactRow::from);
     let files = &arguments.tables;
-    tables.write(files.trace.as_deref(), recorded.trace.iter().copied())?;
-    tables.write(files.map.as_deref(), recorded.map.iter().copied())?;
-    tables.write(files.profile.as_deref(), recorded.profile.iter().copied())?;
-    let contacts = recorded.contacts.iter().map(ContactRow::from);
-    tables.write(files.contacts.as_deref(), contacts)?;
-    tables.write(files.slip_table.as_deref(), slips)?;
-    write_pictures(arguments, parameters, &recorded, &result.slips)?;
-    let report = Report::new(&label.0.job_id, &result, wall);
+    write_table(
+        &sweep,
+        parameters,
+        &files.trace,
+        records.trace.iter().copied(),
+    )?;
+    write_table(&sweep, parameters, &files.map, records.map.iter().copied())?;
+    write_table(
+        &sweep,
+        parameters,
+        &files.profile,
+        records.profile.iter().copied(),
+    )?;
+    write_table(&sweep, parameters, &files.contacts, contacts)?;
+    write_table(&sweep, parameters, &files.slip_table, slips)?;
+    arguments.write_plots(parameters, &records, &measured.slips)?;
+
+    let report = Report::new(&label.0.job_id, &measured, wall);
     if arguments.json {
         output::json(FORMAT, &report)?;
     } else {
-        output::print(&table_of_slips(&result.slips))?;
+        output::print(&table_of_slips(&measured.slips))?;
         report.print()?;
     }
     Ok(Exit::Done)
+}
+
+/// Writes a table, if there is a file for it.
+fn write_table<R: Table>(
+    sweep: &Sweep,
+    parameters: &Parameters,
+    path: &Option<PathBuf>,
+    rows: impl Iterator<Item = R>,
+) -> Result<()> {
+    let Some(path) = path else { return Ok(()) };
+    let footer = Footer::default()
+        .with_sweep(sweep.name(), sweep.text())
+        .with("parameters", &as_json(parameters));
+    let left_out = sweep.recording().left_out();
+    Destination::new(path, Kind::PARQUET)?.write(signals::catch, |file| {
+        let mut writer = TableWriter::without(&left_out, file, &footer)?;
+        for row in rows {
+            writer.push(&row)?;
+        }
+        Ok(writer.finish()?)
+    })
+}
+
+impl Arguments {
+    /// Refuses what could not be written or drawn, before anything runs.
+    fn check(&self, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
+        let recording = sweep.recording();
+        let request = self.request().check(parameters, recording);
+        request.map_err(|error| UsageError(format!("--{error}")))?;
+        let longest = recording.max_time.unwrap_or(f64::INFINITY);
+        self.plot.check(longest).map_err(UsageError)?;
+        let tables = &self.tables;
+        let tables = [
+            &tables.trace,
+            &tables.map,
+            &tables.profile,
+            &tables.contacts,
+            &tables.slip_table,
+        ];
+        let mut all = Vec::new();
+        for table in tables.into_iter().flatten() {
+            if table.exists() && !table.is_file() {
+                return Err(UsageError(format!("{}: must be a file", shown(table))).into());
+            }
+            all.push(Destination::new(table, Kind::PARQUET)?);
+        }
+        for file in &self.plot.files {
+            all.push(picture_file(file)?.0);
+        }
+        Ok(Destination::refuse_same(&all)?)
+    }
+
+    /// Draws the plot into each of its files.
+    fn write_plots(
+        &self,
+        parameters: &Parameters,
+        records: &Records,
+        slips: &[Slip],
+    ) -> Result<()> {
+        let PlotFlags { files, from, .. } = &self.plot;
+        if files.is_empty() {
+            return Ok(());
+        }
+        let refused = |problem: String| UsageError(format!("--from {from}: {problem}"));
+        let last = records.trace.last().map(|row| row.time);
+        let last = last
+            .or(records.map.last().map(|row| row.time))
+            .unwrap_or(0.0);
+        if *from >= last {
+            let problem = format!(
+                "the simulation ended at {last} s; take an earlier instant, or a longer --time"
+            );
+            return Err(refused(problem).into());
+        }
+        let shown = self.shown_times();
+        let trace = records.trace.iter().filter(|row| shown.contains(&row.time));
+        let trace: Vec<(f64, f64)> = trace.map(|row| (row.time, row.force)).collect();
+        let map = records.map.iter().filter(|row| shown.contains(&row.time));
+        let map: Vec<_> = map.copied().collect();
+        let onsets: Vec<f64> = slips.iter().map(|slip| slip.onset).collect();
+        let trace = self.plot.draws(Panel::Force).then_some(&*trace);
+        let map = self.plot.draws(Panel::Map).then_some(&*map);
+        let picture = simulation(parameters, trace, map, &onsets);
+        let picture = picture.map_err(|error| refused(error.to_string()))?;
+        for path in files {
+            let (destination, format) = picture_file(path)?;
+            output::write(&destination, &picture.encoded(format)?)?;
+        }
+        Ok(())
+    }
+
+    /// The times of the plot. The sample at an end is shown, however its time is rounded.
+    fn shown_times(&self) -> RangeInclusive<f64> {
+        let slack = 1e-6 * self.tables.sample;
+        self.plot.from - slack..=self.plot.until.unwrap_or(f64::INFINITY) + slack
+    }
 }
 
 impl JobFlags {
     /// What the flags set, each as a key of a sweep file.
     fn changes(&self) -> Result<Vec<Change>, UsageError> {
         let is_fixed = self.solver.as_deref() == Some("fixed-step");
+        let default = is_fixed.then(|| "1e-6".to_owned());
+        let dt = self.dt.clone().or(default);
         let flags = [
             ("slips", &self.slips),
             ("max_time", &self.time),
             ("method", &self.solver),
             ("tolerance", &self.tolerance),
-            (
-                "dt",
-                &self
-                    .dt
-                    .clone()
-                    .or_else(|| is_fixed.then(|| "1e-6".to_owned())),
-            ),
+            ("dt", &dt),
         ];
         let flags = flags
             .into_iter()

@@ -5,7 +5,7 @@ use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::results::tables::{recorded_schema, tables_of};
-use crate::simulate as single;
+use crate::single_job;
 use crate::sweep::{Change, Sweep, SweepError, varied};
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
@@ -125,7 +125,7 @@ pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> 
         }
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
-        (None, None) => return of_flags(&single::sweep_text(changes)),
+        (None, None) => return of_flags(&single_job::sweep_text(changes)),
     };
     vary(sweep?, changes)
 }
