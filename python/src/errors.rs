@@ -10,7 +10,7 @@ create_exception!(
     stickslip,
     SweepError,
     PyValueError,
-    "A sweep, or a key of a simulation, that says nothing that can run."
+    "A mistake in a sweep, or in the keys of a simulation."
 );
 create_exception!(
     stickslip,

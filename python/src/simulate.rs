@@ -19,7 +19,8 @@ use stickslip::table::columns::{Row, Value};
 /// The text of a sweep with one job, from keys and their values as TOML.
 #[pyfunction]
 pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
-    let (mut changes, mut unknown) = (Vec::new(), Vec::new());
+    let mut changes = Vec::new();
+    let mut unknown = Vec::new();
     for (key, value) in keys {
         match section(&key) {
             Some(section) => changes.push(Change {
@@ -146,7 +147,9 @@ pub fn simulate<'py>(
 
 /// A row as a dict, by the names of the columns; `None` where a value is missing.
 fn as_dict<'py, R: Row>(py: Python<'py>, row: &R) -> PyResult<Bound<'py, PyDict>> {
-    let (columns, dict, mut written) = (R::columns(), PyDict::new(py), Ok(()));
+    let columns = R::columns();
+    let dict = PyDict::new(py);
+    let mut written = Ok(());
     row.cells(&mut |cell| {
         let Some(column) = columns.get(dict.len()) else {
             return;
