@@ -38,8 +38,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of the JSON.
-const FORMAT: u32 = 2;
+const JSON_FORMAT: u32 = 2;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
@@ -56,7 +55,7 @@ pub fn export(arguments: &Arguments) -> Result<Exit> {
     })?;
     bar.finish_and_clear();
     if arguments.json {
-        output::json(FORMAT, &exported)?;
+        output::json(JSON_FORMAT, &exported)?;
         return Ok(Exit::Done);
     }
     output::lines(exported.files.iter().map(|file| {

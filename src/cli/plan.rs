@@ -41,8 +41,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of the JSON.
-const FORMAT: u32 = 2;
+const JSON_FORMAT: u32 = 2;
 
 /// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction. As measured, rounded up.
 const MEMORY: f64 = 80e6;
@@ -103,7 +102,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let directory = root.map_or(Ok(None), |root| Directory::of(&sweep, root))?;
     let forecast = Forecast::new(&sweep, threads, directory);
     if arguments.json {
-        output::json(FORMAT, &forecast)?;
+        output::json(JSON_FORMAT, &forecast)?;
     } else {
         output::pairs(&forecast.pairs(&sweep))?;
     }

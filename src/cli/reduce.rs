@@ -23,14 +23,13 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`ReductionSummary`] as JSON.
-const FORMAT: u32 = 2;
+const JSON_FORMAT: u32 = 2;
 
 pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let summary = crate::reduce::reduce(&results)?;
     if arguments.json {
-        output::json(FORMAT, &summary)?;
+        output::json(JSON_FORMAT, &summary)?;
     } else {
         output::pairs(&summary_lines(&summary, results.layout()))?;
     }

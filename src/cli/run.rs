@@ -82,8 +82,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`RunReport`] as JSON.
-const FORMAT: u32 = 2;
+const JSON_FORMAT: u32 = 2;
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
@@ -165,7 +164,7 @@ fn work(
     };
     // What was run is reported even if it could not be reduced.
     if arguments.json {
-        output::json(FORMAT, &report)?;
+        output::json(JSON_FORMAT, &report)?;
     } else {
         let mut lines = summary_lines(&report);
         if let Ok(Some(reduced)) = &reduced {

@@ -59,8 +59,7 @@ Examples:
 
 Columns are those of stickslip plot --list.";
 
-/// Version of the JSON.
-const FORMAT: u32 = 1;
+const JSON_FORMAT: u32 = 1;
 
 /// Sets that the end of a run shows, and reads for its columns and for what ended otherwise.
 const FIRST: usize = 12;
@@ -108,7 +107,7 @@ impl Arguments {
             let sets = (0..count).map(|set| record(columns, set).into_iter().collect());
             let sets: Vec<Map<String, Json>> = sets.collect();
             let edges: Vec<Json> = edges.iter().map(json).collect();
-            output::json(FORMAT, &serde_json::json!({ "sets": sets, "edges": edges }))
+            output::json(JSON_FORMAT, &serde_json::json!({ "sets": sets, "edges": edges }))
         } else if self.csv {
             print_csv(columns, count)
         } else {

@@ -202,8 +202,7 @@ enum Panel {
     Both,
 }
 
-/// Version of the JSON.
-const FORMAT: u32 = 1;
+const JSON_FORMAT: u32 = 1;
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let changes = arguments.job.changes()?;
@@ -248,7 +247,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
 
     let report = Report::new(&label.0.job_id, &measured, wall);
     if arguments.json {
-        output::json(FORMAT, &report)?;
+        output::json(JSON_FORMAT, &report)?;
     } else {
         output::print(&table_of_slips(&measured.slips))?;
         report.print()?;

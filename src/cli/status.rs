@@ -29,15 +29,14 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`Status`] as JSON.
-const FORMAT: u32 = 3;
+const JSON_FORMAT: u32 = 3;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read_plan(&Layout::new(&Disk, &arguments.directory))?;
     let status = crate::run::status(&results)?;
     let overview = status.overview;
     if arguments.json {
-        output::json(FORMAT, &status)?;
+        output::json(JSON_FORMAT, &status)?;
     } else {
         output::pairs(&pairs(&status))?;
         output::lines(status.workers.iter().map(worker_in_words))?;

@@ -35,8 +35,7 @@ pub struct Arguments {
 /// Names of parts, and ids of jobs of each problem, that are shown; `--json` has all.
 const SHOWN: usize = 3;
 
-/// Version of [`Report`] as JSON.
-const FORMAT: u32 = 5;
+const JSON_FORMAT: u32 = 5;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -70,7 +69,7 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
         commands,
     };
     if arguments.json {
-        output::json(FORMAT, &report)?;
+        output::json(JSON_FORMAT, &report)?;
     } else {
         report.print()?;
     }

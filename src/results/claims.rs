@@ -11,7 +11,6 @@ use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ffi::OsStr;
 
-/// The claims as they were when they were listed.
 #[derive(Debug)]
 pub struct Claims<'a> {
     member: &'a Member<'a>,

@@ -113,7 +113,6 @@ impl Layout<'_> {
         Ok(marks)
     }
 
-    /// Removes the marks of parts that are done.
     pub fn tidy_deaths(&self) -> Result<(), StorageError> {
         let marks = self.marks()?;
         if marks.is_empty() {

@@ -14,7 +14,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use tempfile::{Builder, TempDir};
 
-/// What the names of drafts begin with.
 const PREFIX: &str = ".stickslip-";
 /// Bytes at the beginning of a file that say what it is.
 const BEGINNING: u64 = 1024;
@@ -172,7 +171,6 @@ impl Destination {
 /// A folder that takes its place as a whole.
 pub struct NewFolder {
     pub place: PathBuf,
-    /// Where its files are prepared.
     pub draft: TempDir,
 }
 

@@ -28,7 +28,6 @@ pub struct Results<'a> {
     footers: Vec<Arc<Footer>>,
 }
 
-/// What is wrong with the name of a table file.
 pub(super) const STRANGER: &str =
     "no part of this directory has this name, and readers of the folder would take it for one";
 
@@ -302,7 +301,6 @@ impl<'a> Results<'a> {
         Ok(Dataset::of(self.layout.storage, files.collect()))
     }
 
-    /// The file of a part in a table, as a dataset.
     pub(super) fn dataset_of(&self, table: &str, part: PartName) -> Dataset<'a> {
         let file = self.file_in(&self.layout.tables(), table, part);
         Dataset::of(self.layout.storage, vec![file])
@@ -317,7 +315,6 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Looks up which parts are done.
     pub fn done_parts(&self) -> Result<DoneParts, ResultsError> {
         if self.extensions.is_empty() {
             return Ok(DoneParts::default());
@@ -420,7 +417,6 @@ impl<'a> Results<'a> {
         tables_of(self.sweep().recording())
     }
 
-    /// The id of a job of a part.
     pub fn job_id(&self, part: &Part, position: usize) -> String {
         self.extensions[part.extension]
             .sweep

@@ -19,20 +19,16 @@ use std::time::{SystemTime, UNIX_EPOCH};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum RunEvent {
-    /// A run knows what is to be done.
     Started {
         host: String,
         process: u32,
         program: String,
         /// Shard, as `K/N`.
         shard: String,
-        /// Other workers that are there.
         others: usize,
         threads: usize,
         jobs: u64,
-        /// Jobs that are there already.
         jobs_there: u64,
-        /// Predicted cost of the jobs to run.
         predicted_cost: f64,
     },
     /// The next round of an adaptive sweep has begun.
@@ -74,12 +70,10 @@ pub enum RunEvent {
     },
     PartCommitted {
         part: String,
-        /// Jobs that were run for it.
         jobs: usize,
         failed: usize,
         predicted_cost: f64,
         measured_cost: f64,
-        /// Sum of their wall times.
         wall: f64,
     },
     /// The run was asked to stop, or its time is over; jobs in flight are interrupted.
@@ -118,7 +112,6 @@ pub struct RunReport {
     pub measured_cost: f64,
     /// Wall time of the run, in s.
     pub wall: f64,
-    /// How far the rounds of an adaptive sweep are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rounds: Option<RoundsSoFar>,
 }

@@ -59,7 +59,6 @@ struct Format {
     format: u32,
 }
 
-/// Names of the columns of each table of a sweep.
 fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
     let columns = |table: &str| {
         let schema = recorded_schema(table, sweep.recording());
@@ -93,7 +92,6 @@ impl Record {
         }
     }
 
-    /// The text of the file.
     pub fn text(&self) -> String {
         // It always has a form as JSON: it holds texts and numbers alone.
         checksum::to_json(self).unwrap_or_default()

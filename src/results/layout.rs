@@ -32,10 +32,8 @@ const RESULTS: &str = "results";
 pub const RUN_FOLDERS: [&str; 8] = [
     "staging", "lock", "log", "workers", "claims", "spill", "batch", "deaths",
 ];
-/// What the name of an extension's file begins with.
 const EXTENSION: &str = "extension-";
 
-/// Paths within a results directory, and the storage on which it lies.
 #[derive(Clone)]
 pub struct Layout<'a> {
     pub storage: &'a dyn Storage,
@@ -141,7 +139,6 @@ impl<'a> Layout<'a> {
         self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
     }
 
-    /// The file of an extension.
     pub fn extension(&self, number: usize) -> PathBuf {
         self.run().join(extension_name(number))
     }

@@ -50,7 +50,6 @@ impl<'a> Results<'a> {
         Ok(Dataset::of(self.layout().storage, files))
     }
 
-    /// The file of a part in a table.
     pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
         self.layout().table(table).join(PartName::from(part).file())
     }

@@ -57,7 +57,6 @@ pub enum Again {
     CutOff,
 }
 
-/// Which failed jobs run again.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Retry {
     pub all: bool,
@@ -112,13 +111,11 @@ impl<'a> Pending<'a> {
         Ok(pending)
     }
 
-    /// Looks up again what is spilled.
     pub fn look_at_spill(&self) -> Result<(), ResultsError> {
         *self.spilled.borrow_mut() = self.results.spilled_parts(tables::JOBS)?;
         Ok(())
     }
 
-    /// Looks up again at which parts workers died.
     pub fn look_at_deaths(&self) -> Result<(), ResultsError> {
         *self.deaths.borrow_mut() = self.results.layout().marks()?;
         Ok(())
@@ -130,7 +127,6 @@ impl<'a> Pending<'a> {
         Ok(())
     }
 
-    /// How many workers died at a part.
     pub fn deaths(&self, part: &Outline) -> usize {
         let deaths = self.deaths.borrow();
         deaths.get(&part.into()).map_or(0, Vec::len)
@@ -149,7 +145,6 @@ impl<'a> Pending<'a> {
             || pairs.any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
     }
 
-    /// Whether a job of a finished part runs again.
     pub fn runs_again(&self, job: &Job, why: &Again) -> bool {
         match why {
             Again::CutOff => true,

@@ -19,7 +19,6 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Staging folder of a repair.
 const WRITER: &str = "repair";
 
 #[derive(Clone, Debug, Default, Serialize)]

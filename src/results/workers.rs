@@ -27,7 +27,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Time between two heartbeats.
 pub const BEAT: Duration = shorter_in_tests(Duration::from_secs(5), Duration::from_secs(1));
 /// A worker of another host is dead if its file is older by this time than the file of the worker that looks.
 pub const SILENCE: Duration = shorter_in_tests(Duration::from_mins(1), Duration::from_secs(4));
@@ -131,7 +130,6 @@ pub fn host() -> String {
     }
 }
 
-/// The name of a host as names of files hold it.
 pub fn plain(host: &str) -> String {
     host.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-', "_")
 }
@@ -294,7 +292,6 @@ impl<'a> Member<'a> {
         self.layout.staging(&self.name)
     }
 
-    /// A file that holds its name.
     pub(super) fn claim(&self) -> PathBuf {
         self.staging().join(CLAIM)
     }
@@ -385,7 +382,6 @@ impl<'a> Member<'a> {
         is_buried.then(|| ResultsError::new(ErrorKind::Stopped, self.layout.root(), problem))
     }
 
-    /// Begins to prepare files for their places.
     pub(super) fn commit(&self) -> Commit<'a> {
         Commit::within(self.layout.storage, &self.staging())
     }

@@ -31,7 +31,6 @@ const LONG_BY_PREDICTION: f64 = 20.0;
 const AHEAD: f64 = 0.5;
 const MAX_AHEAD: usize = 256;
 
-/// A job that has ended.
 struct Ended {
     job: PartJob,
     /// `None` if it was interrupted.
@@ -39,7 +38,6 @@ struct Ended {
     time: JobTime,
 }
 
-/// What a job took, in s.
 #[derive(Clone, Copy, Debug, Default)]
 struct JobTime {
     cpu: f64,
@@ -253,7 +251,6 @@ impl<'a, 'e> Collector<'a, 'e> {
         }
     }
 
-    /// Reports jobs that take long.
     fn report_long_jobs(&mut self, under_way: &AllUnderWay) -> Result<(), ResultsError> {
         for long in locked(under_way).values_mut() {
             let elapsed = long.begin.elapsed();

@@ -22,25 +22,21 @@ pub struct Status {
     pub name: String,
     #[serde(flatten)]
     pub overview: Overview,
-    /// Workers that are there now.
     pub workers: Vec<Present>,
     /// Measured over predicted CPU time so far, by the logs; null before the first part.
     pub pace: Option<f64>,
     /// Predicted wall time for the missing jobs, in s, at this pace and with the threads that are there now or ran last; null
     /// before the first part.
     pub time_left: Option<f64>,
-    /// The first failed jobs, and all by reason.
     pub failures: Vec<Failure>,
     pub failure_reasons: Reasons,
     pub cut: Cut,
     /// Unfinished parts at which workers died.
     pub marked: Vec<Marked>,
-    /// How far the rounds of an adaptive sweep are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rounds: Option<RoundsSoFar>,
 }
 
-/// A worker that is there.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Present {
     pub host: String,
@@ -70,7 +66,6 @@ columns! {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Cut {
     pub jobs: u64,
-    /// Slips that they recorded.
     pub slips: u64,
 }
 

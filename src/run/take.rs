@@ -27,7 +27,6 @@ const LOOK_BUSY: Duration = Duration::from_secs(5);
 /// Deaths of workers after which a part runs alone, one job after the other.
 const DEATHS: usize = 3;
 
-/// A part that this worker has taken.
 #[derive(Debug)]
 pub(super) struct Taken {
     pub part: Part,
@@ -59,7 +58,6 @@ impl PartJob {
 /// What is left when a worker has nothing to do.
 #[derive(Debug, Default)]
 pub(super) struct Left {
-    /// Jobs of the parts that are not done.
     pub jobs: u64,
     /// Hosts of the workers that run them.
     pub hosts: BTreeSet<String>,
