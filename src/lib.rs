@@ -26,7 +26,7 @@
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
 //! | job | one point of a sweep, known by a hash of parameters, solver and recording |
 //! | set | all jobs that differ in the seed alone |
-//! | round | points of a sweep that decides for itself, run together: an extension ([`rounds`]) |
+//! | round | points of an adaptive sweep that run together: an extension ([`rounds`]) |
 //! | extension | a sweep in a results directory; it owns its jobs but for those that earlier ones have done |
 //! | part | consecutive jobs of an extension, committed together |
 //! | outline | a part without its jobs: where they lie, and what they add up to |

@@ -1,7 +1,7 @@
 //! `stickslip accuracy`: speed against error of the solvers, measured in one run.
 
 use super::exit::{Exit, UsageError};
-use super::output::{self, Columns};
+use super::output::{self, TextTable};
 use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
 use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, shows_bias, verdict};
@@ -184,7 +184,7 @@ fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
         .filter(|row| *row.parameters == *set)
         .collect();
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
-    let mut columns = Columns::default();
+    let mut columns = TextTable::default();
     columns.words("   solver", &rows, |row| {
         let is_own = row.solver == study.own.into();
         format!("{} {}", if is_own { "->" } else { "  " }, row.solver)

@@ -63,7 +63,7 @@ impl Question {
     }
 }
 
-/// A sweep that runs as it is, with all other keys as comments.
+/// A sweep that runs unchanged, with all other keys as comments.
 const TEMPLATE: Preset = Preset {
     name: "sweep",
     text: include_str!("init/template.toml"),
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_template_runs_as_it_is_and_names_every_key_with_its_default() {
+    fn the_template_runs_unchanged_and_names_every_key_with_its_default() {
         // The tables of rounds stand as a whole or not at all.
         let text = TEMPLATE.text.split("\n# Seeds until").next().unwrap();
         // What has no default stays a comment.

@@ -3,7 +3,7 @@
 use super::signals;
 use crate::results::Results;
 use crate::results::destination::Destination;
-use crate::results::rounds::RoundsSoFar;
+use crate::results::next_round::RoundsSoFar;
 use crate::run::Reasons;
 use crate::sweep::Standing;
 use crate::table::shown::{is_plain, shown_text};
@@ -65,7 +65,7 @@ pub fn plain_json(value: &impl Serialize) -> Result<()> {
 
 /// Prints labels and values in two columns.
 pub fn pairs(pairs: &[(&str, String)]) -> Result<()> {
-    let mut columns = Columns::default();
+    let mut columns = TextTable::default();
     columns.words("", pairs, |(label, _)| (*label).to_owned());
     columns.words("", pairs, |(_, value)| value.clone());
     print(&columns.to_string())
@@ -73,15 +73,15 @@ pub fn pairs(pairs: &[(&str, String)]) -> Result<()> {
 
 /// A table for people: columns of cells, each below its head. Without any head, there is no line for heads.
 #[derive(Default)]
-pub struct Columns(Vec<Column>);
+pub struct TextTable(Vec<TextColumn>);
 
-struct Column {
+struct TextColumn {
     /// Words stand to the left, numbers to the right.
     is_worded: bool,
     cells: Vec<String>,
 }
 
-impl Columns {
+impl TextTable {
     /// Adds a column of words, with a cell for each row.
     pub fn words<R>(&mut self, head: impl Into<String>, rows: &[R], cell: impl Fn(&R) -> String) {
         self.add(true, head.into(), rows.iter().map(cell));
@@ -94,14 +94,14 @@ impl Columns {
 
     pub fn add(&mut self, is_worded: bool, head: String, cells: impl Iterator<Item = String>) {
         let cells = std::iter::once(head).chain(cells).collect();
-        self.0.push(Column { is_worded, cells });
+        self.0.push(TextColumn { is_worded, cells });
     }
 }
 
-impl fmt::Display for Columns {
+impl fmt::Display for TextTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = |cell: &String| cell.chars().count();
-        let width = |column: &Column| column.cells.iter().map(width).max().unwrap_or(0);
+        let width = |column: &TextColumn| column.cells.iter().map(width).max().unwrap_or(0);
         let widths: Vec<usize> = self.0.iter().map(width).collect();
         let lines = self.0.first().map_or(0, |column| column.cells.len());
         let has_heads = self.0.iter().any(|column| !column.cells[0].is_empty());

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use super::sweep::{self, PresetFlag, Variation};
 use crate::results::layout::Layout;
-use crate::results::rounds::RoundsSoFar;
+use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
 use crate::run::threads::{self, Threads};
 use crate::run::{Overview, status};
@@ -60,7 +60,7 @@ struct Forecast<'a> {
     threads: usize,
     worker_memory_bytes: f64,
     thread_memory_bytes: f64,
-    directory: Option<Directory>,
+    directory: Option<DirectoryState>,
     /// What all rounds of an adaptive sweep may add up to; the other numbers are those of the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     at_most: Option<Bounds>,
@@ -74,7 +74,7 @@ struct AxisInBrief {
 
 /// How much of the sweep is in its results directory, or why it cannot be run there.
 #[derive(Serialize)]
-struct Directory {
+struct DirectoryState {
     #[serde(serialize_with = "serialize_path")]
     path: PathBuf,
     refused: Option<String>,
@@ -99,7 +99,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     }
     let threads = Threads::choose(None, |variable| std::env::var_os(variable))?;
     let threads = threads::or_all_cores(threads.count);
-    let directory = root.map_or(Ok(None), |root| Directory::of(&sweep, root))?;
+    let directory = root.map_or(Ok(None), |root| DirectoryState::of(&sweep, root))?;
     let forecast = Forecast::new(&sweep, threads, directory);
     if arguments.json {
         output::json(JSON_FORMAT, &forecast)?;
@@ -110,7 +110,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
 }
 
 impl<'a> Forecast<'a> {
-    fn new(sweep: &'a Sweep, threads: usize, directory: Option<Directory>) -> Self {
+    fn new(sweep: &'a Sweep, threads: usize, directory: Option<DirectoryState>) -> Self {
         let totals = Plan::new(&[Extension::new(sweep, &[])]).totals();
         let axes = sweep.axes();
         Self {
@@ -186,14 +186,14 @@ impl<'a> Forecast<'a> {
         }
         let directory = (self.directory.as_ref()).map_or_else(
             || "none yet: all jobs are to run".to_owned(),
-            Directory::in_words,
+            DirectoryState::in_words,
         );
         pairs.push(("directory", directory));
         pairs
     }
 }
 
-impl Directory {
+impl DirectoryState {
     /// `None` if there is none yet.
     fn of(sweep: &Sweep, root: PathBuf) -> Result<Option<Self>> {
         if !Disk.exists(&root)? {

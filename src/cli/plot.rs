@@ -1,7 +1,7 @@
 //! `stickslip plot`: reduced data to figures, the standing ones or one's own.
 
 use super::exit::{Exit, UsageError};
-use super::output::{self, Columns};
+use super::output::{self, TextTable};
 use crate::figure::{Format, Look, OwnFigure, Size, Style, draw_all, draw_own, write_own};
 use crate::reduce::{renew, set_columns};
 use crate::results::Results;
@@ -13,7 +13,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Draw the figures of a results directory, or one of your own; reduces first where the reduced data are not of its tables
+/// Draw the figures of a results directory, or a custom figure; first makes reduced data again that are out of date
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
@@ -34,7 +34,7 @@ pub struct Arguments {
     style: Style,
     #[command(flatten)]
     own: OwnFigure,
-    /// File of your own figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
+    /// File of a custom figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
     #[arg(
         short,
         long,
@@ -122,7 +122,7 @@ pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
 /// The columns of the table of sets.
 fn list() -> String {
     let described = set_columns();
-    let mut columns = Columns::default();
+    let mut columns = TextTable::default();
     columns.words("", &described, |column| column.name.to_string());
     columns.words("", &described, |column| column.unit.to_owned());
     columns.words("", &described, |column| column.meaning.to_owned());

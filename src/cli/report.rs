@@ -59,7 +59,7 @@ const SPACING: u32 = 100;
 /// When a browser loads the page again while other workers still run.
 const OTHERS_SPACING: Duration = Duration::from_secs(30);
 
-/// Writes the report of a run while it goes on.
+/// Writes the report of a run during the run.
 pub struct Reporter<'a> {
     layout: &'a Layout<'a>,
     /// Whether something was committed since the last one.

@@ -10,7 +10,7 @@ use crate::observe::measure;
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::results::rounds::RoundsSoFar;
+use crate::results::next_round::RoundsSoFar;
 use crate::run::threads::{self, Threads};
 use crate::run::{Joined, Options, RunReport, Shard};
 use crate::sweep::{Job, Sweep};

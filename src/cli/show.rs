@@ -1,7 +1,7 @@
 //! `stickslip show`: the result of a sweep, a line for each set. `run` ends with its first lines.
 
 use super::exit::{Exit, UsageError};
-use super::output::{self, Columns};
+use super::output::{self, TextTable};
 use crate::model::Symbol;
 use crate::reduce::{
     EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing, read_reduced,
@@ -107,7 +107,10 @@ impl Arguments {
             let sets = (0..count).map(|set| record(columns, set).into_iter().collect());
             let sets: Vec<Map<String, Json>> = sets.collect();
             let edges: Vec<Json> = edges.iter().map(json).collect();
-            output::json(JSON_FORMAT, &serde_json::json!({ "sets": sets, "edges": edges }))
+            output::json(
+                JSON_FORMAT,
+                &serde_json::json!({ "sets": sets, "edges": edges }),
+            )
         } else if self.csv {
             print_csv(columns, count)
         } else {
@@ -299,7 +302,7 @@ fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
 
 /// A table for people: symbols and units at its head, values with half of their 95 % intervals.
 fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
-    let mut text = Columns::default();
+    let mut text = TextTable::default();
     for values in columns {
         add_column(&mut text, values, rows, most);
     }
@@ -307,7 +310,7 @@ fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
 }
 
 /// Adds a column of the first sets.
-fn add_column(columns: &mut Columns, values: &Values, rows: &[SetRow], most: usize) {
+fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: usize) {
     let label = values.label();
     let is_interval = values.column.name == "tau_mean";
     let bound = |set: usize| rows.get(set).filter(|_| is_interval)?.tau_bound;
@@ -345,7 +348,7 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
     let Some(first) = edges.first() else {
         return String::new();
     };
-    let mut columns = Columns::default();
+    let mut columns = TextTable::default();
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
     let as_set = |edge: &EdgeRow| SetRow {
         frequency: edge.parameters.frequency(),

@@ -4,7 +4,7 @@
 //! are those of a sweep.
 
 use super::exit::{Exit, UsageError};
-use super::output::{self, Columns};
+use super::output::{self, TextTable};
 use super::plot::picture_file;
 use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
@@ -471,7 +471,7 @@ fn table_of_slips(slips: &[Slip]) -> String {
         return String::new();
     }
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
-    let mut columns = Columns::default();
+    let mut columns = TextTable::default();
     columns.numbers("slip", slips, |slip| slip.number.to_string());
     columns.numbers("onset (s)", slips, |slip| format!("{:.6}", slip.onset));
     columns.numbers("interval (s)", slips, |slip| {

@@ -36,7 +36,7 @@ const PRESETS: [Preset; 31] = presets! {
 };
 
 impl Preset {
-    /// What the first line of the file says, without a sentence that goes on in the next line.
+    /// What the first line of the file says, without a sentence that continues in the next line.
     fn about(self) -> &'static str {
         let line = self.text.lines().next().unwrap_or_default();
         let line = line.trim_start_matches(['#', ' ']);

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::results::verify::{Problem, Verification};
+use crate::results::verification::{Problem, Verification};
 use crate::table::shown::{shown, shown_text};
 use crate::table::storage::Disk;
 use anyhow::Result;

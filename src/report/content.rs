@@ -1,8 +1,8 @@
 //! The data of a page.
 
 use super::ADVICE;
+use super::reduced_columns::{Census, Sets, backbone};
 use super::slips::Slips;
-use super::tables::{Census, Sets, backbone};
 use crate::figure::{INKS, SCALE};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::model::{MODEL_VERSION, RNG_SCHEME, Symbol};
@@ -63,7 +63,7 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
         "rng_scheme": RNG_SCHEME,
         "plan_version": PLAN_VERSION,
         "directory": shown(layout.root()).to_string(),
-        // Set while a run goes on; times in s, `written` since 1970 UTC.
+        // Set during a run; times in s, `written` since 1970 UTC.
         "live": refresh.map(|refresh| json!({ "refresh": refresh.as_secs_f64(), "written": written })),
         "status": status_with(results, MAX_FAILURES)?,
         "asked": asked(sweep),

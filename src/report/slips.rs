@@ -1,6 +1,6 @@
 //! Slips for the charts, or a sample of them.
 
-use super::tables::Columns;
+use super::reduced_columns::Columns;
 use crate::observe::Slip;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};

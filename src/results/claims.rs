@@ -27,7 +27,7 @@ pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing<'a> {
+pub enum ClaimState<'a> {
     /// No living worker has it: this generation can be made.
     Free(u64),
     Own,
@@ -58,7 +58,7 @@ impl<'a> Claims<'a> {
         Ok(())
     }
 
-    /// The last generation of a claim, as far as is known; `None` if nobody has claimed it.
+    /// The last generation of a claim, as far as is known; `None` if no worker has claimed it.
     pub fn last(&self, what: &str) -> Option<u64> {
         self.generations.get(what).copied()
     }
@@ -68,19 +68,19 @@ impl<'a> Claims<'a> {
         &self,
         what: &str,
         living: &'l BTreeMap<String, Living>,
-    ) -> Result<Standing<'l>, StorageError> {
+    ) -> Result<ClaimState<'l>, StorageError> {
         if self.own.contains(what) {
-            return Ok(Standing::Own);
+            return Ok(ClaimState::Own);
         }
         let Some(generation) = self.last(what) else {
-            return Ok(Standing::Free(0));
+            return Ok(ClaimState::Free(0));
         };
         let owner = self.owner(what, generation)?;
         if owner == self.member.name() {
-            return Ok(Standing::Own);
+            return Ok(ClaimState::Own);
         }
         let living = living.get_key_value(&owner).map(|(name, _)| name.as_str());
-        Ok(living.map_or(Standing::Free(generation + 1), Standing::Taken))
+        Ok(living.map_or(ClaimState::Free(generation + 1), ClaimState::Taken))
     }
 
     /// Makes a claim; false if another worker was first.

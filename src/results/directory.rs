@@ -293,7 +293,7 @@ impl<'a> Results<'a> {
         Ok(parts)
     }
 
-    /// All files of a table as they are now, each of them that of a part.
+    /// The files of all parts in a table.
     pub fn dataset(&self, table: &str) -> Result<Dataset<'a>, ResultsError> {
         let tables = self.layout.tables();
         let parts = self.parts_of(table)?.into_iter();

@@ -45,7 +45,7 @@ pub(super) struct Record {
     part_cost: f64,
     /// The points that the extension before keeps from when this one began; all, if this is the next round of its sweep.
     kept_before: Option<Vec<RangeInclusive<u64>>>,
-    /// Of a sweep that decides for itself.
+    /// The round of an adaptive sweep.
     round: Option<Round>,
     /// Checksum of the file before.
     before: Option<String>,
@@ -278,7 +278,7 @@ pub(super) fn extensions(
             }
         };
         if sweep.rounds().is_some() != record.round.is_some() {
-            let problem = "its sweep has rounds where it decides nothing, or none where it does";
+            let problem = "its sweep is adaptive and the file has no round, or the other way round";
             return Err(ResultsError::damaged(&layout.extension(number), problem));
         }
         if let Some(last) = extensions.last_mut() {

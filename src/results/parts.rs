@@ -9,7 +9,7 @@ use crate::results::commit::Commit;
 use crate::results::directory::Results;
 use crate::results::layout::PartName;
 use crate::results::tables::{
-    self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow,
+    self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
     label, relabel,
 };
 use crate::results::workers::Member;
@@ -165,7 +165,7 @@ impl<'a> Results<'a> {
         jobs: &'j Jobs<'_>,
         write: impl Fn(
             &mut TableWriter<R>,
-            &'j Label<DriveAndSeed>,
+            &'j JobLabel<DriveAndSeed>,
             &'j Outcome,
         ) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
@@ -195,7 +195,7 @@ impl<'a> Results<'a> {
 }
 
 /// The jobs of a part, those that were run with their outcomes.
-type Jobs<'a> = Vec<(Label<DriveAndSeed>, Option<&'a Outcome>)>;
+type Jobs<'a> = Vec<(JobLabel<DriveAndSeed>, Option<&'a Outcome>)>;
 
 columns! {
     /// What the jobs table says about the rows of a job in other tables.

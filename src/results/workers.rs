@@ -434,7 +434,7 @@ impl Drop for Member<'_> {
 pub(crate) mod tests {
     use super::*;
     use crate::results::ErrorKind;
-    use crate::results::claims::{Claims, Standing};
+    use crate::results::claims::{ClaimState, Claims};
     use crate::results::directory::Results;
     use crate::sweep::Sweep;
     use crate::table::storage::over_disk::{Access, OverDisk};
@@ -518,7 +518,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn who_was_killed_here_is_dead_at_once_and_elsewhere_after_a_silence() {
+    fn a_worker_killed_here_is_dead_at_once_and_elsewhere_after_a_silence() {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());
         let layout = results.layout();
@@ -546,7 +546,7 @@ pub(crate) mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn a_worker_that_cannot_be_read_may_live_and_what_is_no_file_is_none() {
+    fn a_worker_that_cannot_be_read_may_live_and_a_folder_is_no_worker() {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());
         join(&results, |member| {
@@ -664,9 +664,9 @@ pub(crate) mod tests {
             let standing = |claims: &Claims<'_>, member: &Member<'_>| match claims
                 .standing("part", &member.others().unwrap())
             {
-                Ok(Standing::Taken(owner)) => Err(owner.to_owned()),
-                Ok(Standing::Free(generation)) => Ok(Some(generation)),
-                Ok(Standing::Own) => Ok(None),
+                Ok(ClaimState::Taken(owner)) => Err(owner.to_owned()),
+                Ok(ClaimState::Free(generation)) => Ok(Some(generation)),
+                Ok(ClaimState::Own) => Ok(None),
                 Err(error) => panic!("{error}"),
             };
             assert_eq!(standing(&claims, first), Ok(None));

@@ -6,7 +6,7 @@ use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
 use crate::run::take::{PartJob, Taken, Work};
 use crate::run::walltime::Walltime;
-use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, memory, threads};
+use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, memory_limits, threads};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
 use std::any::Any;
@@ -218,7 +218,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                     self.take(&job, Err(reason), JobTime::default())?;
                     continue;
                 }
-                if out.memory + memory::beside_threads(job.memory, threads) > free {
+                if out.memory + memory_limits::beside_threads(job.memory, threads) > free {
                     let is_limit = out.jobs < threads && job.memory.is_finite();
                     if is_limit && !std::mem::replace(&mut is_short_of_memory, true) {
                         let allowed = free - out.memory;

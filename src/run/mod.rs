@@ -13,24 +13,24 @@
 //! job in flight.
 
 mod collect;
-mod memory;
+mod memory_limits;
 mod shard;
-mod status;
+mod state;
 mod take;
 #[cfg(test)]
 mod tests;
 pub mod threads;
 mod walltime;
 
-pub use crate::results::events::{RunEvent, RunReport};
+pub use crate::results::log::{RunEvent, RunReport};
 pub use crate::results::pending::Overview;
 pub use shard::Shard;
-pub use status::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status, status_with};
+pub use state::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status, status_with};
 
 use crate::observe::Measurements;
-use crate::results::claims::{Claims, Standing};
-use crate::results::events::Log;
+use crate::results::claims::{ClaimState, Claims};
 use crate::results::layout::Layout;
+use crate::results::log::Log;
 use crate::results::pending::{Pending, Retry};
 use crate::results::workers::{Member, host};
 use crate::results::{Results, ResultsError};
@@ -121,7 +121,7 @@ pub fn join<T, E: From<ResultsError>>(
             begin,
             walltime: Walltime::new(begin, options.walltime),
             threads,
-            allowed_memory: memory::allowed(),
+            allowed_memory: memory_limits::allowed(),
             options,
         })?;
         member
@@ -191,7 +191,7 @@ impl Joined<'_> {
 
     /// Memory that all jobs together may take now, in bytes.
     fn memory(&self) -> f64 {
-        self.allowed_memory.min(memory::available())
+        self.allowed_memory.min(memory_limits::available())
     }
 
     /// Runs the parts of the rounds so far.
@@ -331,10 +331,10 @@ impl Joined<'_> {
         let mut claims = Claims::list(self.member)?;
         let last = claims.last(REDUCTION);
         let is_taken = match claims.standing(REDUCTION, &others)? {
-            Standing::Own => true,
-            Standing::Taken(_) => false,
-            Standing::Free(_) if last.is_some() && claims.last(REDUCED) == last => false,
-            Standing::Free(generation) => claims.take(REDUCTION, generation)?,
+            ClaimState::Own => true,
+            ClaimState::Taken(_) => false,
+            ClaimState::Free(_) if last.is_some() && claims.last(REDUCED) == last => false,
+            ClaimState::Free(generation) => claims.take(REDUCTION, generation)?,
         };
         let generation = claims.last(REDUCTION).unwrap_or_default();
         Ok(is_taken.then_some((claims, generation)))

@@ -5,12 +5,12 @@
 //! that may not fit in memory come later, and parts at which workers died last; after some deaths they run alone, as a job
 //! that ends its process must not end others.
 
-use crate::results::claims::{Claims, Standing};
+use crate::results::claims::{ClaimState, Claims};
 use crate::results::layout::{PartName, shorter_in_tests};
 use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
-use crate::run::memory;
+use crate::run::memory_limits;
 use crate::run::walltime::Walltime;
 use crate::sweep::{Job, Outline, Part, predicted_memory};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -89,11 +89,11 @@ impl Pending<'_> {
         for part in self.parts.iter().filter(|part| !done.has(part)) {
             left.jobs += part.job_count as u64;
             match claims.standing(&PartName::from(part).to_string(), &others)? {
-                Standing::Taken(owner) => {
+                ClaimState::Taken(owner) => {
                     left.hosts.insert(others[owner].worker.host.clone());
                 }
-                Standing::Free(_) => left.has_abandoned = true,
-                Standing::Own => {
+                ClaimState::Free(_) => left.has_abandoned = true,
+                ClaimState::Own => {
                     let path = self.results.part_file(tables::JOBS, part);
                     return Err(ResultsError::damaged(&path, "it was committed and is gone"));
                 }
@@ -136,7 +136,7 @@ impl<'a> Work<'a> {
             pass.rotate_left(usize::try_from(place).unwrap_or_default());
         }
         pass.sort_by_key(|part| {
-            let needed = memory::beside_threads(part.memory, threads);
+            let needed = memory_limits::beside_threads(part.memory, threads);
             let may_not_fit = needed > pending.retry.memory;
             (pending.deaths(part), may_not_fit, pending.done.has(part))
         });
@@ -226,7 +226,7 @@ impl<'a> Work<'a> {
             return Ok(self.claims.last(&name).is_none() && self.take_part(outline, 0)?);
         }
         match self.claims.standing(&name, &self.others)? {
-            Standing::Free(generation) => self.take_part(outline, generation),
+            ClaimState::Free(generation) => self.take_part(outline, generation),
             _ => Ok(false),
         }
     }
@@ -244,13 +244,13 @@ impl<'a> Work<'a> {
         for part in self.pending.parts.iter().filter(|part| !done.has(part)) {
             let name = PartName::from(part).to_string();
             match self.claims.standing(&name, &others)? {
-                Standing::Own => (),
-                Standing::Taken(owner) => {
+                ClaimState::Own => (),
+                ClaimState::Taken(owner) => {
                     let living = &others[owner];
                     let first = self.beats.entry(owner.to_owned()).or_insert(living.beat);
                     is_certain &= living.is_certain || *first != living.beat;
                 }
-                Standing::Free(generation) => free.push((part, generation)),
+                ClaimState::Free(generation) => free.push((part, generation)),
             }
         }
         if free.is_empty() {

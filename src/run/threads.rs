@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn too_many_are_refused_whoever_asks_for_them() {
+    fn too_many_threads_are_refused_from_flags_and_from_python() {
         assert_eq!(choose(Some(1024), &[]).unwrap(), threads(1024, None));
         for count in [1025, 1 << 62] {
             let error = choose(Some(count), &[]).unwrap_err().to_string();

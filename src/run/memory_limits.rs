@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_and_fields_are_read_and_what_is_unlimited_is_none() {
+    fn limits_and_fields_are_read_and_unlimited_is_no_number() {
         let limits = "Limit                     Soft Limit           Hard Limit           Units     \n\
                       Max data size             unlimited            unlimited            bytes     \n\
                       Max address space         1536000000           unlimited            bytes     \n";

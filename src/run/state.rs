@@ -1,9 +1,9 @@
 //! How far a directory is, and how far a run is: jobs done and missing, failures by reason, time left.
 
 use crate::results::deaths::Marked;
-use crate::results::events::RunEvent;
+use crate::results::log::RunEvent;
+use crate::results::next_round::RoundsSoFar;
 use crate::results::pending::{Again, Overview, Pending, Retry};
-use crate::results::rounds::RoundsSoFar;
 use crate::results::tables::{JOBS, JobOutcome};
 use crate::results::workers::Living;
 use crate::results::{Results, ResultsError};

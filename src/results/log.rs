@@ -7,7 +7,7 @@ use crate::results::commit::own_number;
 use crate::results::deaths::Marked;
 use crate::results::directory::Results;
 use crate::results::layout::is_hidden;
-use crate::results::rounds::RoundsSoFar;
+use crate::results::next_round::RoundsSoFar;
 use crate::results::workers::{host, plain};
 use crate::table::error::ResultsError;
 use crate::table::storage::{StorageError, StoredFile};
