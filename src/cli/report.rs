@@ -80,8 +80,7 @@ impl<'a> Reporter<'a> {
         }
     }
 
-    /// Writes a report if there is something new and the last is long enough ago. A report that cannot be written does not
-    /// end the run.
+    /// Writes a report if there is something new and the last is long enough ago. A failure does not end the run.
     pub fn follow(&mut self, event: &RunEvent) {
         self.is_due |= matches!(
             event,

@@ -429,8 +429,7 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
     }
 }
 
-/// What the lines do not say: jobs that ended otherwise, each kind with a command that shows one, and sets that the sweep
-/// no longer has.
+/// Notes on jobs that ended otherwise, each kind with a command that shows one, and on sets that the sweep no longer has.
 fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     let sweep = results.sweep();
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();

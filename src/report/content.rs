@@ -38,8 +38,7 @@ const STANDING: [&str; 7] = [
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
 
-/// The data of a directory with reduced data, for the scripts of the page. With `refresh`, the page reloads itself after
-/// about this time.
+/// The data of a directory for the scripts of the page, which reloads itself about every `refresh`.
 pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<Json> {
     let layout = results.layout();
     let sweep = results.sweep();

@@ -58,8 +58,7 @@ impl<'a> Commit<'a> {
         file.sync()
     }
 
-    /// Moves the staged files to their targets, in the order in which they were staged.
-    /// If a move fails, the files before it are in their places.
+    /// Moves the staged files to their targets, in order. If a move fails, the files before it are in their places.
     pub fn publish(mut self) -> Result<(), StorageError> {
         for (staged, target) in &self.staged {
             self.storage.rename(staged, target)?;

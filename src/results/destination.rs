@@ -128,8 +128,7 @@ impl Destination {
         self.place == other.place || inode(self).is_some_and(|of_one| Some(of_one) == inode(other))
     }
 
-    /// Writes the whole file, or leaves the earlier one: after an error, and if the flag of `stop` was set meanwhile. A device,
-    /// which may wait for its reader for ever, has no flag.
+    /// Writes the whole file, or leaves the earlier one after an error or if `stop` is set. A device has no flag.
     pub fn write(
         &self,
         stop: impl FnOnce() -> anyhow::Result<&'static AtomicBool>,

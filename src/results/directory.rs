@@ -16,8 +16,7 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A results directory: where it lies, and which sweeps it belongs to. Which parts are done is looked up each time, as
-/// other processes may run them.
+/// A results directory: where it lies, and which sweeps it belongs to. Finished parts are looked up each time.
 #[derive(Clone, Debug)]
 pub struct Results<'a> {
     layout: Layout<'a>,
@@ -32,8 +31,7 @@ pub(super) const STRANGER: &str =
     "no part of this directory has this name, and readers of the folder would take it for one";
 
 impl<'a> Results<'a> {
-    /// Opens the directory of a sweep for a worker: begins it, resumes it, or extends it.
-    /// Nothing is written if the directory is refused.
+    /// Begins, resumes or extends the directory of a sweep. Nothing is written if it is refused.
     fn open(member: &Member<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         let layout = member.layout();
         loop {
@@ -53,8 +51,7 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Joins the workers on the directory of a sweep, opens it, and is one of them while `body` runs. Nothing is written if
-    /// the directory is refused.
+    /// Opens the directory of a sweep as one of its workers, while `body` runs. Nothing is written if it is refused.
     pub fn join<T, E: From<ResultsError>>(
         layout: &Layout<'a>,
         sweep: &Sweep,
@@ -203,8 +200,7 @@ impl<'a> Results<'a> {
         Err(ResultsError::refused(self.layout.root(), problem))
     }
 
-    /// The same with this sweep after the others: finished parts stay; other jobs belong to the new sweep, or to none. Walks
-    /// through the plan.
+    /// The same with this sweep after the others, which keep their finished parts. Walks through the plan.
     fn extended(&self, sweep: &Sweep, done: &DoneParts) -> Self {
         let last = self.extensions.len().checked_sub(1);
         let kept = last.map(|last| Plan::new(&self.extensions).ranges(last, |part| done.has(part)));
@@ -260,8 +256,7 @@ impl<'a> Results<'a> {
         Ok(())
     }
 
-    /// Makes sure that the directory is still the one that was opened. Another directory in its place belongs to other
-    /// sweeps, and must not get rows of these.
+    /// Makes sure that the directory is still the one that was opened: another one must not get rows of its sweeps.
     pub fn check_place(&self) -> Result<(), ResultsError> {
         let last = self.records.len() - 1;
         for file in self.layout.files_of_extension(last) {
@@ -369,8 +364,7 @@ impl<'a> Results<'a> {
         Ok(())
     }
 
-    /// Moves staged files to their targets, if the directory is still in its place. Should it be moved after this check,
-    /// the staged files, which lie in it, are not found.
+    /// Moves staged files to their targets, if the directory, in which they lie, is still in its place.
     pub fn publish(&self, commit: Commit<'_>) -> Result<(), ResultsError> {
         self.check_place()?;
         Ok(commit.publish()?)
@@ -423,8 +417,7 @@ impl<'a> Results<'a> {
             .job_id(&part.jobs[position].parameters)
     }
 
-    /// Syncs the names of results. A process that was killed between a rename, or the creation of a folder, and the sync
-    /// after it leaves names that would not survive a power cut.
+    /// Syncs the names of results, as a process may have been killed between a rename and the sync after it.
     pub fn sync_names(&self) -> Result<(), StorageError> {
         let layout = &self.layout;
         for above in layout.root().ancestors().skip(1) {

@@ -35,8 +35,7 @@ pub struct ExportedFile {
 }
 
 impl Results<'_> {
-    /// Writes the tables to a new folder, which is there as a whole or not at all. `progress` hears how many of how many
-    /// parts of all tables are done.
+    /// Writes the tables to a new folder, all or none. `progress` gets the number of finished parts of tables, and of all.
     pub fn export(
         &self,
         path: &Path,

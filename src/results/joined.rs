@@ -165,8 +165,7 @@ impl<'a> JoinedTable<'a> {
     }
 }
 
-/// Rows with the columns of a schema: their own, or others by name. Programs of other versions had other columns: null
-/// stands for one that is missing.
+/// Rows with the columns of a schema: their own, or others by name; null for a column that another version did not have.
 pub fn with_columns(
     rows: &RecordBatch,
     schema: &SchemaRef,

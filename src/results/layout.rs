@@ -105,8 +105,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The names of table files in a folder. Hidden names and other endings, as file managers, network file systems and
-    /// other programs leave there, are passed over.
+    /// The names of table files in a folder. Hidden names and other endings, which other programs leave, are passed over.
     pub fn table_files(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
         let mut names = self.names_in(folder)?;
         names.retain(|name| is_table_file(name));
@@ -148,8 +147,7 @@ impl<'a> Layout<'a> {
         [self.run(), self.copies()].map(|folder| folder.join(extension_name(number)))
     }
 
-    /// The files of extensions that the folders list, by their numbers, copies last. A network file system may list a file
-    /// before it finds it.
+    /// The listed files of extensions, by number, copies last. A network file system may list a file before it finds it.
     pub(super) fn listed_extensions(&self) -> Result<BTreeMap<usize, Vec<PathBuf>>, StorageError> {
         // In this order: where a copy is listed, its first file was there before.
         let copies = self.names_in(&self.copies())?;

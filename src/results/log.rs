@@ -169,8 +169,7 @@ impl Results<'_> {
         Ok(Log(self.layout().storage.create(&path)?))
     }
 
-    /// Visits all logged events, in order of the beginnings of their runs. Half-written lines of a killed run, and names of
-    /// other than regular files, are passed over.
+    /// Visits all logged events, run after run. Half-written lines and other than regular files are passed over.
     pub fn events(&self, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
         let folder = self.layout().logs();
         let storage = self.layout().storage;

@@ -116,8 +116,7 @@ impl<'a> Results<'a> {
         })
     }
 
-    /// Writes files of a part with some of its jobs: new rows of those with an outcome, the old ones of the others. From and to
-    /// are the tables or the spill.
+    /// Writes files of a part, from and to the tables or the spill: new rows of jobs with an outcome, old ones of others.
     fn write(
         &self,
         member: &Member<'_>,
@@ -208,8 +207,7 @@ columns! {
 }
 
 impl RowsOfJob {
-    /// How many rows the job has in a table. One that may run again, as it failed or was ended by a time limit, may have more:
-    /// a run that was killed while it replaced them left them, and the same command puts that right.
+    /// How many rows the job has in a table. A job that may run again may have more, which a killed run wrote.
     pub(super) fn count(&self, table: &str) -> RowCount {
         let rows = if table == tables::SLIPS {
             self.slips

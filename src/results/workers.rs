@@ -112,8 +112,7 @@ impl Worker {
         match (self.directory, directory) {
             // A copy of a directory has the files of the workers of the original.
             (Some(its), Some(here)) if its.device == here.device => Some(its.inode == here.inode),
-            // Another device may be another mount of the same directory: its beats decide, and taking a living worker
-            // for dead is worse than waiting.
+            // Another device may be another mount of the same directory: heartbeats decide.
             (Some(_), Some(_)) => None,
             _ => Some(true),
         }
@@ -319,8 +318,7 @@ impl<'a> Member<'a> {
             let _ = storage.remove(&new);
             storage.create(&new)?.write(text.as_bytes())?;
             match storage.rename(&new, &self.file()) {
-                // A worker that does not see this one yet, nor any other, took it for a dead one's, and does so each time that
-                // it tidies up: a few times in its life.
+                // A worker that saw no other took it for that of a dead worker, which happens a few times at most.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => (),
                 renamed => return renamed,
             }

@@ -5,7 +5,6 @@ use crate::results::layout::{PartName, shorter_in_tests};
 use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
 use crate::run::take::{PartJob, Taken, Work};
-use crate::run::walltime::Walltime;
 use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, memory_limits, threads};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
@@ -93,7 +92,6 @@ struct OpenPart {
 pub(super) struct Collector<'a, 'e> {
     joined: &'a Joined<'a>,
     pending: &'a Pending<'a>,
-    walltime: &'a Walltime,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
     open: BTreeMap<(usize, u64), OpenPart>,
@@ -105,14 +103,12 @@ impl<'a, 'e> Collector<'a, 'e> {
     pub fn new(
         joined: &'a Joined<'a>,
         pending: &'a Pending<'a>,
-        walltime: &'a Walltime,
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
         Self {
             joined,
             pending,
-            walltime,
             events,
             report,
             open: BTreeMap::new(),
@@ -124,7 +120,12 @@ impl<'a, 'e> Collector<'a, 'e> {
     /// a job fails. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let mut threads = self.joined.threads;
-        let work = Work::new(self.pending, self.joined.member, self.walltime, threads)?;
+        let work = Work::new(
+            self.pending,
+            self.joined.member,
+            &self.joined.walltime,
+            threads,
+        )?;
         if work.is_all_alone() {
             // Each thread takes address space.
             threads = 1;
@@ -234,7 +235,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 out.add(&job);
                 hand_out(job);
             }
-            if !is_out_of_time && self.walltime.has_refused() {
+            if !is_out_of_time && self.joined.walltime.has_refused() {
                 is_out_of_time = true;
                 self.events.send(&RunEvent::OutOfTime)?;
             }
@@ -325,8 +326,8 @@ impl<'a, 'e> Collector<'a, 'e> {
             .commit(self.joined.member, part, &whole.outcomes, spilled)?;
         let name = PartName::from(&**part);
         self.joined.member.end_part(name)?;
-        self.walltime
-            .committed(whole.of.begin.elapsed(), begin.elapsed());
+        let took = whole.of.begin.elapsed();
+        self.joined.walltime.committed(took, begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);
         }

@@ -47,8 +47,7 @@ fn number_after(text: &str, key: &str) -> Option<f64> {
     value.split_whitespace().next()?.parse().ok()
 }
 
-/// The least limit of the control groups, of both versions, and of all above them. A container may show its own group in
-/// place of the topmost.
+/// The least limit of the control groups and of all above them. A container may show its own group as the topmost.
 fn of_groups(groups: &str, mount: &Path) -> f64 {
     let mut least = f64::INFINITY;
     for group in groups.lines() {

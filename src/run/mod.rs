@@ -230,7 +230,7 @@ impl Joined<'_> {
             predicted_cost,
             events,
         )?;
-        let mut collector = Collector::new(self, pending, &self.walltime, events, report);
+        let mut collector = Collector::new(self, pending, events, report);
         let ended = self.collect(&mut collector, pending, kernel);
         report.wall = self.begin.elapsed().as_secs_f64();
         let left = ended.inspect_err(|error| {

@@ -25,8 +25,7 @@ pub struct Status {
     pub workers: Vec<Present>,
     /// Measured over predicted CPU time so far, by the logs; null before the first part.
     pub pace: Option<f64>,
-    /// Predicted wall time for the missing jobs, in s, at this pace and with the threads that are there now or ran last; null
-    /// before the first part.
+    /// Predicted wall time for the missing jobs, in s, at this pace on the present or last threads; null like the pace.
     pub time_left: Option<f64>,
     pub failures: Vec<Failure>,
     pub failure_reasons: Reasons,

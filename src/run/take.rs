@@ -79,8 +79,7 @@ impl Pending<'_> {
         Ok((jobs, cost))
     }
 
-    /// What is left now, once this worker has committed all that it has taken. The last of all workers to look finds
-    /// nothing.
+    /// What is left once this worker has committed all its parts; nothing for the last worker that looks.
     pub(super) fn left(&self, member: &Member<'_>) -> Result<Left, ResultsError> {
         let others = member.others()?;
         let claims = Claims::list(member)?;
@@ -218,8 +217,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Takes a part in the first pass: an unclaimed part, or a finished part whose jobs may run again and which no worker
-    /// runs.
+    /// Takes a part in the first pass: unclaimed, or finished with jobs that may run again and no worker that runs them.
     fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
         let name = PartName::from(outline).to_string();
         if !self.pending.done.has(outline) {
@@ -231,8 +229,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Takes an unfinished part whose claim is a dead worker's. Returns whether there is none, and the owners of all others
-    /// certainly live.
+    /// Takes a part of a dead worker. Returns whether there is none, and the owners of all other parts certainly live.
     fn take_abandoned(&mut self) -> Result<bool, ResultsError> {
         // In this order: a worker that has ended committed or spilled before.
         let others = self.member.others()?;

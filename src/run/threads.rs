@@ -14,8 +14,7 @@ const VARIABLES: [&str; 5] = [
     "LSB_DJOB_NUMPROC",
 ];
 
-/// Most threads of one process. Starting this many takes seconds, and four times as many minutes, in which no signal stops
-/// a run.
+/// Most threads of one process. Starting more would take minutes, in which no signal stops a run.
 pub const MAX_THREADS: usize = 1024;
 
 /// A bad number of threads.
