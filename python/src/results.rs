@@ -134,7 +134,7 @@ fn read_table(
         let problem = "has no precursors; set precursors = true under [record]";
         return Err(ResultsError::refused(results.layout().root(), problem).into());
     }
-    let joined = JoinedTable::new(results, table, columns);
+    let joined = JoinedTable::new(results, table, &columns);
     let mut batches = Vec::new();
     for part in joined.parts()? {
         if stop.load(Ordering::Relaxed) {

@@ -83,11 +83,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let has_file = arguments.sweep.is_some() || arguments.preset.preset.is_some();
     let mut out = PathBuf::from("results/accuracy");
     if has_file || !changes.is_empty() {
-        let sweep = sweep::read(
-            arguments.sweep.as_deref(),
-            arguments.preset.preset,
-            &changes,
-        )?;
+        let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &changes)?;
         output::warn(&sweep.warnings());
         let (sets, slips): (Vec<_>, Vec<f64>) = sets_of(&sweep)?.into_iter().unzip();
         study = study.at(sets, sweep.solver());
@@ -102,11 +98,8 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     }
     let out = arguments.out.clone().unwrap_or(out);
     if !out.is_dir() && out.symlink_metadata().is_ok() {
-        return Err(UsageError(format!(
-            "--out {}: must be a folder, or not be there yet",
-            shown(&out)
-        ))
-        .into());
+        let problem = "must be a folder, or not be there yet";
+        return Err(UsageError(format!("--out {}: {problem}", shown(&out))).into());
     }
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
     study.slips = arguments.slips.unwrap_or(study.slips);

@@ -98,7 +98,7 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
 }
 
 fn script(arguments: &Arguments, program: &Path) -> Result<String> {
-    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &[])?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &[])?;
     output::warn(&sweep.warnings());
     arguments.check()?;
     let root = match &arguments.out {

@@ -166,7 +166,7 @@ pub fn by_reason(reasons: &Reasons) -> String {
     let mut lines = String::new();
     for (reason, jobs) in reasons.iter().take(MAX_REASONS) {
         let jobs = count(*jobs, "job");
-        lines += &format!("failed  {jobs} in all: {}\n", shown_text(reason));
+        lines = format!("{lines}failed  {jobs} in all: {}\n", shown_text(reason));
     }
     if reasons.len() > MAX_REASONS {
         lines += "failed  for other reasons, too: see outcome and reason in tables/jobs\n";
@@ -192,11 +192,11 @@ pub fn rounds(rounds: &RoundsSoFar) -> String {
     let mut text = format!("{round} ({over}): {done} done, {sets_open} open");
     if sets_capped > 0 {
         let sets = count(sets_capped, "set");
-        text += &format!("; {sets} with all seeds allowed, above the target");
+        text = format!("{text}; {sets} with all seeds allowed, above the target");
     }
     if edges_capped > 0 {
         let edges = count(edges_capped, "edge");
-        text += &format!("; {edges} wider than wanted, at the limit of seeds or jobs");
+        text = format!("{text}; {edges} wider than wanted, at the limit of seeds or jobs");
     }
     text
 }

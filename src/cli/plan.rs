@@ -86,11 +86,7 @@ struct DirectoryState {
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let changes = sweep::changes(&arguments.variation)?;
-    let sweep = sweep::read(
-        arguments.sweep.as_deref(),
-        arguments.preset.preset,
-        &changes,
-    )?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &changes)?;
     output::warn(&sweep.warnings());
     let default = changes.is_empty().then(|| Layout::default_root(&sweep));
     let root = arguments.out.clone().or(default);
@@ -228,10 +224,10 @@ impl DirectoryState {
         );
         if overview.jobs_kept > 0 {
             let kept = overview.jobs_kept;
-            text += &format!("; {kept} more done that the sweep no longer has");
+            text = format!("{text}; {kept} more done that the sweep no longer has");
         }
         if let Some(rounds) = &self.rounds {
-            text += &format!("; round {}", output::rounds(rounds));
+            text = format!("{text}; round {}", output::rounds(rounds));
         }
         text
     }

@@ -126,10 +126,13 @@ impl Progress {
         let time = output::duration(predicted_cost / threads as f64);
         let mut place = output::count(threads as u64, "thread");
         if let Some(variable) = self.threads.variable {
-            place += &format!(" ({variable})");
+            place = format!("{place} ({variable})");
         }
         if others > 0 {
-            place += &format!(", shared with {}", output::count(others as u64, "worker"));
+            place = format!(
+                "{place}, shared with {}",
+                output::count(others as u64, "worker")
+            );
         }
         self.say(&format!(
             "running {jobs}, {jobs_there} there already; predicted: {time} on {place}"

@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 impl Arguments {
     fn sweep_and_root(&self) -> Result<(Sweep, PathBuf)> {
         let changes = sweep::changes(&self.variation)?;
-        let sweep = sweep::read(self.sweep.as_deref(), self.preset.preset, &changes)?;
+        let sweep = sweep::read(self.sweep.as_deref(), self.preset, &changes)?;
         let own = self.sweep.as_deref().filter(|path| path.is_dir());
         let root = own.map_or_else(|| Layout::default_root(&sweep), Path::to_owned);
         if let Some(out) = &self.out {

@@ -193,7 +193,7 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let mut text = table_of_edges(&edges(results)?) + &aligned(&columns, &rows, first);
     if let Some(more @ 1..) = count.checked_sub(first as u64) {
         let root = output::quoted_path(results.layout().root());
-        text += &format!("… {more} more: stickslip show {root}\n");
+        text = format!("{text}… {more} more: stickslip show {root}\n");
     }
     for note in notes(results, &rows) {
         text += &(note + "\n");

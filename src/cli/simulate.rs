@@ -22,8 +22,9 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::json;
+use std::borrow::Cow;
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -206,11 +207,7 @@ const JSON_FORMAT: u32 = 1;
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let changes = arguments.job.changes()?;
-    let sweep = sweep::read(
-        arguments.sweep.as_deref(),
-        arguments.preset.preset,
-        &changes,
-    )?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &changes)?;
     let job = single_job::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
     arguments.check(&sweep, parameters)?;
@@ -227,22 +224,19 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
     let slips = (measured.slips.iter()).map(|slip| -> SlipRow<'_> { (&label, slip) });
     let contacts = records.contacts.iter().map(ContactRow::from);
+    let footer = Footer::default()
+        .with_sweep(sweep.name(), sweep.text())
+        .with("parameters", &as_json(parameters));
+    let tables = Tables {
+        footer: &footer,
+        left_out: &sweep.recording().left_out(),
+    };
     let files = &arguments.tables;
-    write_table(
-        &sweep,
-        parameters,
-        &files.trace,
-        records.trace.iter().copied(),
-    )?;
-    write_table(&sweep, parameters, &files.map, records.map.iter().copied())?;
-    write_table(
-        &sweep,
-        parameters,
-        &files.profile,
-        records.profile.iter().copied(),
-    )?;
-    write_table(&sweep, parameters, &files.contacts, contacts)?;
-    write_table(&sweep, parameters, &files.slip_table, slips)?;
+    tables.write(files.trace.as_deref(), records.trace.iter().copied())?;
+    tables.write(files.map.as_deref(), records.map.iter().copied())?;
+    tables.write(files.profile.as_deref(), records.profile.iter().copied())?;
+    tables.write(files.contacts.as_deref(), contacts)?;
+    tables.write(files.slip_table.as_deref(), slips)?;
     arguments.write_plots(parameters, &records, &measured.slips)?;
 
     let report = Report::new(&label.0.job_id, &measured, wall);
@@ -255,25 +249,24 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Writes a table, if there is a file for it.
-fn write_table<R: Table>(
-    sweep: &Sweep,
-    parameters: &Parameters,
-    path: &Option<PathBuf>,
-    rows: impl Iterator<Item = R>,
-) -> Result<()> {
-    let Some(path) = path else { return Ok(()) };
-    let footer = Footer::default()
-        .with_sweep(sweep.name(), sweep.text())
-        .with("parameters", &as_json(parameters));
-    let left_out = sweep.recording().left_out();
-    Destination::new(path, Kind::PARQUET)?.write(signals::catch, |file| {
-        let mut writer = TableWriter::without(&left_out, file, &footer)?;
-        for row in rows {
-            writer.push(&row)?;
-        }
-        Ok(writer.finish()?)
-    })
+/// What the tables of a job have in common.
+struct Tables<'a> {
+    footer: &'a Footer,
+    left_out: &'a [Cow<'static, str>],
+}
+
+impl Tables<'_> {
+    /// Writes a table, if there is a file for it.
+    fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
+        let Some(path) = path else { return Ok(()) };
+        Destination::new(path, Kind::PARQUET)?.write(signals::catch, |file| {
+            let mut writer = TableWriter::without(self.left_out, file, self.footer)?;
+            for row in rows {
+                writer.push(&row)?;
+            }
+            Ok(writer.finish()?)
+        })
+    }
 }
 
 impl Arguments {

@@ -67,7 +67,7 @@ fn pairs(status: &Status) -> Vec<(&'static str, String)> {
     let mut done = overview.jobs_done.to_string();
     if overview.jobs_kept > 0 {
         let kept = overview.jobs_kept;
-        done += &format!(", {kept} of them kept of values that the sweep no longer has");
+        done = format!("{done}, {kept} of them kept of values that the sweep no longer has");
     }
     let parts = format!(
         "{} done, {} missing",

@@ -117,8 +117,8 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
 }
 
 /// Reads a sweep file or the sweep of a results directory, or takes a preset, as varied; without either, a sweep with one point, of what is set.
-pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> Result<Sweep> {
-    let sweep = match (file, preset) {
+pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result<Sweep> {
+    let sweep = match (file, flag.preset) {
         // A results directory: its current sweep.
         (Some(folder), _) if folder.is_dir() => {
             Ok(Results::read(&Layout::new(&Disk, folder))?.sweep().clone())

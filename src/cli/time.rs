@@ -76,10 +76,12 @@ pub fn with_units(time: Duration) -> String {
         (seconds % HOUR / MINUTE, "m"),
         (seconds % MINUTE, "s"),
     ];
-    let parts = parts.into_iter().filter(|(number, _)| *number > 0);
-    parts
-        .map(|(number, unit)| format!("{number}{unit}"))
-        .collect()
+    let mut text = String::new();
+    for (number, unit) in parts.into_iter().filter(|(number, _)| *number > 0) {
+        text += &number.to_string();
+        text += unit;
+    }
+    text
 }
 
 #[cfg(test)]

@@ -84,8 +84,7 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
                 _elsewhere: Some(elsewhere),
             })
         }
-        Err(error) if is_there => Err(error
-            .context("the reduced data are not of the tables as they are, and must be made again")),
+        Err(error) if is_there => Err(error.context("the reduced data are out of date")),
         Err(error) => Err(error),
     }
 }

@@ -72,7 +72,7 @@ impl Results<'_> {
         for table in self.tables() {
             let name = format!("{table}.{}", format.extension());
             let path = to.draft.path().join(&name);
-            let joined = JoinedTable::new(self, table, self.exported_columns(table));
+            let joined = JoinedTable::new(self, table, &self.exported_columns(table));
             let file = storage.create(&path)?;
             let mut writer = RowWriter::new(file, format, joined.schema(), &self.footer_of_all())?;
             let mut rows = 0;

@@ -53,7 +53,7 @@ impl<'a> JoinedTable<'a> {
     }
 
     /// A table with these of its columns.
-    pub fn new(results: &'a Results<'a>, table: &'static str, columns: Vec<FieldRef>) -> Self {
+    pub fn new(results: &'a Results<'a>, table: &'static str, columns: &[FieldRef]) -> Self {
         let recorded = recorded_schema(table, results.sweep().recording());
         let names = columns.iter().map(|field| field.name().clone());
         let (mut own, mut of_jobs): (Vec<_>, Vec<_>) =

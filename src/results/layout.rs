@@ -17,6 +17,7 @@
 use crate::sweep::{Outline, Sweep};
 use crate::table::error::ResultsError;
 use crate::table::file::FILE_EXTENSION;
+use crate::table::shown::shown;
 use crate::table::storage::{Storage, StorageError, gone_is_fine};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::{OsStr, OsString};
@@ -84,12 +85,17 @@ impl<'a> Layout<'a> {
     /// The error of a command that reads results where there are none.
     pub(super) fn no_results(&self) -> ResultsError {
         let is_there = self.storage.exists(&self.root).unwrap_or(true);
-        let problem = if is_there {
-            "is no results directory (it has no run/extension-000.json)"
+        let is_sweep = self.root.extension().is_some_and(|ending| ending == "toml");
+        let problem = if is_there && is_sweep {
+            let name = Path::new(RESULTS).join(self.root.file_stem().unwrap_or_default());
+            format!("is a sweep file; did you mean {}?", shown(&name))
+        } else if is_there {
+            format!(
+                "is no results directory (it has no run/extension-000.json); name one that a run made, such as {RESULTS}/fig3"
+            )
         } else {
-            "there is no such directory"
+            format!("there is no such directory; name one that a run made, such as {RESULTS}/fig3")
         };
-        let problem = format!("{problem}; name one that a run made, such as {RESULTS}/fig3");
         ResultsError::refused(&self.root, problem)
     }
 

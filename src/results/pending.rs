@@ -257,6 +257,9 @@ columns! {
     }
 }
 
+/// A file of the spill is damaged or gone.
+struct Lost;
+
 impl Results<'_> {
     /// How far all parts are. Of a directory of another version, whose parts were others, nothing counts as missing.
     pub fn overview(&self) -> Result<Overview, ResultsError> {
@@ -310,9 +313,9 @@ impl Results<'_> {
     fn spilled(&self, outline: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
         let mut ids = HashSet::new();
         for table in self.tables() {
-            match settled(|| self.spilled_ids(outline, table))?.flatten() {
-                Some(of_table) => ids = of_table,
-                None => return Ok(BTreeSet::new()),
+            match settled(|| self.spilled_ids(outline, table))? {
+                Some(Ok(of_table)) => ids = of_table,
+                Some(Err(Lost)) | None => return Ok(BTreeSet::new()),
             }
         }
         let part = self.plan().part(outline);
@@ -322,26 +325,26 @@ impl Results<'_> {
             .collect())
     }
 
-    /// The ids in a file of the spill; `Some(None)` if it is damaged or gone, `None` if this host does not see it yet.
+    /// The ids in a file of the spill; `None` if this host does not see it yet.
     fn spilled_ids(
         &self,
         outline: &Outline,
         table: &str,
-    ) -> Result<Option<Option<HashSet<String>>>, ResultsError> {
+    ) -> Result<Option<Result<HashSet<String>, Lost>>, ResultsError> {
         let file = self.file_in(&self.layout().spill(), table, outline.into());
         let mut ids = HashSet::new();
         for batch in Dataset::of(self.layout().storage, vec![file]).rows::<RowOfJob>() {
             match batch {
                 Ok(rows) => ids.extend(rows.into_iter().map(|row| row.job_id)),
-                Err(error) if error.kind == ErrorKind::Damaged => return Ok(Some(None)),
+                Err(error) if error.kind == ErrorKind::Damaged => return Ok(Some(Err(Lost))),
                 Err(error) if error.kind == ErrorKind::Disk(io::ErrorKind::NotFound) => {
                     // Another worker that has just committed the part has removed the file.
                     let is_listed = self.spilled_parts(table)?.contains(&outline.into());
-                    return Ok((!is_listed).then_some(None));
+                    return Ok((!is_listed).then_some(Err(Lost)));
                 }
                 Err(error) => return Err(error),
             }
         }
-        Ok(Some(Some(ids)))
+        Ok(Some(Ok(ids)))
     }
 }

@@ -309,10 +309,8 @@ impl<'a> Member<'a> {
         };
         // It always has a form as JSON: it holds texts and numbers alone.
         let text = serde_json::to_string(&worker).unwrap_or_default();
-        let (storage, new) = (
-            self.layout.storage,
-            self.layout.workers().join(format!("{}{NEW}", self.name)),
-        );
+        let storage = self.layout.storage;
+        let new = self.layout.workers().join(format!("{}{NEW}", self.name));
         loop {
             // A beat that failed may have left it.
             let _ = storage.remove(&new);
