@@ -4,13 +4,13 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use stickslip::run::threads::ThreadsError;
-use stickslip::simulate::{RequestError, mistakes_in};
+use stickslip::single_job::RequestError;
 
 create_exception!(
     stickslip,
     SweepError,
     PyValueError,
-    "A sweep, or a key of a simulation, that says nothing that can run."
+    "A mistake in a sweep, or in the keys of a simulation."
 );
 create_exception!(
     stickslip,
@@ -54,16 +54,6 @@ impl From<PyErr> for Error {
 impl From<stickslip::sweep::SweepError> for Error {
     fn from(error: stickslip::sweep::SweepError) -> Self {
         Self::Sweep(error.to_string())
-    }
-}
-
-/// A text that Python wrote has no lines that its author knows.
-pub fn in_text(error: stickslip::sweep::SweepError, source: &str) -> Error {
-    match error {
-        stickslip::sweep::SweepError::Invalid { mistakes, .. } => {
-            Error::Sweep(mistakes_in(source, &mistakes))
-        }
-        unreadable => unreadable.into(),
     }
 }
 

@@ -1,4 +1,4 @@
-//! What can be set: the keys of a sweep file, from the descriptions that the library has of them.
+//! The keys of a sweep file, from their descriptions in the library.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -10,7 +10,7 @@ const MODEL: &str = "model";
 const RECORD: &str = "record";
 const SOLVER: &str = "solver";
 
-/// Keys that stand for others, and those of the solver: section, key, meaning, what is allowed.
+/// Keys in place of others, and keys of the solver: section, key, meaning, what is allowed.
 const OTHERS: [(&str, &str, &str, &str); 6] = [
     (
         MODEL,
@@ -68,7 +68,7 @@ pub fn section(key: &str) -> Option<&'static str> {
         .map(|(_, section)| section)
 }
 
-/// What was probably meant by an unknown key.
+/// The known key that is nearest to an unknown key, or all.
 pub fn hint(key: &str) -> String {
     let known: Vec<&str> = sections().map(|(key, _)| key).collect();
     match stickslip::sweep::nearest(key, &known) {
@@ -81,7 +81,8 @@ pub fn hint(key: &str) -> String {
 #[pyfunction]
 pub fn keys(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let keys = PyDict::new(py);
-    let (parameters, recording) = (Parameters::default(), Recording::default());
+    let parameters = Parameters::default();
+    let recording = Recording::default();
     let model = Symbol::ALL.map(|symbol| (symbol.description(), parameters.get(symbol)));
     let record = RecordingKey::ALL.map(|key| (key.description(), recording.get(key)));
     for (field, default) in model.into_iter().chain(record) {

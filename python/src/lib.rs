@@ -1,12 +1,12 @@
-//! The module `stickslip._stickslip`: what the Python package `stickslip` takes from the library.
+//! The module `stickslip._stickslip`: the part of the Python package `stickslip` that is written in Rust.
 //!
 //! ```text
-//! keys.rs       what can be set, from the descriptions of the library
+//! keys.rs       keys of sweep files, from the descriptions of the library
 //! simulate.rs   one job -> tables
 //! run.rs        a sweep -> a results directory, with progress
 //! results.rs    a results directory -> tables
 //! table.rs      Arrow tables, handed on through the C interface of Arrow
-//! watched.rs    work without the interpreter's lock that obeys Ctrl-C
+//! watched.rs    work without the interpreter's lock, which Ctrl-C ends
 //! errors.rs     errors as exceptions
 //! ```
 //!

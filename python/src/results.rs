@@ -3,29 +3,21 @@
 use crate::errors::Error;
 use crate::table::Table;
 use crate::watched::watched;
-use arrow_array::cast::AsArray;
-use arrow_array::{Array, ArrayRef, RecordBatch, UInt32Array, new_null_array};
-use arrow_schema::{Field, FieldRef, Schema, SchemaRef};
-use arrow_select::concat::concat_batches;
-use arrow_select::take::take;
+use arrow_schema::{FieldRef, Fields, Schema, SchemaRef};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, renew};
-use stickslip::results::controls::{CONTROL, ControlSets, SET_ID};
+use stickslip::results::joined::{JoinedTable, with_columns};
 use stickslip::results::layout::Layout;
-use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, SLIPS, recorded_schema};
+use stickslip::results::tables::{JOBS, TABLES, recorded_schema};
 use stickslip::results::{Results, ResultsError};
 use stickslip::table::arrow::schema;
 use stickslip::table::columns::Table as TableRow;
-use stickslip::table::file::Dataset;
+use stickslip::table::file::{Batch, Dataset};
 use stickslip::table::storage::Disk;
-
-/// The column by which tables of jobs are joined.
-const JOB_ID: &str = "job_id";
 
 /// Name and text of the sweep that a results directory belongs to.
 #[pyfunction]
@@ -56,7 +48,7 @@ pub fn reduce(py: Python<'_>, directory: PathBuf) -> PyResult<()> {
     Ok(reduced?)
 }
 
-/// A table, or its columns of these names. Those that it has not are taken from the jobs; `join` adds all of these.
+/// A table, or its columns of these names. Slips and precursors have those of the jobs, too; `join` adds them all.
 #[pyfunction]
 pub fn read(
     py: Python<'_>,
@@ -67,30 +59,106 @@ pub fn read(
 ) -> PyResult<Table> {
     let layout = Layout::new(&Disk, &directory);
     let results = py.detach(|| Results::read(&layout)).map_err(Error::from)?;
-    let known = [SLIPS, PRECURSORS, JOBS]
-        .into_iter()
-        .find(|known| *known == table);
-    let own = match known {
-        Some(known) => (known, recorded_schema(known, results.sweep().recording())),
-        None if table == SetRow::NAME && results.round().is_some() => {
-            (SetRow::NAME, schema::<SetInRounds>())
+    let columns = columns.as_deref();
+    let found = match TABLES.into_iter().find(|known| *known == table) {
+        Some(table) => {
+            let columns = columns_of_table(&results, table, columns, join)?;
+            watched::<_, ()>(
+                py,
+                |stop, _| read_table(&results, table, columns, stop),
+                |()| (),
+                |_| Ok(()),
+            )
         }
-        None => reduced_schema(table)
-            .ok_or_else(|| PyValueError::new_err(format!("there is no table {table}")))?,
+        None => {
+            let (table, all) = reduced_columns(&results, table)?;
+            let columns = match columns {
+                Some(names) => named(table, &all, names)?,
+                None => all.to_vec(),
+            };
+            watched::<_, ()>(
+                py,
+                |_, _| read_reduced(&results, table, columns),
+                |()| (),
+                |_| Ok(()),
+            )
+        }
     };
-    let wanted = Wanted::new(own, columns.as_deref(), join)?;
-    let found = watched::<_, ()>(
-        py,
-        |stop, _| wanted.read(&results, stop),
-        |()| (),
-        |_| Ok(()),
-    );
     Ok(found?)
 }
 
-fn reduced_schema(table: &str) -> Option<(&'static str, SchemaRef)> {
-    fn of<R: TableRow>() -> (&'static str, SchemaRef) {
-        (R::NAME, schema::<R>())
+/// The columns with these names.
+fn named(table: &str, all: &[FieldRef], names: &[String]) -> PyResult<Vec<FieldRef>> {
+    let unknown = |name: &str| {
+        let known: Vec<&str> = all.iter().map(|field| field.name().as_str()).collect();
+        let hint = match stickslip::sweep::nearest(name, &known) {
+            Some(near) => format!("did you mean {near}?"),
+            None => format!("there are {}", known.join(", ")),
+        };
+        PyValueError::new_err(format!("{table}: there is no column {name}; {hint}"))
+    };
+    let column = |name: &String| {
+        let found = all.iter().find(|field| field.name() == name);
+        found.cloned().ok_or_else(|| unknown(name))
+    };
+    names.iter().map(column).collect()
+}
+
+/// The columns of slips, precursors or jobs to read: by default its own, and of the jobs whether they are controls.
+fn columns_of_table(
+    results: &Results<'_>,
+    table: &str,
+    names: Option<&[String]>,
+    join: bool,
+) -> PyResult<Vec<FieldRef>> {
+    let recorded = recorded_schema(table, results.sweep().recording());
+    let is_own = |field: &FieldRef| recorded.field_with_name(field.name()).is_ok();
+    let mut all = JoinedTable::columns(results, table);
+    if let Some(names) = names {
+        let mut chosen = named(table, &all, names)?;
+        all.retain(|field| join && !is_own(field) && !chosen.contains(field));
+        chosen.append(&mut all);
+        return Ok(chosen);
+    }
+    all.retain(|field| join || is_own(field) || table == JOBS);
+    Ok(all)
+}
+
+fn read_table(
+    results: &Results<'_>,
+    table: &'static str,
+    columns: Vec<FieldRef>,
+    stop: &AtomicBool,
+) -> Result<Table, Error> {
+    if !results.tables().any(|recorded| recorded == table) {
+        let problem = "has no precursors; set precursors = true under [record]";
+        return Err(ResultsError::refused(results.layout().root(), problem).into());
+    }
+    let joined = JoinedTable::new(results, table, &columns);
+    let mut batches = Vec::new();
+    for part in joined.parts()? {
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::Results("interrupted".to_owned()));
+        }
+        joined.visit(part, |batch| {
+            batches.push(batch);
+            Ok(())
+        })?;
+    }
+    Ok(Table::new(
+        table,
+        SchemaRef::clone(joined.schema()),
+        batches,
+    ))
+}
+
+/// Name and columns of a table of reduced data.
+fn reduced_columns(results: &Results<'_>, table: &str) -> PyResult<(&'static str, Fields)> {
+    fn of<R: TableRow>() -> (&'static str, Fields) {
+        (R::NAME, schema::<R>().fields().clone())
+    }
+    if table == SetRow::NAME && results.round().is_some() {
+        return Ok((SetRow::NAME, schema::<SetInRounds>().fields().clone()));
     }
     let all = [
         of::<SetRow>(),
@@ -99,243 +167,27 @@ fn reduced_schema(table: &str) -> Option<(&'static str, SchemaRef)> {
         of::<BackboneBin>(),
         of::<Point>(),
     ];
-    all.into_iter().find(|(name, _)| *name == table)
+    let found = all.into_iter().find(|(name, _)| *name == table);
+    found.ok_or_else(|| PyValueError::new_err(format!("there is no table {table}")))
 }
 
-/// Columns to read.
-struct Wanted {
+fn read_reduced(
+    results: &Results<'_>,
     table: &'static str,
-    /// Of the result.
-    schema: SchemaRef,
-    /// Those of the table itself, and those of the jobs.
-    own: Vec<String>,
-    of_jobs: Vec<String>,
-    /// Whether the column of controls is wanted.
-    has_control: bool,
-}
-
-impl Wanted {
-    fn new(
-        (table, own): (&'static str, SchemaRef),
-        columns: Option<&[String]>,
-        join: bool,
-    ) -> PyResult<Self> {
-        let of_jobs: Vec<FieldRef> = match table {
-            SLIPS | PRECURSORS => schema::<JobRow>().fields().to_vec(),
-            _ => Vec::new(),
-        };
-        let of_control = [SLIPS, PRECURSORS, JOBS]
-            .contains(&table)
-            .then(|| Arc::new(ControlSets::field()));
-        let jobs = Schema::new(of_jobs.into_iter().chain(of_control).collect::<Vec<_>>());
-        let is_own = |name: &str| own.field_with_name(name).is_ok();
-        let others = || {
-            jobs.fields()
-                .iter()
-                .map(|field| field.name())
-                .filter(|name| !is_own(name))
-        };
-        let names: Vec<String> = match columns {
-            Some(columns) => columns.to_vec(),
-            None => own
-                .fields()
-                .iter()
-                .map(|field| field.name().as_str())
-                .chain((table == JOBS).then_some(CONTROL))
-                .map(str::to_owned)
-                .collect(),
-        };
-        let joined = others()
-            .filter(|name| join && !names.contains(name))
-            .cloned()
-            .collect();
-        let names = [names, joined].concat();
-        let mut fields = Vec::new();
-        for name in &names {
-            let field = own
-                .field_with_name(name)
-                .or_else(|_| jobs.field_with_name(name));
-            let field = field.map_err(|_| {
-                let known: Vec<&str> = own
-                    .fields()
-                    .iter()
-                    .map(|field| field.name())
-                    .chain(others())
-                    .map(String::as_str)
-                    .collect();
-                PyValueError::new_err(match stickslip::sweep::nearest(name, &known) {
-                    Some(near) => {
-                        format!("{table}: there is no column {name}; did you mean {near}?")
-                    }
-                    None => format!(
-                        "{table}: there is no column {name}; there are {}",
-                        known.join(", ")
-                    ),
-                })
-            })?;
-            fields.push(field.clone());
-        }
-        let (own, others): (Vec<_>, Vec<_>) = names.into_iter().partition(|name| is_own(name));
-        let (of_control, of_jobs): (Vec<_>, Vec<_>) =
-            others.into_iter().partition(|name| name == CONTROL);
-        Ok(Self {
-            table,
-            schema: Arc::new(Schema::new(fields)),
-            own,
-            of_jobs,
-            has_control: !of_control.is_empty(),
-        })
+    columns: Vec<FieldRef>,
+) -> Result<Table, Error> {
+    if table == EdgeRow::NAME && results.sweep().refinement().is_none() {
+        let problem = "has no edges: its sweep file has no [refine]";
+        return Err(ResultsError::refused(results.layout().root(), problem).into());
     }
-
-    fn read(&self, results: &Results<'_>, stop: &AtomicBool) -> Result<Table, Error> {
-        let layout = results.layout();
-        let renewed;
-        let files = match self.table {
-            JOBS => results.dataset(JOBS)?,
-            SLIPS | PRECURSORS => {
-                if !results.tables().any(|table| table == self.table) {
-                    let problem = "has no precursors; set precursors = true under [record]";
-                    return Err(ResultsError::refused(layout.root(), problem).into());
-                }
-                results.committed_files(self.table, &results.dataset(JOBS)?)?
-            }
-            EdgeRow::NAME if results.sweep().refinement().is_none() => {
-                let problem = "has no edges: its sweep file has no [refine]";
-                return Err(ResultsError::refused(layout.root(), problem).into());
-            }
-            _ => {
-                renewed = renew(results)?;
-                Dataset::new(&Disk, vec![renewed.layout().reduced_file(self.table)])
-            }
-        };
-        let mut own = self.own.clone();
-        if !self.of_jobs.is_empty() || own.is_empty() {
-            own.push(JOB_ID.to_owned());
-        }
-        let mut controls = None;
-        if self.has_control {
-            controls = Some(ControlSets::of(results)?);
-            if !own.iter().any(|name| name == SET_ID) {
-                own.push(SET_ID.to_owned());
-            }
-        }
-        let jobs = if self.of_jobs.is_empty() {
-            None
-        } else {
-            Some(Jobs::read(results, &self.of_jobs, stop)?)
-        };
-        let mut batches = Vec::new();
-        for batch in files.columns(&own) {
-            interruptible(stop)?;
-            let batch = batch?;
-            let damaged = |problem: String| ResultsError::damaged(&batch.path, problem);
-            let rows = jobs
-                .as_ref()
-                .map(|jobs| jobs.rows(&batch.rows))
-                .transpose()
-                .map_err(damaged)?;
-            let column = |field: &Field| -> Result<ArrayRef, Error> {
-                let name = field.name();
-                let of_control = || controls.as_ref()?.column(&batch.rows);
-                match (batch.rows.column_by_name(name), &jobs, &rows) {
-                    (Some(column), ..) => Ok(Arc::clone(column)),
-                    _ if name == CONTROL && self.has_control => of_control()
-                        .ok_or_else(|| damaged(format!("there is no column {SET_ID}")).into()),
-                    (None, Some(jobs), Some(rows)) if !self.own.contains(name) => {
-                        jobs.take(name, rows)
-                    }
-                    // Programs of other versions had other columns.
-                    _ if field.is_nullable() => {
-                        Ok(new_null_array(field.data_type(), batch.rows.num_rows()))
-                    }
-                    _ => Err(damaged(format!("there is no column {name}")).into()),
-                }
-            };
-            let columns = self.schema.fields().iter().map(|field| column(field));
-            let columns = columns.collect::<Result<Vec<ArrayRef>, Error>>()?;
-            batches.push(RecordBatch::try_new(
-                SchemaRef::clone(&self.schema),
-                columns,
-            )?);
-        }
-        Ok(Table::new(
-            self.table,
-            SchemaRef::clone(&self.schema),
-            batches,
-        ))
+    let names: Vec<String> = columns.iter().map(|field| field.name().clone()).collect();
+    let schema = Arc::new(Schema::new(columns));
+    let file = renew(results)?.layout().reduced_file(table);
+    let mut batches = Vec::new();
+    for batch in Dataset::new(&Disk, vec![file]).columns(&names) {
+        let Batch { path, rows } = batch?;
+        let rows = with_columns(&rows, &schema, |_| None);
+        batches.push(rows.map_err(ResultsError::damage_at(&path))?);
     }
-}
-
-/// Some columns of the jobs, to be joined by their ids.
-struct Jobs {
-    columns: RecordBatch,
-    rows: HashMap<String, u32>,
-}
-
-impl Jobs {
-    fn read(results: &Results<'_>, columns: &[String], stop: &AtomicBool) -> Result<Self, Error> {
-        let mut names = columns.to_vec();
-        names.push(JOB_ID.to_owned());
-        let mut batches = Vec::new();
-        for batch in results.dataset(JOBS)?.columns(&names) {
-            interruptible(stop)?;
-            batches.push(batch?.rows);
-        }
-        let of_first = batches
-            .first()
-            .map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
-        let batches = batches
-            .into_iter()
-            .map(|batch| batch.with_schema(SchemaRef::clone(&of_first)));
-        let columns = concat_batches(&of_first, &batches.collect::<Result<Vec<_>, _>>()?)?;
-        let ids = columns
-            .column_by_name(JOB_ID)
-            .map(AsArray::as_string::<i32>);
-        let rows = ids
-            .into_iter()
-            .flatten()
-            .zip(0..)
-            .filter_map(|(id, row)| Some((id?.to_owned(), row)))
-            .collect();
-        Ok(Self { columns, rows })
-    }
-
-    /// The row of the job of each row of a batch.
-    fn rows(&self, batch: &RecordBatch) -> Result<UInt32Array, String> {
-        let ids = batch
-            .column_by_name(JOB_ID)
-            .ok_or_else(|| format!("there is no column {JOB_ID}"))?;
-        let row = |id: Option<&str>| {
-            let row = id.and_then(|id| self.rows.get(id)).copied();
-            row.ok_or_else(|| {
-                format!(
-                    "job {} is not in the table of jobs",
-                    id.unwrap_or("without an id")
-                )
-            })
-        };
-        ids.as_string::<i32>()
-            .iter()
-            .map(row)
-            .collect::<Result<Vec<u32>, String>>()
-            .map(UInt32Array::from)
-    }
-
-    fn take(&self, column: &str, rows: &UInt32Array) -> Result<ArrayRef, Error> {
-        let column = self.columns.column_by_name(column).ok_or_else(|| {
-            Error::Results(format!(
-                "tables/jobs: there is no column {column}; `stickslip verify` reports what to do"
-            ))
-        })?;
-        Ok(take(column.as_ref() as &dyn Array, rows, None)?)
-    }
-}
-
-/// Ends what nobody waits for any more.
-fn interruptible(stop: &AtomicBool) -> Result<(), Error> {
-    if stop.load(Ordering::Relaxed) {
-        Err(Error::Results("interrupted".to_owned()))
-    } else {
-        Ok(())
-    }
+    Ok(Table::new(table, schema, batches))
 }

@@ -16,7 +16,7 @@ use stickslip::run::threads::Threads;
 use stickslip::run::{Options, RunEvent, RunReport, Shard, Tally};
 use stickslip::table::storage::Disk;
 
-/// What a run has come to, as a callback is shown it.
+/// How far a run is, for the callback.
 #[derive(Default)]
 struct Progress {
     tally: Tally,
@@ -62,23 +62,15 @@ impl Progress {
         }
     }
 
-    /// Calls back with jobs done, all jobs, the share of the work that is done, and messages; if there is anything new.
+    /// Calls back with jobs done, all jobs, the share of the cost that is done, and messages; if there is anything new.
     fn show(&mut self, py: Python<'_>, callback: &Py<PyAny>) -> PyResult<()> {
         if !std::mem::take(&mut self.has_news) || callback.is_none(py) {
             return Ok(());
         }
-        let (
-            Tally {
-                jobs, jobs_done, ..
-            },
-            share,
-        ) = (self.tally, self.tally.share());
-        callback
-            .call1(
-                py,
-                (jobs_done, jobs, share, std::mem::take(&mut self.messages)),
-            )
-            .map(drop)
+        let tally = self.tally;
+        let messages = std::mem::take(&mut self.messages);
+        let arguments = (tally.jobs_done, tally.jobs, tally.share(), messages);
+        callback.call1(py, arguments).map(drop)
     }
 }
 
@@ -126,7 +118,8 @@ pub fn run(
                 shard: Shard::default(),
                 walltime,
             };
-            let (recording, solver) = (*sweep.recording(), sweep.solver());
+            let recording = *sweep.recording();
+            let solver = sweep.solver();
             stickslip::run::join(
                 &layout,
                 &sweep,
@@ -135,7 +128,7 @@ pub fn run(
                     let kernel = |job: &stickslip::sweep::Job, interrupt: &_| {
                         measure(&job.parameters, &recording, solver, interrupt)
                     };
-                    // That nobody listens any more does not end a run.
+                    // A run goes on without a receiver of events.
                     let report =
                         joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
                     if reduce && report.jobs_left == 0 && !report.stopped {

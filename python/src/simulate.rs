@@ -1,6 +1,6 @@
 //! One job.
 
-use crate::errors::{Error, in_text};
+use crate::errors::Error;
 use crate::keys::{hint, section};
 use crate::table::Table;
 use crate::watched::watched;
@@ -12,14 +12,15 @@ use stickslip::observe::ContactRow;
 use stickslip::results::tables::{
     All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label, relabel,
 };
-use stickslip::simulate::{self as single, Records, Request, only_job};
+use stickslip::single_job::{self, Records, Request, only_job};
 use stickslip::sweep::{Change, Sweep};
 use stickslip::table::columns::{Row, Value};
 
 /// The text of a sweep with one job, from keys and their values as TOML.
 #[pyfunction]
 pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
-    let (mut changes, mut unknown) = (Vec::new(), Vec::new());
+    let mut changes = Vec::new();
+    let mut unknown = Vec::new();
     for (key, value) in keys {
         match section(&key) {
             Some(section) => changes.push(Change {
@@ -34,7 +35,7 @@ pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
         }
     }
     if unknown.is_empty() {
-        Ok(single::sweep_text(&changes))
+        Ok(single_job::sweep_text(&changes))
     } else {
         Err(Error::Sweep(unknown.join("\n")).into())
     }
@@ -42,10 +43,11 @@ pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
 
 /// Reads a sweep: a file, or a text that was made of something.
 pub fn read_sweep(file: Option<&Path>, text: &str, source: &str) -> Result<Sweep, Error> {
-    match file {
-        Some(file) => Ok(Sweep::from_file(file)?),
-        None => Sweep::parse(text, Path::new(source)).map_err(|error| in_text(error, source)),
-    }
+    let sweep = match file {
+        Some(file) => Sweep::from_file(file),
+        None => Sweep::parse_made(text, source),
+    };
+    Ok(sweep?)
 }
 
 /// A row of the jobs table, the text of the sweep, warnings, and tables by name.
@@ -90,7 +92,7 @@ pub fn simulate<'py>(
     let (row, tables) = watched::<_, ()>(
         py,
         |stop, _| {
-            let (measured, records) = single::simulate(&sweep, &parameters, request, stop)?;
+            let (measured, records) = single_job::simulate(&sweep, &parameters, request, stop)?;
             let names = label::<DriveAndSeed>(&sweep, &parameters);
             let row: JobRow = (relabel::<_, All>(&names), JobRecord::new(Ok(&measured)));
             let Records {
@@ -145,7 +147,9 @@ pub fn simulate<'py>(
 
 /// A row as a dict, by the names of the columns; `None` where a value is missing.
 fn as_dict<'py, R: Row>(py: Python<'py>, row: &R) -> PyResult<Bound<'py, PyDict>> {
-    let (columns, dict, mut written) = (R::columns(), PyDict::new(py), Ok(()));
+    let columns = R::columns();
+    let dict = PyDict::new(py);
+    let mut written = Ok(());
     row.cells(&mut |cell| {
         let Some(column) = columns.get(dict.len()) else {
             return;

@@ -16,7 +16,7 @@ use stickslip::table::columns::Table as TableRow;
 
 /// A table with its units, in Arrow's memory layout.
 ///
-/// pandas, polars, DuckDB and pyarrow take it as it is, without a copy: `pyarrow.table(slips)`,
+/// pandas, polars, DuckDB and pyarrow take it without a copy: `pyarrow.table(slips)`,
 /// `polars.DataFrame(slips)`, `duckdb.sql("from slips")`. All quantities are in SI units.
 #[pyclass(frozen, module = "stickslip")]
 pub struct Table {
@@ -118,17 +118,14 @@ impl Table {
                 .max()
                 .unwrap_or(0)
         };
-        let (names, units) = (
-            width(|field| field.name()),
-            width(|field| metadata(field, UNIT)),
-        );
+        let names = width(|field| field.name());
+        let units = width(|field| metadata(field, UNIT));
         let line = |field: &std::sync::Arc<Field>| {
-            let (unit, meaning) = (metadata(field, UNIT), metadata(field, DESCRIPTION));
-            format!(
-                "  {:names$}  {:5}  {unit:units$}  {meaning}",
-                field.name(),
-                kind(field)
-            )
+            let name = field.name();
+            let kind = kind(field);
+            let unit = metadata(field, UNIT);
+            let meaning = metadata(field, DESCRIPTION);
+            format!("  {name:names$}  {kind:5}  {unit:units$}  {meaning}")
         };
         let rows = match self.__len__() {
             1 => "1 row".to_owned(),

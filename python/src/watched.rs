@@ -1,5 +1,5 @@
-//! Work on a thread of its own, without the interpreter's lock, while this one waits for it and obeys Ctrl-C: signals reach
-//! the main thread alone, and there Python looks at them only when it is asked to.
+//! Work on a separate thread, without the interpreter's lock, while this one waits and obeys Ctrl-C: signals reach only the
+//! main thread, where Python handles them only on request.
 
 use crate::errors::Error;
 use pyo3::prelude::*;
@@ -9,11 +9,11 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How often Python is asked for signals, and shown what has happened.
+/// Time between two looks for signals, and two calls of `show`.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Does some work until it ends. What it sends is collected by `note`, and shown by `show` now and then. An exception, of
-/// `show` or by Ctrl-C, sets the flag that `work` looks at, and is raised once that has ended.
+/// Runs `work` until it ends. `note` collects its messages, and `show` shows them now and then. An exception, by `show` or by
+/// Ctrl-C, sets the flag of `work`, and is raised once that has ended.
 pub fn watched<T: Send, M: Send>(
     py: Python<'_>,
     work: impl FnOnce(&AtomicBool, &Sender<M>) -> Result<T, Error> + Send,
@@ -26,7 +26,8 @@ pub fn watched<T: Send, M: Send>(
         thread::scope(|scope| {
             // The sender is dropped with the work, which ends the loop.
             let worker = scope.spawn(move || work(stop, &sender));
-            let (mut raised, mut last_look) = (Ok(()), Instant::now());
+            let mut raised = Ok(());
+            let mut last_look = Instant::now();
             loop {
                 match receiver.recv_timeout(POLL) {
                     Ok(message) => note(message),
@@ -53,8 +54,6 @@ pub fn watched<T: Send, M: Send>(
 
 fn message_of(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied();
-    let text = text
-        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("without a message");
-    format!("panic: {text}")
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    format!("panic: {}", text.unwrap_or("without a message"))
 }

@@ -6,10 +6,10 @@
     results = stickslip.run("sweeps/fig3.toml")                      a sweep, or what is missing of it
     results = stickslip.open("results/fig3")                         what is there
 
-    results.slips().to_pandas()          or to_polars(), to_pyarrow(); DuckDB takes the table as it is
+    results.slips().to_pandas()          or to_polars(), to_pyarrow(); DuckDB takes the table directly
     results.plot.phase_eta()             a figure to build on
 
-All quantities are in SI units; tables carry them (`results.slips().units`). Keys are those of a sweep file:
+All quantities are in SI units, which tables name (`results.slips().units`). Keys are those of a sweep file:
 `help(stickslip.simulate)` lists them with units and defaults.
 
 Further modules: `statistics` (circular statistics, estimates with confidence intervals) and `tables` (pandas frames). They

@@ -47,7 +47,7 @@ class SimulationError(RuntimeError):
 class Table:
     """A table with its units, in Arrow's memory layout.
 
-    pandas, polars, DuckDB and pyarrow take it as it is, without a copy: `pyarrow.table(slips)`,
+    pandas, polars, DuckDB and pyarrow take it without a copy: `pyarrow.table(slips)`,
     `polars.DataFrame(slips)`, `duckdb.sql("from slips")`. All quantities are in SI units.
     """
 

@@ -3,18 +3,29 @@
 Each returns its axes, so that anything can be added or changed: `axes.set_xlim(...)`, `axes.figure.savefig(...)`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
-from ._stickslip import ResultsError, minimum_phase
+from ._stickslip import ResultsError, Table, minimum_phase
 
 if TYPE_CHECKING:
     import numpy
     import pandas
     from matplotlib.axes import Axes
 
-    from .results import Results
+
+class Tables(Protocol):
+    """What figures read of `stickslip.Results`."""
+
+    directory: Path
+
+    def sets(self, columns: Sequence[str] | None = None) -> Table: ...
+    def histograms(self, columns: Sequence[str] | None = None) -> Table: ...
+    def backbone(self, columns: Sequence[str] | None = None) -> Table: ...
+    def points(self, columns: Sequence[str] | None = None) -> Table: ...
+
 
 #: The program's colours: slips of sets with a phase and others, averages, theory, bars; and lines side by side (Okabe and Ito).
 PHASED, OTHERS, AVERAGE, THEORY, BARS = "black", "#8c8c8c", "#1f55c4", "#d62020", "#9db4d6"
@@ -66,7 +77,7 @@ def _new_axes() -> "Axes":
 class Plot:
     """The figures of a results directory. `axes` are matplotlib's to draw on; new ones if they are not given."""
 
-    def __init__(self, results: "Results") -> None:
+    def __init__(self, results: Tables) -> None:
         self._results = results
 
     @_styled()

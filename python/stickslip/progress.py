@@ -12,13 +12,13 @@ SPACING = 10.0
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is. `share` goes by predicted cost; other processes that share the work are counted."""
+    """How far a run is, with the jobs of other processes that share the work."""
 
     jobs_done: int
     jobs: int
     """All jobs to run."""
     share: float
-    """Share of the work that is done, from 0 to 1."""
+    """Share of the predicted cost that is done, from 0 to 1."""
     elapsed: float
     """Seconds since the run began."""
     messages: list[str] = field(default_factory=list)
@@ -26,7 +26,7 @@ class Progress:
 
     @property
     def remaining(self) -> float | None:
-        """Seconds left, as far as the share tells."""
+        """Seconds left, extrapolated from the share; None while nothing is done."""
         return self.elapsed * (1 - self.share) / self.share if self.share > 0 else None
 
 
@@ -46,7 +46,7 @@ def display(progress: bool | Callable[[Progress], object]) -> "_Display":
 
 
 class _Display:
-    """Calls back, and closes what was opened. The run calls it with what it knows."""
+    """Passes progress on to a callback. The run calls it."""
 
     def __init__(self, callback: Callable[[Progress], object] | None) -> None:
         self.callback = callback
@@ -57,7 +57,7 @@ class _Display:
             self.callback(Progress(jobs_done, jobs, share, time.monotonic() - self.begin, messages))
 
     def close(self) -> None:
-        """Leaves the display as it is."""
+        """Nothing is open here."""
 
 
 class _Lines(_Display):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def open(directory: str | PathLike[str]) -> "Results":
     """Opens a results directory, also one whose sweep still runs.
 
-    Raises `ResultsError` if it is none.
+    Raises `ResultsError` for any other directory.
 
     >>> results = stickslip.open("results/fig3")
     >>> slips = results.slips().to_pandas()
@@ -25,11 +25,11 @@ def open(directory: str | PathLike[str]) -> "Results":
 
 
 class Results:
-    """The results directory of a sweep. Each table is read when it is asked for, as far as it is there; the tables are
-    reduced first where the reduced data are not of them as they are.
+    """The results directory of a sweep, finished or not. Each call reads its table again; reduced data that are out of date
+    are made again first.
 
-    Every table is one of Arrow (`stickslip.Table`), with units, and goes into pandas, polars, DuckDB or pyarrow as it is.
-    `columns` are names of columns to read, which saves time and memory; what a row means is in `Table.meaning`.
+    Every table is an Arrow table with units (`stickslip.Table`), which pandas, polars, DuckDB and pyarrow take directly.
+    `columns` are names of columns to read, which saves time and memory; `Table.meaning` describes them.
     """
 
     def __init__(self, directory: str | PathLike[str]) -> None:
@@ -55,7 +55,7 @@ class Results:
         return self._table("slips", columns, join)
 
     def precursors(self, columns: Sequence[str] | None = None, *, join: bool = False) -> Table:
-        """One row per precursor, if the sweep records them; `columns` and `join` as of `slips`."""
+        """One row per precursor, if the sweep records them; `columns` and `join` as in `slips`."""
         return self._table("precursors", columns, join)
 
     def jobs(self, columns: Sequence[str] | None = None) -> Table:
@@ -86,7 +86,7 @@ class Results:
         return self._table("points", columns)
 
     def reduce(self) -> None:
-        """Reduces the tables, as far as they are there. `sets` and the others do so themselves where it is due."""
+        """Reduces the finished parts of the tables. `sets` and the others do so themselves when needed."""
         _stickslip.reduce(self.directory)
 
     @cached_property

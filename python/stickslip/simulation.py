@@ -77,7 +77,7 @@ def simulate(
     `trace`, `map`, `profile` and `contacts` record more than slips; `sample` is the time between samples, in s.
     Without `slips` it records 20, or with `time` or `max_time` alone all until then. Ctrl-C ends it. Other threads of Python run meanwhile.
 
-    Raises `SweepError` for a key or a value that cannot be, and `SimulationError` if it cannot continue.
+    Raises `SweepError` for a bad key or value, and `SimulationError` if the simulation cannot continue.
 
     >>> one = stickslip.simulate(Delta=1e-6, frequency=29, slips=20, trace=True)
     >>> one.outcome, one.job["mean_friction"]

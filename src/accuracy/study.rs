@@ -13,7 +13,7 @@ use super::{Method, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Recording, Slip, measure};
-use crate::run::cpu;
+use crate::run::threads;
 use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate};
 use crate::table::columns::columns;
 use anyhow::{Context, Result, bail};
@@ -445,7 +445,7 @@ fn measured(
     recording: &Recording,
 ) -> Result<(f64, Measurements)> {
     let (cpu_seconds, measured) =
-        cpu::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
+        threads::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
     Ok((
         cpu_seconds,
         measured.with_context(|| in_words(parameters, solver))?,

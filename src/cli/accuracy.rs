@@ -1,7 +1,7 @@
 //! `stickslip accuracy`: speed against error of the solvers, measured in one run.
 
 use super::exit::{Exit, UsageError};
-use super::output::{self, Columns};
+use super::output::{self, TextTable};
 use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
 use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, shows_bias, verdict};
@@ -83,11 +83,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let has_file = arguments.sweep.is_some() || arguments.preset.preset.is_some();
     let mut out = PathBuf::from("results/accuracy");
     if has_file || !changes.is_empty() {
-        let sweep = sweep::read(
-            arguments.sweep.as_deref(),
-            arguments.preset.preset,
-            &changes,
-        )?;
+        let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &changes)?;
         output::warn(&sweep.warnings());
         let (sets, slips): (Vec<_>, Vec<f64>) = sets_of(&sweep)?.into_iter().unzip();
         study = study.at(sets, sweep.solver());
@@ -102,11 +98,8 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     }
     let out = arguments.out.clone().unwrap_or(out);
     if !out.is_dir() && out.symlink_metadata().is_ok() {
-        return Err(UsageError(format!(
-            "--out {}: must be a folder, or not be there yet",
-            shown(&out)
-        ))
-        .into());
+        let problem = "must be a folder, or not be there yet";
+        return Err(UsageError(format!("--out {}: {problem}", shown(&out))).into());
     }
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
     study.slips = arguments.slips.unwrap_or(study.slips);
@@ -122,9 +115,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         output::plain_json(&accuracy::to_json(&study, &findings))?;
     } else {
         output::print(&study_text(&study, &findings))?;
-        files
-            .iter()
-            .try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
+        output::lines(files.iter().map(|file| shown(file).to_string()))?;
     }
     Ok(Exit::Done)
 }
@@ -186,47 +177,25 @@ fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
         .filter(|row| *row.parameters == *set)
         .collect();
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
-    let mut columns = Columns::default();
-    let mut add = |is_worded: bool, head: &str, cell: &dyn Fn(&MethodRow) -> String| {
-        columns.add(
-            is_worded,
-            std::iter::once(head.to_owned())
-                .chain(rows.iter().map(|row| cell(row)))
-                .collect(),
-        );
-    };
-    add(true, "   solver", &|row| {
-        format!(
-            "{} {}",
-            if row.solver == study.own.into() {
-                "->"
-            } else {
-                "  "
-            },
-            row.solver
-        )
+    let mut columns = TextTable::default();
+    columns.words("   solver", &rows, |row| {
+        let is_own = row.solver == study.own.into();
+        format!("{} {}", if is_own { "->" } else { "  " }, row.solver)
     });
-    add(false, "ms/slip", &|row| {
-        format!(
-            "{:.3}{}",
-            1e3 * row.cost.per_slip,
-            if row.cost.is_extrapolated() { "*" } else { "" }
-        )
+    columns.numbers("ms/slip", &rows, |row| {
+        let mark = if row.cost.is_extrapolated() { "*" } else { "" };
+        format!("{:.3}{mark}", 1e3 * row.cost.per_slip)
     });
-    add(
-        false,
-        "break times (s)",
-        &|MethodRow { break_times, .. }| {
-            let times = break_times.median.zip(break_times.largest);
-            or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
-        },
-    );
+    columns.numbers("break times (s)", &rows, |row| {
+        let times = row.break_times.median.zip(row.break_times.largest);
+        or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
+    });
     let intervals = findings
         .biases
         .iter()
         .filter(|row| row.quantity == "interval");
     let comparisons = intervals.count();
-    add(false, "interval (%)", &|row| {
+    columns.numbers("interval (%)", &rows, |row| {
         or_none(findings.bias_of(row, "interval").and_then(|row| {
             let scale = 100.0 / row.reference_mean.abs();
             let bias = scale * row.bias.of_mean;

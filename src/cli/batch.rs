@@ -1,6 +1,6 @@
 //! `stickslip batch`: a script that submits a sweep to a batch system. It submits nothing itself.
 //!
-//! The script starts the same command many times; whoever is started shares what is left. Logs lie in `run/batch/`.
+//! The script starts the same command many times; the workers share the missing jobs. Logs lie in `run/batch/`.
 
 use super::exit::{Exit, UsageError};
 use super::output::{self, quoted};
@@ -98,33 +98,13 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
 }
 
 fn script(arguments: &Arguments, program: &Path) -> Result<String> {
-    let Arguments {
-        time,
-        threads,
-        workers,
-        options,
-        ..
-    } = arguments;
-    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &[])?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &[])?;
     output::warn(&sweep.warnings());
-    let starts = arguments.starts.unwrap_or(*workers);
-    if starts < *workers {
-        return Err(UsageError(format!(
-            "--starts {starts}: must be >= --workers, here {workers}"
-        ))
-        .into());
-    }
-    if let Some(option) = options
-        .iter()
-        .find(|option| option.contains(char::is_control))
-    {
-        return Err(UsageError(format!("{option:?}: must hold no control characters")).into());
-    }
-    let root = arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| Layout::default_root(&sweep));
-    let root = whole_path(&root)?;
+    arguments.check()?;
+    let root = match &arguments.out {
+        Some(out) => whole_path(out)?,
+        None => whole_path(&Layout::default_root(&sweep))?,
+    };
     let logs = format!("{root}/run/batch");
     let mut command = vec![whole_path(program)?, "run".to_owned()];
     match (&arguments.sweep, arguments.preset.preset) {
@@ -134,55 +114,85 @@ fn script(arguments: &Arguments, program: &Path) -> Result<String> {
             command.extend(preset.map(|preset| preset.name.to_owned()));
         }
     }
-    let walltime = time::with_units(time.saturating_sub(margin(*time)));
+    let time = arguments.time;
+    let walltime = time::with_units(time.saturating_sub(margin(time)));
     command.extend(["--out", &root, "--worker", "--walltime", &walltime].map(str::to_owned));
     let name = sweep.name();
     let (template, own_options, as_read): (_, _, fn(&str) -> String) = match arguments.engine {
-        Engine::Slurm => {
-            let limit = if starts > *workers {
-                format!("%{workers}")
-            } else {
-                String::new()
-            };
-            let mut own_options = vec![
-                format!("--job-name={name}"),
-                format!("--array=1-{starts}{limit}"),
-                format!("--cpus-per-task={threads}"),
-                format!("--time={}:{:02}", time.as_secs() / 60, time.as_secs() % 60),
-                format!("--output={}/%A_%a.log", logs.replace('%', "%%")),
-            ];
-            if margin(*time) == MAX_MARGIN {
-                own_options.push(format!("--signal=B:USR1@{WARNING}"));
-            }
-            (SLURM, own_options, directive)
-        }
+        Engine::Slurm => (SLURM, arguments.of_slurm(name, &logs), directive),
         Engine::Hyperqueue => {
-            command.extend(["--threads".to_owned(), threads.to_string()]);
-            let own_options = vec![
-                format!("--name={name}"),
-                format!("--array=1-{starts}"),
-                format!("--cpus={threads}"),
-                format!("--time-limit={}", time::with_units(*time)),
-            ];
+            command.extend(["--threads".to_owned(), arguments.threads.to_string()]);
             let as_read = |option: &str| quoted(option) + " \\\n    ";
-            (HYPERQUEUE, own_options, as_read)
+            (HYPERQUEUE, arguments.of_hyperqueue(name), as_read)
         }
     };
-    let options = own_options.iter().chain(options);
+    let options = own_options.iter().chain(&arguments.options);
+    let options: String = options.map(|option| as_read(option)).collect();
     let command: Vec<String> = command.iter().map(|word| quoted(word)).collect();
     let values = [
         ("name", name),
         ("logs", &quoted(&logs)),
-        (
-            "options",
-            &options.map(|option| as_read(option)).collect::<String>(),
-        ),
+        ("options", &options),
         ("command", &command.join(" ")),
     ];
     Ok(filled(template, &values))
 }
 
-/// A template with values in place of its {{names}}. What a value holds is not looked at again.
+impl Arguments {
+    fn starts(&self) -> NonZeroU32 {
+        self.starts.unwrap_or(self.workers)
+    }
+
+    fn check(&self) -> Result<(), UsageError> {
+        let starts = self.starts();
+        let workers = self.workers;
+        if starts < workers {
+            return Err(UsageError(format!(
+                "--starts {starts}: must be >= --workers, here {workers}"
+            )));
+        }
+        let mut options = self.options.iter();
+        match options.find(|option| option.contains(char::is_control)) {
+            Some(option) => Err(UsageError(format!(
+                "{option:?}: must hold no control characters"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    fn of_slurm(&self, name: &str, logs: &str) -> Vec<String> {
+        let starts = self.starts();
+        let limit = if starts > self.workers {
+            format!("%{}", self.workers)
+        } else {
+            String::new()
+        };
+        let seconds = self.time.as_secs();
+        let logs = logs.replace('%', "%%");
+        let mut options = vec![
+            format!("--job-name={name}"),
+            format!("--array=1-{starts}{limit}"),
+            format!("--cpus-per-task={}", self.threads),
+            format!("--time={}:{:02}", seconds / 60, seconds % 60),
+            format!("--output={logs}/%A_%a.log"),
+        ];
+        if margin(self.time) == MAX_MARGIN {
+            options.push(format!("--signal=B:USR1@{WARNING}"));
+        }
+        options
+    }
+
+    fn of_hyperqueue(&self, name: &str) -> Vec<String> {
+        vec![
+            format!("--name={name}"),
+            format!("--array=1-{}", self.starts()),
+            format!("--cpus={}", self.threads),
+            format!("--time-limit={}", time::with_units(self.time)),
+        ]
+    }
+}
+
+/// A template with values in place of its {{names}}. Names within values stay.
 fn filled(template: &str, values: &[(&str, &str)]) -> String {
     let mut pieces = template.split("{{");
     let first = pieces.next().unwrap_or_default().to_owned();
@@ -200,7 +210,7 @@ fn margin(time: Duration) -> Duration {
 
 /// An absolute path; symbolic links stay, since a common disk may be mounted elsewhere on other nodes.
 fn whole_path(mut path: &Path) -> Result<String> {
-    // In the current folder there are none, so that `..` after it needs no look at the disk.
+    // The path of the current folder has no links, so that `..` after it needs no look at the disk.
     let mut folder = std::env::current_dir().unwrap_or_default();
     while let Ok(rest) = path.strip_prefix("..") {
         folder.pop();
@@ -208,18 +218,13 @@ fn whole_path(mut path: &Path) -> Result<String> {
     }
     let path = absolute(folder.join(path))
         .with_context(|| format!("{}: cannot be made absolute", shown(path)))?;
-    let text = path
-        .to_str()
-        .filter(|text| !text.contains(char::is_control));
-    let problem = || {
-        format!(
-            "{}: must be UTF-8 without control characters; choose another path",
-            shown(&path)
-        )
-    };
-    Ok(text
-        .map(ToOwned::to_owned)
-        .ok_or_else(|| UsageError(problem()))?)
+    match path.to_str() {
+        Some(text) if !text.contains(char::is_control) => Ok(text.to_owned()),
+        _ => {
+            let problem = "must be UTF-8 without control characters; choose another path";
+            Err(UsageError(format!("{}: {problem}", shown(&path))).into())
+        }
+    }
 }
 
 /// The line of an option as sbatch reads it from a script: with quotes, and a backslash before what else would mean

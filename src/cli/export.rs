@@ -38,8 +38,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of the JSON.
-const FORMAT: u32 = 2;
+const JSON_FORMAT: u32 = 2;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
@@ -56,16 +55,15 @@ pub fn export(arguments: &Arguments) -> Result<Exit> {
     })?;
     bar.finish_and_clear();
     if arguments.json {
-        output::json(FORMAT, &exported)?;
+        output::json(JSON_FORMAT, &exported)?;
         return Ok(Exit::Done);
     }
-    for file in &exported.files {
-        let (rows, megabytes) = (output::count(file.rows, "row"), file.bytes as f64 / 1e6);
-        output::print(&format!(
-            "{}  {rows}, {megabytes:.1} MB\n",
-            shown(&arguments.out.join(&file.name))
-        ))?;
-    }
+    output::lines(exported.files.iter().map(|file| {
+        let path = out.join(&file.name);
+        let rows = output::count(file.rows, "row");
+        let megabytes = file.bytes as f64 / 1e6;
+        format!("{}  {rows}, {megabytes:.1} MB", shown(&path))
+    }))?;
     if let Some(unfinished) = output::unfinished(&results)? {
         output::report(&format!("exported what is there: {unfinished}"));
     }

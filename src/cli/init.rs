@@ -2,14 +2,13 @@
 
 use super::exit::Exit;
 use super::output;
-use super::signals;
 use super::sweep::{Preset, Variation, changes, vary};
 use crate::results::destination::{Destination, Kind};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Write a commented sweep file to start from
 #[derive(Debug, Args)]
@@ -64,7 +63,7 @@ impl Question {
     }
 }
 
-/// A sweep that runs as it is, with all other keys as comments.
+/// A sweep that runs unchanged, with all other keys as comments.
 const TEMPLATE: Preset = Preset {
     name: "sweep",
     text: include_str!("init/template.toml"),
@@ -72,10 +71,6 @@ const TEMPLATE: Preset = Preset {
 
 pub fn init(arguments: &Arguments) -> Result<Exit> {
     let file = &arguments.file;
-    let name = file
-        .file_stem()
-        .and_then(|stem| stem.to_str())
-        .unwrap_or_default();
     let (preset, axes) = match arguments.question.map(Question::sweep) {
         Some((name, axes)) => (
             Preset::from_str(name, false).map_err(anyhow::Error::msg)?,
@@ -83,47 +78,44 @@ pub fn init(arguments: &Arguments) -> Result<Exit> {
         ),
         None => (arguments.preset.unwrap_or(TEMPLATE), [].as_slice()),
     };
-    let text = preset.text.replace(
-        &format!("name = \"{}\"", preset.name),
-        &format!("name = \"{name}\""),
-    );
-    let sweep = Sweep::parse(&text, file);
-    let sweep = sweep
-        .with_context(|| format!("{}: the name of the file must suit a sweep", shown(file)))?;
-    let axes: Vec<String> = axes.iter().map(|&axis| axis.to_owned()).collect();
-    let own = changes(&arguments.variation)?;
+    let sweep = renamed(preset, file)?;
+    let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
     let of_question = changes(&Variation {
         settings: Vec::new(),
         axes,
     })?;
-    let text = vary(vary(sweep, &of_question)?, &own)?.text().to_owned();
-    // What is set stands no longer as a comment with its default.
+    let own = changes(&arguments.variation)?;
+    let sweep = vary(vary(sweep, &of_question)?, &own)?;
+    // A key that is set need not stand as a comment with its default.
     let is_set = |line: &str| {
-        own.iter()
-            .any(|change| line.starts_with(&format!("# {} = ", change.key)))
+        let is_of = |key: &str| line.starts_with(&format!("# {key} = "));
+        own.iter().any(|change| is_of(&change.key))
     };
-    let text: String = text
-        .split_inclusive('\n')
-        .filter(|line| !is_set(line))
-        .collect();
-    let question = arguments
-        .question
-        .and_then(|question| question.to_possible_value());
-    let text = match question.as_ref().and_then(|question| question.get_help()) {
-        Some(question) => format!(
-            "# {question}\n{}",
-            &text[text.find("name = ").unwrap_or(0)..]
-        ),
-        None => text,
-    };
-    let destination = Destination::new(file, Kind::NEW)?;
-    destination.write(signals::catch, |mut file| Ok(file.write(text.as_bytes())?))?;
+    let lines = sweep.text().split_inclusive('\n');
+    let mut text: String = lines.filter(|line| !is_set(line)).collect();
+    let question = arguments.question.and_then(|it| it.to_possible_value());
+    if let Some(question) = question.as_ref().and_then(|question| question.get_help()) {
+        let begin = text.find("name = ").unwrap_or(0);
+        text.replace_range(..begin, &format!("# {question}\n"));
+    }
+    output::write(&Destination::new(file, Kind::NEW)?, text.as_bytes())?;
+    let path = shown(file);
     let quoted = output::quoted_path(file);
     output::report(&format!(
-        "wrote {}. See what it would run: stickslip plan {quoted}",
-        shown(file)
+        "wrote {path}. See what it would run: stickslip plan {quoted}"
     ));
     Ok(Exit::Done)
+}
+
+/// A preset under the name of a file.
+fn renamed(preset: Preset, file: &Path) -> Result<Sweep> {
+    let name = file.file_stem().and_then(|stem| stem.to_str());
+    let named = |name: &str| format!("name = \"{name}\"");
+    let text = preset
+        .text
+        .replace(&named(preset.name), &named(name.unwrap_or_default()));
+    Sweep::parse(&text, file)
+        .with_context(|| format!("{}: the name of the file must suit a sweep", shown(file)))
 }
 
 #[cfg(test)]
@@ -131,14 +123,13 @@ mod tests {
     use super::*;
     use crate::model::Symbol;
     use crate::observe::RecordingKey;
-    use std::path::Path;
 
     fn sweep(text: &str) -> Sweep {
         Sweep::parse(text, Path::new("template.toml")).unwrap()
     }
 
     #[test]
-    fn the_template_runs_as_it_is_and_names_every_key_with_its_default() {
+    fn the_template_runs_unchanged_and_names_every_key_with_its_default() {
         // The tables of rounds stand as a whole or not at all.
         let text = TEMPLATE.text.split("\n# Seeds until").next().unwrap();
         // What has no default stays a comment.

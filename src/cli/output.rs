@@ -1,7 +1,9 @@
 //! Text for people and JSON for programs.
 
+use super::signals;
 use crate::results::Results;
-use crate::results::rounds::RoundsSoFar;
+use crate::results::destination::Destination;
+use crate::results::next_round::RoundsSoFar;
 use crate::run::Reasons;
 use crate::sweep::Standing;
 use crate::table::shown::{is_plain, shown_text};
@@ -16,7 +18,7 @@ use std::time::Duration;
 /// Reasons of failures that are listed.
 const MAX_REASONS: usize = 10;
 
-/// Writes to standard output. That its reader has seen enough, as `head` has, is no error.
+/// Writes to standard output. A reader that has seen enough, such as `head`, is no error.
 pub fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
@@ -24,7 +26,12 @@ pub fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Writes a line to standard error. That nobody can read it must not end a run.
+/// Writes lines to standard output.
+pub fn lines(lines: impl IntoIterator<Item = String>) -> Result<()> {
+    lines.into_iter().try_for_each(|line| print(&(line + "\n")))
+}
+
+/// Writes a line to standard error. A failed write must not end the run.
 pub fn report(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
@@ -33,6 +40,11 @@ pub fn warn(warnings: &[String]) {
     for warning in warnings {
         report(&format!("warning: {warning}"));
     }
+}
+
+/// Writes bytes to a file.
+pub fn write(file: &Destination, bytes: &[u8]) -> Result<()> {
+    file.write(signals::catch, |mut file| Ok(file.write(bytes)?))
 }
 
 /// Prints a value as JSON, with the version of its form.
@@ -53,52 +65,58 @@ pub fn plain_json(value: &impl Serialize) -> Result<()> {
 
 /// Prints labels and values in two columns.
 pub fn pairs(pairs: &[(&str, String)]) -> Result<()> {
-    let width = pairs
-        .iter()
-        .map(|(label, _)| label.chars().count())
-        .max()
-        .unwrap_or(0);
-    pairs
-        .iter()
-        .try_for_each(|(label, value)| print(&format!("{label:width$}  {value}\n")))
+    let mut columns = TextTable::default();
+    columns.words("", pairs, |(label, _)| (*label).to_owned());
+    columns.words("", pairs, |(_, value)| value.clone());
+    print(&columns.to_string())
 }
 
-/// Columns of cells side by side, each with whether it is of words, which stand to the left.
+/// A table for people: columns of cells, each below its head. Without any head, there is no line for heads.
 #[derive(Default)]
-pub struct Columns(Vec<(bool, Vec<String>)>);
+pub struct TextTable(Vec<TextColumn>);
 
-impl Columns {
-    pub fn add(&mut self, is_worded: bool, cells: Vec<String>) {
-        self.0.push((is_worded, cells));
+struct TextColumn {
+    /// Words stand to the left, numbers to the right.
+    is_worded: bool,
+    cells: Vec<String>,
+}
+
+impl TextTable {
+    /// Adds a column of words, with a cell for each row.
+    pub fn words<R>(&mut self, head: impl Into<String>, rows: &[R], cell: impl Fn(&R) -> String) {
+        self.add(true, head.into(), rows.iter().map(cell));
+    }
+
+    /// Adds a column of numbers, with a cell for each row.
+    pub fn numbers<R>(&mut self, head: impl Into<String>, rows: &[R], cell: impl Fn(&R) -> String) {
+        self.add(false, head.into(), rows.iter().map(cell));
+    }
+
+    pub fn add(&mut self, is_worded: bool, head: String, cells: impl Iterator<Item = String>) {
+        let cells = std::iter::once(head).chain(cells).collect();
+        self.0.push(TextColumn { is_worded, cells });
     }
 }
 
-impl fmt::Display for Columns {
+impl fmt::Display for TextTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = |cells: &[String]| {
-            cells
-                .iter()
-                .map(|cell| cell.chars().count())
-                .max()
-                .unwrap_or(0)
-        };
-        let widths: Vec<usize> = self.0.iter().map(|(_, cells)| width(cells)).collect();
-        let lines = self.0.first().map_or(0, |(_, cells)| cells.len());
-        (0..lines).try_for_each(|line| {
-            let padded = self
-                .0
-                .iter()
-                .zip(&widths)
-                .map(|((is_worded, cells), &width)| {
-                    let cell = &cells[line];
-                    if *is_worded {
-                        format!("{cell:width$}")
-                    } else {
-                        format!("{cell:>width$}")
-                    }
-                });
-            writeln!(f, "{}", padded.collect::<Vec<_>>().join("  ").trim_end())
-        })
+        let width = |cell: &String| cell.chars().count();
+        let width = |column: &TextColumn| column.cells.iter().map(width).max().unwrap_or(0);
+        let widths: Vec<usize> = self.0.iter().map(width).collect();
+        let lines = self.0.first().map_or(0, |column| column.cells.len());
+        let has_heads = self.0.iter().any(|column| !column.cells[0].is_empty());
+        for line in usize::from(!has_heads)..lines {
+            let padded = self.0.iter().zip(&widths).map(|(column, &width)| {
+                let cell = &column.cells[line];
+                if column.is_worded {
+                    format!("{cell:width$}")
+                } else {
+                    format!("{cell:>width$}")
+                }
+            });
+            writeln!(f, "{}", padded.collect::<Vec<_>>().join("  ").trim_end())?;
+        }
+        Ok(())
     }
 }
 
@@ -115,8 +133,7 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// A count with its noun, in the plural where that fits.
-/// Jobs that are missing, and those that are kept for later.
+/// Jobs that are missing, and jobs that are kept for later.
 pub fn missing(jobs_missing: u64, jobs_spilled: u64) -> String {
     let missing = format!("{} missing", count(jobs_missing, "job"));
     match jobs_spilled {
@@ -134,6 +151,7 @@ pub fn unfinished(results: &Results<'_>) -> Result<Option<String>> {
     Ok((overview.jobs_missing > 0).then_some(unfinished))
 }
 
+/// A count with its noun, in the plural where that fits.
 pub fn count(number: u64, noun: &str) -> String {
     if number == 1 {
         format!("1 {noun}")
@@ -145,14 +163,11 @@ pub fn count(number: u64, noun: &str) -> String {
 /// Lines of the most frequent reasons of failures.
 pub fn by_reason(reasons: &Reasons) -> String {
     let reasons = reasons.sorted();
-    let line = |(reason, jobs): &(&str, u64)| {
-        format!(
-            "failed  {} in all: {}\n",
-            count(*jobs, "job"),
-            shown_text(reason)
-        )
-    };
-    let mut lines: String = reasons.iter().take(MAX_REASONS).map(line).collect();
+    let mut lines = String::new();
+    for (reason, jobs) in reasons.iter().take(MAX_REASONS) {
+        let jobs = count(*jobs, "job");
+        lines = format!("{lines}failed  {jobs} in all: {}\n", shown_text(reason));
+    }
     if reasons.len() > MAX_REASONS {
         lines += "failed  for other reasons, too: see outcome and reason in tables/jobs\n";
     }
@@ -172,29 +187,18 @@ pub fn rounds(rounds: &RoundsSoFar) -> String {
     } else {
         "not the last"
     };
-    let sets = format!(
-        "{} ({over}): {} done, {sets_open} open",
-        rounds.round,
-        count(sets_done, "set")
-    );
-    let capped = [
-        (sets_capped > 0).then(|| {
-            format!(
-                "; {} with all seeds allowed, above the target",
-                count(sets_capped, "set")
-            )
-        }),
-        (edges_capped > 0).then(|| {
-            format!(
-                "; {} wider than wanted, at the limit of seeds or jobs",
-                count(edges_capped, "edge")
-            )
-        }),
-    ];
-    capped
-        .into_iter()
-        .flatten()
-        .fold(sets, |text, more| text + &more)
+    let round = rounds.round;
+    let done = count(sets_done, "set");
+    let mut text = format!("{round} ({over}): {done} done, {sets_open} open");
+    if sets_capped > 0 {
+        let sets = count(sets_capped, "set");
+        text = format!("{text}; {sets} with all seeds allowed, above the target");
+    }
+    if edges_capped > 0 {
+        let edges = count(edges_capped, "edge");
+        text = format!("{text}; {edges} wider than wanted, at the limit of seeds or jobs");
+    }
+    text
 }
 
 /// A line on a terminal, with the time so far, until it is dropped.
@@ -211,11 +215,8 @@ pub fn waiting(what: String) -> ProgressBar {
 
 /// A text as a shell reads it.
 pub fn quoted(text: &str) -> String {
-    if !text.is_empty()
-        && text
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "/._-+=:,@".contains(c))
-    {
+    let is_safe = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@".contains(c);
+    if !text.is_empty() && text.chars().all(is_safe) {
         text.to_owned()
     } else {
         format!("'{}'", text.replace('\'', r"'\''"))

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use super::sweep::{self, PresetFlag, Variation};
 use crate::results::layout::Layout;
-use crate::results::rounds::RoundsSoFar;
+use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
 use crate::run::threads::{self, Threads};
 use crate::run::{Overview, status};
@@ -15,7 +15,6 @@ use crate::table::value::floored;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
-use serde_json::{Value as Json, json};
 use std::path::PathBuf;
 
 /// Show what a sweep would run and what is done: jobs, parts, predicted cost. Nothing is written
@@ -42,15 +41,40 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of the JSON.
-const FORMAT: u32 = 2;
+const JSON_FORMAT: u32 = 2;
 
 /// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction. As measured, rounded up.
 const MEMORY: f64 = 80e6;
 
-/// What of the sweep is in its results directory, or why it cannot be run there.
+/// What a sweep would run.
 #[derive(Serialize)]
-struct Directory {
+struct Forecast<'a> {
+    name: &'a str,
+    axes: Vec<AxisInBrief>,
+    points: u64,
+    jobs: u64,
+    parts: u64,
+    slips: usize,
+    predicted_cpu_seconds: f64,
+    predicted_wall_seconds: f64,
+    threads: usize,
+    worker_memory_bytes: f64,
+    thread_memory_bytes: f64,
+    directory: Option<DirectoryState>,
+    /// What all rounds of an adaptive sweep may add up to; the other numbers are those of the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    at_most: Option<Bounds>,
+}
+
+#[derive(Serialize)]
+struct AxisInBrief {
+    keys: String,
+    points: u64,
+}
+
+/// How much of the sweep is in its results directory, or why it cannot be run there.
+#[derive(Serialize)]
+struct DirectoryState {
     #[serde(serialize_with = "serialize_path")]
     path: PathBuf,
     refused: Option<String>,
@@ -60,7 +84,112 @@ struct Directory {
     rounds: Option<RoundsSoFar>,
 }
 
-impl Directory {
+pub fn plan(arguments: &Arguments) -> Result<Exit> {
+    let changes = sweep::changes(&arguments.variation)?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &changes)?;
+    output::warn(&sweep.warnings());
+    let default = changes.is_empty().then(|| Layout::default_root(&sweep));
+    let root = arguments.out.clone().or(default);
+    if let Some(root) = &root {
+        sweep::warn_of_partitions(root, &sweep);
+    }
+    let threads = Threads::choose(None, |variable| std::env::var_os(variable))?;
+    let threads = threads::or_all_cores(threads.count);
+    let directory = root.map_or(Ok(None), |root| DirectoryState::of(&sweep, root))?;
+    let forecast = Forecast::new(&sweep, threads, directory);
+    if arguments.json {
+        output::json(JSON_FORMAT, &forecast)?;
+    } else {
+        output::pairs(&forecast.pairs(&sweep))?;
+    }
+    Ok(Exit::Done)
+}
+
+impl<'a> Forecast<'a> {
+    fn new(sweep: &'a Sweep, threads: usize, directory: Option<DirectoryState>) -> Self {
+        let totals = Plan::new(&[Extension::new(sweep, &[])]).totals();
+        let axes = sweep.axes();
+        Self {
+            name: sweep.name(),
+            axes: axes
+                .map(|(keys, points)| AxisInBrief { keys, points })
+                .collect(),
+            points: sweep.point_count(),
+            jobs: totals.jobs,
+            parts: totals.parts,
+            slips: floored(totals.slips.round()),
+            predicted_cpu_seconds: totals.cost,
+            predicted_wall_seconds: totals.cost / threads as f64,
+            threads,
+            worker_memory_bytes: MEMORY,
+            thread_memory_bytes: totals.memory + totals.memory_of_slips,
+            directory,
+            at_most: sweep.bounds(),
+        }
+    }
+
+    fn pairs(&self, sweep: &Sweep) -> Vec<(&'static str, String)> {
+        let axes: Vec<String> = (self.axes.iter())
+            .map(|axis| format!("{} ({})", axis.keys, axis.points))
+            .collect();
+        let axes = match axes.as_slice() {
+            [] => "none: a single point".to_owned(),
+            axes => axes.join(" x "),
+        };
+        let (choice, which) = match self.at_most {
+            Some(_) => (
+                ", from which the rounds choose",
+                "in the first round, to which the numbers below refer",
+            ),
+            None if sweep.recording().control => {
+                ("", "after conditions and duplicates, and their controls")
+            }
+            None => ("", "after conditions and duplicates"),
+        };
+        let cpu_time = self.predicted_cpu_seconds;
+        let core_hours = cpu_time / 3600.0;
+        let cpu_time = output::duration(cpu_time);
+        let wall_time = output::duration(self.predicted_wall_seconds);
+        let threads = output::count(self.threads as u64, "thread");
+        let of_worker = shown_bytes(self.worker_memory_bytes);
+        let of_thread = shown_bytes(self.thread_memory_bytes);
+        let mut pairs = vec![
+            ("sweep", self.name.to_owned()),
+            ("axes", axes),
+            ("grid points", format!("{}{choice}", self.points)),
+            ("jobs", format!("{} {which}", self.jobs)),
+            ("parts", self.parts.to_string()),
+            ("slips to record", self.slips.to_string()),
+            (
+                "predicted CPU time",
+                format!("{cpu_time}, {core_hours:.1} core-hours"),
+            ),
+            ("predicted wall time", format!("{wall_time} on {threads}")),
+            (
+                "worker memory",
+                format!("{of_worker} and {of_thread} for each thread"),
+            ),
+        ];
+        if let Some(Bounds {
+            sets,
+            jobs,
+            predicted_cost,
+        }) = self.at_most
+        {
+            let cost = output::duration(predicted_cost);
+            let at_most = format!("at most {sets} sets, {jobs} jobs; estimated CPU time {cost}");
+            pairs.push(("all rounds", at_most));
+        }
+        let directory = (self.directory.as_ref()).map_or_else(
+            || "none yet: all jobs are to run".to_owned(),
+            DirectoryState::in_words,
+        );
+        pairs.push(("directory", directory));
+        pairs
+    }
+}
+
+impl DirectoryState {
     /// `None` if there is none yet.
     fn of(sweep: &Sweep, root: PathBuf) -> Result<Option<Self>> {
         if !Disk.exists(&root)? {
@@ -82,145 +211,24 @@ impl Directory {
     }
 
     fn in_words(&self) -> String {
-        let Some(Overview {
-            jobs_done,
-            jobs_spilled,
-            jobs_failed,
-            jobs_kept,
-            jobs_missing,
-            ..
-        }) = &self.overview
-        else {
+        let Some(overview) = &self.overview else {
             return format!("refused: {}", self.refused.as_deref().unwrap_or_default());
         };
-        let (path, own) = (shown(&self.path), jobs_done - jobs_kept);
-        let kept = format!("; {jobs_kept} more done that the sweep no longer has");
-        let kept = if *jobs_kept == 0 { "" } else { &kept };
-        let round = self.rounds.as_ref().map_or_else(String::new, |rounds| {
-            format!("; round {}", output::rounds(rounds))
-        });
-        format!(
-            "{path}: {own} done, {jobs_spilled} kept for later, {jobs_failed} failed, {jobs_missing} to run{kept}{round}"
-        )
-    }
-}
-
-pub fn plan(arguments: &Arguments) -> Result<Exit> {
-    let changes = sweep::changes(&arguments.variation)?;
-    let sweep = sweep::read(
-        arguments.sweep.as_deref(),
-        arguments.preset.preset,
-        &changes,
-    )?;
-    output::warn(&sweep.warnings());
-    let default = changes.is_empty().then(|| Layout::default_root(&sweep));
-    let root = arguments.out.clone().or(default);
-    if let Some(root) = &root {
-        sweep::warn_of_partitions(root, &sweep);
-    }
-    let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
-    let threads = Threads::choose(None, |variable| std::env::var_os(variable))?;
-    let threads = threads::or_all_cores(threads.count);
-    let wall_time = totals.cost / threads as f64;
-    let thread_memory = totals.memory + totals.memory_of_slips;
-    let slips = floored(totals.slips.round());
-    // What all rounds of a sweep that decides for itself may add up to; the other numbers are those of the first.
-    let at_most = sweep.bounds();
-    let directory = root.map_or(Ok(None), |root| Directory::of(&sweep, root))?;
-    if arguments.json {
-        let axes: Vec<Json> = sweep
-            .axes()
-            .map(|(keys, points)| json!({ "keys": keys, "points": points }))
-            .collect();
-        let mut report = json!({
-            "name": sweep.name(),
-            "axes": axes,
-            "points": sweep.point_count(),
-            "jobs": totals.jobs,
-            "parts": totals.parts,
-            "slips": slips,
-            "predicted_cpu_seconds": totals.cost,
-            "predicted_wall_seconds": wall_time,
-            "threads": threads,
-            "worker_memory_bytes": MEMORY,
-            "thread_memory_bytes": thread_memory,
-            "directory": directory,
-        });
-        if let Some(at_most) = at_most {
-            report["at_most"] = json!(at_most);
+        let mut text = format!(
+            "{}: {} done, {} kept for later, {} failed, {} to run",
+            shown(&self.path),
+            overview.jobs_done - overview.jobs_kept,
+            overview.jobs_spilled,
+            overview.jobs_failed,
+            overview.jobs_missing
+        );
+        if overview.jobs_kept > 0 {
+            let kept = overview.jobs_kept;
+            text = format!("{text}; {kept} more done that the sweep no longer has");
         }
-        output::json(FORMAT, &report)?;
-    } else {
-        let axes: Vec<String> = sweep
-            .axes()
-            .map(|(keys, points)| format!("{keys} ({points})"))
-            .collect();
-        let directory = directory.map_or("none yet: all jobs are to run".to_owned(), |directory| {
-            directory.in_words()
-        });
-        let (choice, which) = match at_most {
-            Some(_) => (
-                ", from which the rounds choose",
-                "in the first round, to which the numbers below refer",
-            ),
-            None if sweep.recording().control => {
-                ("", "after conditions and duplicates, and their controls")
-            }
-            None => ("", "after conditions and duplicates"),
-        };
-        let mut pairs = vec![
-            ("sweep", sweep.name().to_owned()),
-            (
-                "axes",
-                if axes.is_empty() {
-                    "none: a single point".to_owned()
-                } else {
-                    axes.join(" x ")
-                },
-            ),
-            ("grid points", format!("{}{choice}", sweep.point_count())),
-            ("jobs", format!("{} {which}", totals.jobs)),
-            ("parts", totals.parts.to_string()),
-            ("slips to record", slips.to_string()),
-            (
-                "predicted CPU time",
-                format!(
-                    "{}, {:.1} core-hours",
-                    output::duration(totals.cost),
-                    totals.cost / 3600.0
-                ),
-            ),
-            (
-                "predicted wall time",
-                format!(
-                    "{} on {}",
-                    output::duration(wall_time),
-                    output::count(threads as u64, "thread")
-                ),
-            ),
-            (
-                "worker memory",
-                format!(
-                    "{} and {} for each thread",
-                    shown_bytes(MEMORY),
-                    shown_bytes(thread_memory)
-                ),
-            ),
-        ];
-        if let Some(Bounds {
-            sets,
-            jobs,
-            predicted_cost,
-        }) = at_most
-        {
-            let cost = output::duration(predicted_cost);
-            pairs.push((
-                "all rounds",
-                format!("at most {sets} sets, {jobs} jobs; estimated CPU time {cost}"),
-            ));
+        if let Some(rounds) = &self.rounds {
+            text = format!("{text}; round {}", output::rounds(rounds));
         }
-        pairs.push(("directory", directory));
-        output::pairs(&pairs)?;
+        text
     }
-    Ok(Exit::Done)
 }

@@ -1,8 +1,7 @@
 //! `stickslip plot`: reduced data to figures, the standing ones or one's own.
 
 use super::exit::{Exit, UsageError};
-use super::output;
-use super::signals;
+use super::output::{self, TextTable};
 use crate::figure::{Format, Look, OwnFigure, Size, Style, draw_all, draw_own, write_own};
 use crate::reduce::{renew, set_columns};
 use crate::results::Results;
@@ -14,7 +13,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Draw the figures of a results directory, or one of your own; reduces first where the reduced data are not of its tables
+/// Draw the figures of a results directory, or a custom figure; first makes reduced data again that are out of date
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
@@ -35,7 +34,7 @@ pub struct Arguments {
     style: Style,
     #[command(flatten)]
     own: OwnFigure,
-    /// File of your own figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
+    /// File of a custom figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
     #[arg(
         short,
         long,
@@ -77,14 +76,15 @@ impl Arguments {
 
 pub fn plot(arguments: &Arguments) -> Result<Exit> {
     if arguments.list {
-        list()?;
+        output::print(&list())?;
     }
     let Some(directory) = &arguments.directory else {
         return Ok(Exit::Done);
     };
     let out = arguments.out.as_deref().map(picture_file).transpose()?;
     let results = renew(&Results::read(&Layout::new(&Disk, directory))?)?;
-    let (layout, look) = (results.layout(), arguments.look(&results));
+    let layout = results.layout();
+    let look = arguments.look(&results);
     let files = if arguments.own.x.is_none() {
         draw_all(layout, &look, arguments.formats())?
     } else {
@@ -95,8 +95,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         match &out {
             None => write_own(layout, picture, &look, arguments.formats())?,
             Some((out, format)) => {
-                let bytes = picture.encoded(*format)?;
-                out.write(signals::catch, |mut file| Ok(file.write(&bytes)?))?;
+                output::write(out, &picture.encoded(*format)?)?;
                 arguments.out.iter().cloned().collect()
             }
         }
@@ -104,9 +103,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     if files.is_empty() {
         output::report("there is nothing to draw: no set has a result");
     }
-    for path in files {
-        output::print(&format!("{}\n", shown(&path)))?;
-    }
+    output::lines(files.iter().map(|path| shown(path).to_string()))?;
     Ok(Exit::Done)
 }
 
@@ -122,23 +119,12 @@ pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
     }
 }
 
-/// Prints the columns of the table of sets.
-fn list() -> Result<()> {
-    let columns = set_columns();
-    let name = columns
-        .iter()
-        .map(|column| column.name.len())
-        .max()
-        .unwrap_or(0);
-    let unit = columns
-        .iter()
-        .map(|column| column.unit.len())
-        .max()
-        .unwrap_or(0);
-    columns.iter().try_for_each(|column| {
-        output::print(&format!(
-            "{:name$}  {:unit$}  {}\n",
-            column.name, column.unit, column.meaning
-        ))
-    })
+/// The columns of the table of sets.
+fn list() -> String {
+    let described = set_columns();
+    let mut columns = TextTable::default();
+    columns.words("", &described, |column| column.name.to_string());
+    columns.words("", &described, |column| column.unit.to_owned());
+    columns.words("", &described, |column| column.meaning.to_owned());
+    columns.to_string()
 }

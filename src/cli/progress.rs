@@ -55,67 +55,25 @@ impl Progress {
 
     pub fn show(&mut self, event: &RunEvent) {
         self.tally.note(event);
-        self.has_results |= matches!(
-            event,
-            RunEvent::PartCommitted { .. }
-                | RunEvent::Started {
-                    jobs_there: 1..,
-                    ..
-                }
-        );
         match event {
-            &RunEvent::Started {
-                jobs,
-                predicted_cost,
-                jobs_there,
-                threads,
-                others,
-                ..
-            } => {
-                self.begin = Instant::now();
-                let variable = self
-                    .threads
-                    .variable
-                    .map_or_else(String::new, |variable| format!(" ({variable})"));
-                let workers =
-                    || format!(", shared with {}", output::count(others as u64, "worker"));
-                let beside = (others > 0).then(workers).unwrap_or_default();
-                self.say(&format!(
-                    "running {}{}, {jobs_there} there already; predicted: {} on {}{variable}{beside}",
-                    output::count(jobs, "job"),
-                    self.of_round,
-                    output::duration(predicted_cost / threads as f64),
-                    output::count(threads as u64, "thread"),
-                ));
-                if self.is_terminal {
-                    self.bar = ProgressBar::with_draw_target(
-                        Some(u64::from(RESOLUTION)),
-                        ProgressDrawTarget::stderr(),
-                    );
-                }
-                if let Ok(style) =
-                    ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}")
-                {
-                    self.bar.set_style(style.progress_chars("=> "));
-                }
-            }
+            RunEvent::Started { .. } => self.begin(event),
+            RunEvent::PartCommitted { .. } => self.has_results = true,
             RunEvent::RoundBegun { jobs, rounds, .. } => {
-                self.say(&format!(
-                    "{} more; round {}",
-                    output::count(*jobs, "job"),
-                    output::rounds(rounds)
-                ));
+                let jobs = output::count(*jobs, "job");
+                self.say(&format!("{jobs} more; round {}", output::rounds(rounds)));
             }
             RunEvent::JobDone { .. } | RunEvent::Tick => self.draw(),
             RunEvent::JobTakesLong {
                 command,
                 predicted_cost,
                 wall,
-            } => self.say(&format!(
-                "1 job has run {}, {:.0} times its prediction: {command}",
-                output::duration(*wall),
-                wall / predicted_cost
-            )),
+            } => {
+                let time = output::duration(*wall);
+                let ratio = wall / predicted_cost;
+                self.say(&format!(
+                    "1 job has run {time}, {ratio:.0} times its prediction: {command}"
+                ));
+            }
             RunEvent::JobFailed {
                 job_id,
                 reason,
@@ -130,11 +88,13 @@ impl Progress {
                 }
                 self.draw();
             }
-            RunEvent::ShortOfMemory { allowed, needed } => self.say(&format!(
-                "memory limits the jobs at once: {} free, the next is predicted to take {}",
-                shown_bytes(*allowed),
-                shown_bytes(*needed)
-            )),
+            RunEvent::ShortOfMemory { allowed, needed } => {
+                let allowed = shown_bytes(*allowed);
+                let needed = shown_bytes(*needed);
+                self.say(&format!(
+                    "memory limits the jobs at once: {allowed} free, the next is predicted to take {needed}"
+                ));
+            }
             RunEvent::Stopping => self.say("stopping: jobs in flight end, finished jobs are kept"),
             RunEvent::OutOfTime => self.say("not enough time left to start another part"),
             RunEvent::Finished(_) => {
@@ -147,6 +107,45 @@ impl Progress {
         }
     }
 
+    /// Says what is to be done, and begins the bar.
+    fn begin(&mut self, event: &RunEvent) {
+        let &RunEvent::Started {
+            jobs,
+            predicted_cost,
+            jobs_there,
+            threads,
+            others,
+            ..
+        } = event
+        else {
+            return;
+        };
+        self.begin = Instant::now();
+        self.has_results |= jobs_there > 0;
+        let jobs = output::count(jobs, "job") + self.of_round;
+        let time = output::duration(predicted_cost / threads as f64);
+        let mut place = output::count(threads as u64, "thread");
+        if let Some(variable) = self.threads.variable {
+            place = format!("{place} ({variable})");
+        }
+        if others > 0 {
+            place = format!(
+                "{place}, shared with {}",
+                output::count(others as u64, "worker")
+            );
+        }
+        self.say(&format!(
+            "running {jobs}, {jobs_there} there already; predicted: {time} on {place}"
+        ));
+        if self.is_terminal {
+            let target = ProgressDrawTarget::stderr();
+            self.bar = ProgressBar::with_draw_target(Some(u64::from(RESOLUTION)), target);
+        }
+        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
+            self.bar.set_style(style.progress_chars("=> "));
+        }
+    }
+
     fn say(&self, line: &str) {
         if self.is_terminal {
             self.bar.suspend(|| output::report(line));
@@ -155,17 +154,17 @@ impl Progress {
         }
     }
 
-    /// Draws the bar, which counts the jobs of all workers since this one began, or says a line if the last is long ago.
+    /// Draws the bar, which counts the jobs of all workers since this one began, or prints a line if the last is long ago.
     fn draw(&mut self) {
         let share = self.tally.share();
         let elapsed = self.begin.elapsed().as_secs_f64();
-        let guess = if share < GUESS {
-            ", a guess so far"
-        } else {
-            ""
-        };
         let left = if share > 0.0 {
             let left = output::duration(elapsed * (1.0 - share) / share);
+            let guess = if share < GUESS {
+                ", a guess so far"
+            } else {
+                ""
+            };
             format!("{left} left{}{guess}", self.of_round)
         } else {
             "time left unknown".to_owned()
@@ -174,20 +173,16 @@ impl Progress {
             0 => String::new(),
             jobs => format!(" ({jobs} by others)"),
         };
-        let Tally {
-            jobs, jobs_done, ..
-        } = self.tally;
+        let jobs = self.tally.jobs;
+        let jobs_done = self.tally.jobs_done;
         let text = format!("{jobs_done} of {jobs} jobs{others}, {left}");
         let position = floored(f64::from(RESOLUTION) * share) as u64;
         self.bar.set_position(position);
         self.bar.set_message(text.clone());
         if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();
-            output::report(&format!(
-                "{}, {:.0} %: {text}",
-                output::duration(elapsed),
-                100.0 * share
-            ));
+            let elapsed = output::duration(elapsed);
+            output::report(&format!("{elapsed}, {:.0} %: {text}", 100.0 * share));
         }
     }
 }

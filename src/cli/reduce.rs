@@ -9,7 +9,7 @@ use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Reduce the tables of a results directory to Fig. 3-style data
 #[derive(Debug, Args)]
@@ -23,14 +23,13 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`ReductionSummary`] as JSON.
-const FORMAT: u32 = 2;
+const JSON_FORMAT: u32 = 2;
 
 pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let summary = crate::reduce::reduce(&results)?;
     if arguments.json {
-        output::json(FORMAT, &summary)?;
+        output::json(JSON_FORMAT, &summary)?;
     } else {
         output::pairs(&summary_lines(&summary, results.layout()))?;
     }
@@ -42,7 +41,7 @@ pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     })
 }
 
-/// Says which jobs were not there to be reduced.
+/// Reports how many jobs are missing, and how to continue.
 pub fn report_missing(results: &Results<'_>) -> Result<()> {
     if let Some(unfinished) = output::unfinished(results)? {
         output::report(&format!("reduced what is there: {unfinished}"));
@@ -54,17 +53,13 @@ pub fn summary_lines(
     summary: &ReductionSummary,
     layout: &Layout<'_>,
 ) -> Vec<(&'static str, String)> {
-    let text = |path: &Path| shown(path).to_string();
+    let jobs = format!("{}, {} failed", summary.jobs, summary.failed_jobs);
+    let phased = summary.phased_sets;
+    let sets = format!("{}, {phased} of them with a preferred phase", summary.sets);
     vec![
-        (
-            "jobs reduced",
-            format!("{}, {} failed", summary.jobs, summary.failed_jobs),
-        ),
-        (
-            "parameter sets",
-            format!("{}, {} with a phase", summary.sets, summary.phased_sets),
-        ),
+        ("jobs reduced", jobs),
+        ("parameter sets", sets),
         ("slips", summary.slips.to_string()),
-        ("reduced data", text(&layout.reduced())),
+        ("reduced data", shown(&layout.reduced()).to_string()),
     ]
 }

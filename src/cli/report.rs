@@ -1,7 +1,7 @@
 //! `stickslip report`, and `--report` of `run`: a results directory as one HTML page.
 
 use super::exit::Exit;
-use super::{message, output, signals};
+use super::{message, output};
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
@@ -24,7 +24,7 @@ Examples:
 
 The page needs no network and no other file. It shows the swept parameters, regimes, failed jobs with
 their commands, charts, the table of parameter sets, predicted and measured cost, and versions. Reduced data that are
-not of the tables as they are get updated first.")]
+out of date are made again first.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
@@ -41,7 +41,7 @@ pub fn report(arguments: &Arguments) -> Result<Exit> {
         Some(path) => {
             let destination = Destination::new(path, Kind::REPORT)?;
             let page = crate::report::page(&results, None)?;
-            destination.write(signals::catch, |mut file| Ok(file.write(page.as_bytes())?))?;
+            output::write(&destination, page.as_bytes())?;
             path.clone()
         }
     };
@@ -54,12 +54,12 @@ pub fn report(arguments: &Arguments) -> Result<Exit> {
 
 /// Least time between two reports of a run.
 const MIN_SPACING: Duration = Duration::from_secs(5);
-/// The time between two is so many times as long as one takes, which keeps them below one percent of the run.
+/// The time between two reports over the time that one takes: they take less than one percent of the run.
 const SPACING: u32 = 100;
-/// How soon a browser is to look again for what other workers write.
+/// When a browser loads the page again while other workers still run.
 const OTHERS_SPACING: Duration = Duration::from_secs(30);
 
-/// Writes the report of a run while it goes on.
+/// Writes the report of a run during the run.
 pub struct Reporter<'a> {
     layout: &'a Layout<'a>,
     /// Whether something was committed since the last one.
@@ -80,8 +80,7 @@ impl<'a> Reporter<'a> {
         }
     }
 
-    /// Writes a report if there is something new and the last is long enough ago. One that cannot be written does not
-    /// end the run.
+    /// Writes a report if there is something new and the last is long enough ago. A failure does not end the run.
     pub fn follow(&mut self, event: &RunEvent) {
         self.is_due |= matches!(
             event,

@@ -10,7 +10,7 @@ use crate::observe::measure;
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::results::rounds::RoundsSoFar;
+use crate::results::next_round::RoundsSoFar;
 use crate::run::threads::{self, Threads};
 use crate::run::{Joined, Options, RunReport, Shard};
 use crate::sweep::{Job, Sweep};
@@ -82,8 +82,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`RunReport`] as JSON.
-const FORMAT: u32 = 2;
+const JSON_FORMAT: u32 = 2;
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
@@ -98,10 +97,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         shard: arguments.shard.unwrap_or_default(),
         walltime: arguments.walltime,
     };
-    let (layout, mut progress) = (
-        Layout::new(&Disk, &root),
-        Progress::new(threads, sweep.rounds().is_some()),
-    );
+    let layout = Layout::new(&Disk, &root);
+    let mut progress = Progress::new(threads, sweep.rounds().is_some());
     let report = crate::run::join(&layout, &sweep, options, |joined| {
         work(joined, &sweep, &layout, arguments, &mut progress)
     });
@@ -117,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 impl Arguments {
     fn sweep_and_root(&self) -> Result<(Sweep, PathBuf)> {
         let changes = sweep::changes(&self.variation)?;
-        let sweep = sweep::read(self.sweep.as_deref(), self.preset.preset, &changes)?;
+        let sweep = sweep::read(self.sweep.as_deref(), self.preset, &changes)?;
         let own = self.sweep.as_deref().filter(|path| path.is_dir());
         let root = own.map_or_else(|| Layout::default_root(&sweep), Path::to_owned);
         if let Some(out) = &self.out {
@@ -128,9 +125,10 @@ impl Arguments {
             && Disk.exists(&root)?
             && !Results::read(&Layout::new(&Disk, &root)).is_ok_and(is_own)
         {
-            let (there, root) = (shown(&root), output::quoted_path(&root));
+            let there = shown(&root);
+            let out = output::quoted_path(&root);
             let problem = format!(
-                "--set, --axis: {there} holds another sweep; give a new directory with -o DIR, or -o {root} to extend that one"
+                "--set, --axis: {there} holds another sweep; give a new directory with -o DIR, or -o {out} to extend that one"
             );
             return Err(UsageError(problem).into());
         }
@@ -138,7 +136,7 @@ impl Arguments {
     }
 }
 
-/// Runs what is left, reduces, draws and reports.
+/// Runs missing jobs, reduces, draws and reports.
 fn work(
     joined: &Joined<'_>,
     sweep: &Sweep,
@@ -147,7 +145,8 @@ fn work(
     progress: &mut Progress,
 ) -> Result<RunReport> {
     let mut reporter = arguments.report.then(|| Reporter::new(layout));
-    let (recording, solver) = (*sweep.recording(), sweep.solver());
+    let recording = *sweep.recording();
+    let solver = sweep.solver();
     let kernel =
         |job: &Job, interrupt: &AtomicBool| measure(&job.parameters, &recording, solver, interrupt);
     let mut report = joined.run(&kernel, &mut |event| {
@@ -158,49 +157,52 @@ fn work(
     })?;
     report.stopped |= signals::is_cancelled();
     let is_complete = report.jobs_left == 0 && !report.stopped;
-    let reduced = if !is_complete || arguments.no_reduce {
+    let reduced = if is_complete && !arguments.no_reduce {
+        reduce_once(joined, layout, arguments)
+    } else {
         Ok(None)
-    } else if arguments.shard.is_some() {
-        reduce_and_draw(layout)
-    } else {
-        let reduced = joined.reduce(|| reduce_and_draw(layout));
-        if matches!(reduced, Ok(None)) {
-            output::report("all jobs are done; another worker reduces them");
-        }
-        reduced.map(Option::flatten)
     };
-    // What was run is told even if it could not be reduced.
+    // What was run is reported even if it could not be reduced.
     if arguments.json {
-        output::json(FORMAT, &report)?;
+        output::json(JSON_FORMAT, &report)?;
     } else {
-        let lines = reduced
-            .as_ref()
-            .ok()
-            .and_then(Option::as_ref)
-            .map(|reduced| reduced.lines.clone());
-        output::pairs(&[summary_lines(&report), lines.unwrap_or_default()].concat())?;
+        let mut lines = summary_lines(&report);
+        if let Ok(Some(reduced)) = &reduced {
+            lines.extend(reduced.lines.iter().cloned());
+        }
+        output::pairs(&lines)?;
     }
-    if let Some(Reduced {
-        result, figures, ..
-    }) = reduced?.filter(|_| !arguments.json)
-    {
-        output::print(&format!("\n{result}\n"))?;
-        figures
-            .iter()
-            .try_for_each(|path| output::print(&format!("figure  {}\n", shown(path))))?;
+    if let Some(reduced) = reduced?.filter(|_| !arguments.json) {
+        output::print(&format!("\n{}\n", reduced.result))?;
+        let figures = reduced.figures.iter();
+        output::lines(figures.map(|path| format!("figure  {}", shown(path))))?;
     }
     if is_complete && arguments.shard.is_some() {
         reduce::report_missing(&Results::read(layout)?)?;
     }
-    let written = reporter
-        .as_ref()
-        .map(|reporter| reporter.finish(&report))
-        .transpose()?
-        .flatten();
-    if let Some(path) = written.filter(|_| !arguments.json) {
+    if let Some(reporter) = &reporter
+        && let Some(path) = reporter.finish(&report)?
+        && !arguments.json
+    {
         output::print(&format!("report  {}\n", shown(&path)))?;
     }
     Ok(report)
+}
+
+/// Reduces and draws, unless another worker does.
+fn reduce_once(
+    joined: &Joined<'_>,
+    layout: &Layout<'_>,
+    arguments: &Arguments,
+) -> Result<Option<Reduced>> {
+    if arguments.shard.is_some() {
+        return reduce_and_draw(layout);
+    }
+    let reduced = joined.reduce(|| reduce_and_draw(layout))?;
+    if reduced.is_none() {
+        output::report("all jobs are done; another worker reduces them");
+    }
+    Ok(reduced.flatten())
 }
 
 /// Says what is left and what to do, and how the command ends.
@@ -209,21 +211,8 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
         output::report(&marked.to_string());
     }
     if report.stopped {
-        let hint = match arguments.walltime {
-            Some(_) if report.jobs_run == 0 => {
-                "No part ended in this time: give a longer --walltime."
-            }
-            _ => "The same command resumes.",
-        };
-        let left = output::count(report.jobs_left, "job");
-        let place = match (report.jobs_left, report.rounds) {
-            (0, Some(RoundsSoFar { is_over: false, .. })) => "between two rounds".to_owned(),
-            (0, _) => "before the reduction".to_owned(),
-            (_, Some(_)) => format!("with {left} left of this round"),
-            (_, None) => format!("with {left} left"),
-        };
-        output::report(&format!("stopped {place}; finished jobs are kept. {hint}"));
-        // One that could start nothing would start nothing the next time, either.
+        output::report(&stop_in_words(report, arguments));
+        // A run that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
         return if arguments.worker && has_worked && !signals::is_cancelled() {
             Exit::Done
@@ -232,13 +221,11 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
         };
     }
     if report.jobs_left > 0 {
-        let (left, hosts) = (
-            output::count(report.jobs_left, "job"),
-            report.hosts.join(", "),
-        );
+        let left = output::count(report.jobs_left, "job");
+        let hosts = report.hosts.join(", ");
         let out = output::quoted_path(root);
         output::report(&format!(
-            "nothing is left to take: others run the last {left} ({hosts}); see stickslip status {out}"
+            "no work left here: others run the last {left} ({hosts}); see stickslip status {out}"
         ));
     }
     if report.jobs_failed > 0 {
@@ -256,15 +243,31 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     }
 }
 
-/// What is told of a reduction.
+fn stop_in_words(report: &RunReport, arguments: &Arguments) -> String {
+    let hint = if report.jobs_run == 0 && arguments.walltime.is_some() {
+        "No part ended in this time: give a longer --walltime."
+    } else {
+        "The same command resumes."
+    };
+    let left = output::count(report.jobs_left, "job");
+    let place = match (report.jobs_left, report.rounds) {
+        (0, Some(RoundsSoFar { is_over: false, .. })) => "between two rounds".to_owned(),
+        (0, _) => "before the reduction".to_owned(),
+        (_, Some(_)) => format!("with {left} left of this round"),
+        (_, None) => format!("with {left} left"),
+    };
+    format!("stopped {place}; finished jobs are kept. {hint}")
+}
+
+/// What is printed of a reduction.
 struct Reduced {
     lines: Vec<(&'static str, String)>,
-    /// The sets and what was found of them.
+    /// The sets and their statistics.
     result: String,
     figures: Vec<PathBuf>,
 }
 
-/// Reduces and draws what is there: other shards may be at work still. `None` if nothing is.
+/// Reduces and draws what is there, as other shards may still run. `None` if nothing is there.
 fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
     let results = Results::read(layout)?;
     let summary = match crate::reduce::reduce(&results) {
@@ -274,29 +277,20 @@ fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
         }
         summary => summary?,
     };
-    let figures = draw_all(
-        layout,
-        &Look::of_sweep(results.sweep().name()),
-        &Format::DEFAULT,
-    )?;
-    let lines = reduce::summary_lines(&summary, layout);
+    let look = Look::of_sweep(results.sweep().name());
+    let figures = draw_all(layout, &look, &Format::DEFAULT)?;
     Ok(Some(Reduced {
-        lines,
+        lines: reduce::summary_lines(&summary, layout),
         result: show::summary(&results, summary.sets)?,
         figures,
     }))
 }
 
 fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
+    let jobs = report.jobs_run + report.jobs_spilled;
+    let jobs = format!("{jobs}, {} failed", report.jobs_failed);
     let mut pairs = vec![
-        (
-            "jobs run",
-            format!(
-                "{}, {} failed",
-                report.jobs_run + report.jobs_spilled,
-                report.jobs_failed
-            ),
-        ),
+        ("jobs run", jobs),
         ("parts committed", report.parts_committed.to_string()),
     ];
     if let Some(rounds) = &report.rounds {
@@ -304,13 +298,8 @@ fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
     }
     if report.jobs_run > 0 {
         let measured = output::duration(report.measured_cost);
-        pairs.push((
-            "CPU time",
-            format!(
-                "{measured}, predicted {}",
-                output::duration(report.predicted_cost)
-            ),
-        ));
+        let predicted = output::duration(report.predicted_cost);
+        pairs.push(("CPU time", format!("{measured}, predicted {predicted}")));
         pairs.push(("wall time", output::duration(report.wall)));
     }
     pairs

@@ -1,7 +1,7 @@
 //! `stickslip show`: the result of a sweep, a line for each set. `run` ends with its first lines.
 
 use super::exit::{Exit, UsageError};
-use super::output::{self, Columns};
+use super::output::{self, TextTable};
 use crate::model::Symbol;
 use crate::reduce::{
     EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing, read_reduced,
@@ -10,6 +10,7 @@ use crate::reduce::{
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::sets::{Digits, label};
+use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Table};
 use crate::table::file::Dataset;
@@ -20,7 +21,7 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::{Map, Value as Json};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Show the result of a sweep: a line for each parameter set, with 95 % intervals
 #[derive(Debug, Args)]
@@ -59,8 +60,7 @@ Examples:
 
 Columns are those of stickslip plot --list.";
 
-/// Version of the JSON.
-const FORMAT: u32 = 1;
+const JSON_FORMAT: u32 = 1;
 
 /// Sets that the end of a run shows, and reads for its columns and for what ended otherwise.
 const FIRST: usize = 12;
@@ -84,42 +84,70 @@ const FOUND: [&str; 9] = [
 pub fn show(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &arguments.directory);
     let results = Results::read(&layout)?;
-    let is_text = !arguments.json && !arguments.csv;
-    if let Some(other) = &arguments.other {
-        let others = Results::read(&Layout::new(&Disk, other))?;
-        let columns = compare(&results, &others)?;
-        if columns
-            .first()
-            .is_none_or(|values| values.numbers.is_empty())
-        {
-            let problem =
-                "no set agrees with one of the first in all parameters that either varies";
-            return Err(UsageError(format!("{}: {problem}", shown(other))).into());
-        }
-        if is_text {
-            output::print(&format!(
-                "A is {}, B is {}\n",
-                shown(&arguments.directory),
-                shown(other)
-            ))?;
-            let differences = results.sweep().differences(others.sweep());
-            let mut differences = differences
-                .iter()
-                .filter(|difference| !difference.starts_with("name"));
-            differences.try_for_each(|difference| output::print(&format!("{difference}\n")))?;
-        }
-        let count = columns.first().map_or(0, |values| values.numbers.len());
-        return print(arguments, &columns, count, &[], &[]);
+    match &arguments.other {
+        Some(other) => show_differences(arguments, &results, other)?,
+        None => show_sets(arguments, &*renew(&results)?)?,
     }
-    let results = renew(&results)?;
-    let mut rows = sets(&results, usize::MAX)?;
-    let (usual, count) = (usual_names(&rows), rows.len());
+    Ok(Exit::Done)
+}
+
+impl Arguments {
+    const fn is_text(&self) -> bool {
+        !self.json && !self.csv
+    }
+
+    /// Prints columns of so many sets as is asked, as JSON with the edges; `rows` are the sets, if they are of one directory.
+    fn print(
+        &self,
+        columns: &[Values],
+        count: usize,
+        rows: &[SetRow],
+        edges: &[EdgeRow],
+    ) -> Result<()> {
+        if self.json {
+            let sets = (0..count).map(|set| record(columns, set).into_iter().collect());
+            let sets: Vec<Map<String, Json>> = sets.collect();
+            let edges: Vec<Json> = edges.iter().map(json).collect();
+            output::json(
+                JSON_FORMAT,
+                &serde_json::json!({ "sets": sets, "edges": edges }),
+            )
+        } else if self.csv {
+            print_csv(columns, count)
+        } else {
+            output::print(&aligned(columns, rows, count))
+        }
+    }
+}
+
+/// Shows in what the sets of two directories differ.
+fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) -> Result<()> {
+    let others = Results::read(&Layout::new(&Disk, other))?;
+    let columns = compare(results, &others)?;
+    let count = columns.first().map_or(0, |values| values.numbers.len());
+    if count == 0 {
+        let problem = "no set agrees with one of the first in all parameters that either varies";
+        return Err(UsageError(format!("{}: {problem}", shown(other))).into());
+    }
+    if arguments.is_text() {
+        let first = shown(&arguments.directory);
+        output::print(&format!("A is {first}, B is {}\n", shown(other)))?;
+        let differences = results.sweep().differences(others.sweep()).into_iter();
+        output::lines(differences.filter(|difference| !difference.starts_with("name")))?;
+    }
+    arguments.print(&columns, count, &[], &[])
+}
+
+/// Shows the sets of a directory whose reduced data are up to date.
+fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
+    let mut rows = sets(results, usize::MAX)?;
+    let usual = usual_names(&rows);
     if let Some(condition) = &arguments.condition {
+        let count = rows.len();
         rows = sets_where(rows, condition)
             .map_err(|problem| UsageError(format!("--where {condition}: {problem}")))?;
-        if rows.is_empty() && is_text {
-            output::print(&format!("no set of {count}\n"))?;
-            return Ok(Exit::Done);
+        if rows.is_empty() && arguments.is_text() {
+            return output::print(&format!("none of {count} sets matches\n"));
         }
     }
     if let Some(column) = &arguments.sort {
@@ -128,80 +156,50 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     let matching = rows.len();
     if arguments.csv && rows.is_empty() {
         // The names of the columns are those of all sets.
-        rows = sets(&results, usize::MAX)?;
+        rows = sets(results, usize::MAX)?;
     }
-    let asked = |name: &String| {
-        Values::of(&rows, name)
-            .map_err(|problem| UsageError(format!("--columns {name}: {problem}")))
-    };
-    let asked: Vec<Values> = arguments
-        .columns
-        .iter()
-        .map(asked)
-        .collect::<Result<_, _>>()?;
-    let columns = if asked.is_empty() {
-        usual_columns(usual, &rows)
-    } else {
-        asked
-    };
-    let edges = edges(&results)?;
-    if is_text {
-        if let Some(unfinished) = output::unfinished(&results)? {
+    let mut columns = Vec::new();
+    for name in &arguments.columns {
+        let values = Values::of(&rows, name);
+        columns.push(values.map_err(|problem| UsageError(format!("--columns {name}: {problem}")))?);
+    }
+    if columns.is_empty() {
+        columns = usual_columns(usual, &rows);
+    }
+    let edges = edges(results)?;
+    if arguments.is_text() {
+        if let Some(unfinished) = output::unfinished(results)? {
             output::print(&format!("so far: {unfinished}\n\n"))?;
         }
         output::print(&table_of_edges(&edges))?;
     }
-    print(arguments, &columns, matching, &rows, &edges)?;
-    if is_text {
-        for note in notes(&results, &rows) {
-            output::print(&format!("{note}\n"))?;
-        }
+    arguments.print(&columns, matching, &rows, &edges)?;
+    if arguments.is_text() {
+        output::lines(notes(results, &rows))?;
     }
-    Ok(Exit::Done)
+    Ok(())
 }
 
-/// Prints columns of so many sets as is asked, as JSON with the edges; `rows` are the sets, if they are of one directory.
-fn print(
-    arguments: &Arguments,
-    columns: &[Values],
-    count: usize,
-    rows: &[SetRow],
-    edges: &[EdgeRow],
-) -> Result<Exit> {
-    if arguments.json {
-        let sets: Vec<Map<String, Json>> = (0..count)
-            .map(|set| record(columns, set).into_iter().collect())
-            .collect();
-        let edges: Vec<Json> = edges.iter().map(json).collect();
-        output::json(FORMAT, &serde_json::json!({ "sets": sets, "edges": edges }))?;
-    } else if arguments.csv {
-        print_csv(columns, count)?;
-    } else {
-        output::print(&aligned(columns, rows, count))?;
-    }
-    Ok(Exit::Done)
-}
-
-/// The first of the `count` sets of a directory, and what ended otherwise. Memory: [`MAX_READ`] sets.
+/// The first of the `count` sets of a directory, and notes on its jobs. Memory: [`MAX_READ`] sets.
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let results = &*renew(results)?;
     let rows = sets(results, MAX_READ)?;
     let columns = usual_columns(usual_names(&rows), &rows);
-    let mut notes = notes(results, &rows);
     // A line that says how many more there are is as long as one of these.
     let first = if count <= FIRST as u64 + 1 {
         FIRST + 1
     } else {
         FIRST
     };
-    if let Some(more) = count.checked_sub(first as u64).filter(|more| *more > 0) {
+    let mut text = table_of_edges(&edges(results)?) + &aligned(&columns, &rows, first);
+    if let Some(more @ 1..) = count.checked_sub(first as u64) {
         let root = output::quoted_path(results.layout().root());
-        notes.insert(0, format!("… {more} more: stickslip show {root}"));
+        text = format!("{text}… {more} more: stickslip show {root}\n");
     }
-    let text = table_of_edges(&edges(results)?) + &aligned(&columns, &rows, first);
-    Ok(notes
-        .into_iter()
-        .fold(text, |text, note| text + &note + "\n"))
+    for note in notes(results, &rows) {
+        text += &(note + "\n");
+    }
+    Ok(text)
 }
 
 /// The first of the reduced sets, controls left out.
@@ -250,36 +248,31 @@ fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
 }
 
 fn sort(rows: &mut Vec<SetRow>, column: &str) -> Result<()> {
-    let (name, is_falling) = column
-        .strip_prefix('-')
-        .map_or((column, false), |name| (name, true));
+    let (name, sign) = match column.strip_prefix('-') {
+        Some(name) => (name, -1.0),
+        None => (column, 1.0),
+    };
     let values = Values::of(rows, name)
         .map_err(|problem| UsageError(format!("--sort {column}: {problem}")))?;
+    // Sets without a value come last.
+    let key = |set: &usize| values.numbers[*set].map_or(f64::INFINITY, |number| sign * number);
     let mut order: Vec<usize> = (0..rows.len()).collect();
-    order.sort_by(|&left, &right| {
-        let sign = if is_falling { -1.0 } else { 1.0 };
-        // Sets without a value come last.
-        let key = |set: usize| values.numbers[set].map_or(f64::INFINITY, |number| sign * number);
-        key(left).total_cmp(&key(right))
-    });
+    order.sort_by(|left, right| key(left).total_cmp(&key(right)));
     *rows = order.into_iter().map(|set| rows[set].clone()).collect();
     Ok(())
 }
 
-/// A value of a set with its interval, in SI, by the names of the table of sets, each name once.
+/// The values of a set with their intervals, in SI, by the names of the table of sets, each name once.
 fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
     let mut record = Vec::new();
     for values in columns {
         let name = &values.column.name;
-        let word = values.numbers[set]
-            .filter(|_| values.is_worded())
-            .and_then(|value| values.word(value));
-        let number = || match values.numbers[set] {
+        let value = match values.numbers[set] {
+            Some(number) if values.is_worded() => values.word(number).into(),
             #[expect(clippy::cast_possible_truncation, reason = "a count")]
             Some(number) if values.column.kind == Kind::Count => Json::from(number as i64),
             number => Json::from(number),
         };
-        let value = word.map_or_else(number, Json::from);
         record.push((name.to_string(), value));
         if values.intervals.iter().any(Option::is_some) {
             let (low, high) = values.intervals[set].unzip();
@@ -310,24 +303,45 @@ fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
 
 /// A table for people: symbols and units at its head, values with half of their 95 % intervals.
 fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
-    let mut text = Columns::default();
+    let mut text = TextTable::default();
     for values in columns {
-        text.add(values.is_worded(), column(values, rows, most));
+        add_column(&mut text, values, rows, most);
     }
     text.to_string()
 }
 
-/// The edges that a sweep has found; none for one that looks for none.
+/// Adds a column of the first sets.
+fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: usize) {
+    let label = values.label();
+    let is_interval = values.column.name == "tau_mean";
+    let bound = |set: usize| rows.get(set).filter(|_| is_interval)?.tau_bound;
+    let size = |set: usize| values.numbers[set].or_else(|| bound(set)).map(f64::abs);
+    let largest = (0..values.numbers.len())
+        .filter_map(size)
+        .fold(0.0, f64::max);
+    let (factor, unit) = label.scale(largest);
+    let digits = values.digits();
+    let cell = |set: usize| match (values.numbers[set], values.intervals[set]) {
+        (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
+        (Some(value), Some((low, high))) => {
+            with_interval(factor * value, factor * low, factor * high)
+        }
+        (Some(value), None) => digits.number(factor * value),
+        (None, _) => match bound(set) {
+            Some(tau) => format!("> {}", digits.number(factor * tau)),
+            None => "–".to_owned(),
+        },
+    };
+    let cells = (0..values.numbers.len().min(most)).map(cell);
+    columns.add(values.is_worded(), label.short(unit), cells);
+}
+
+/// The edges that a sweep has found; none for a sweep that looks for none.
 fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
-    let refines = results
-        .sweep()
-        .rounds()
-        .is_some_and(|rounds| rounds.refinement.is_some());
-    Ok(if refines {
-        read_reduced(results.layout())?
-    } else {
-        Vec::new()
-    })
+    if results.sweep().refinement().is_none() {
+        return Ok(Vec::new());
+    }
+    Ok(read_reduced(results.layout())?)
 }
 
 /// Edges for people, and a blank line; empty if there are none.
@@ -335,97 +349,54 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
     let Some(first) = edges.first() else {
         return String::new();
     };
-    let row = |EdgeRow { parameters, .. }: &EdgeRow| SetRow {
-        frequency: parameters.frequency(),
-        parameters: parameters.clone(),
+    let mut columns = TextTable::default();
+    let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
+    let as_set = |edge: &EdgeRow| SetRow {
+        frequency: edge.parameters.frequency(),
+        parameters: edge.parameters.clone(),
         ..SetRow::default()
     };
-    let rows: Vec<SetRow> = edges.iter().map(row).collect();
-    let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
-    let others = differing(&rows.iter())
-        .into_iter()
-        .filter(|symbol| *symbol != axis);
-    let others = others.filter_map(|symbol| Values::of(&rows, key_of(symbol)).ok());
-    let mut columns = Columns::default();
-    others.for_each(|values| columns.add(false, column(&values, &rows, rows.len())));
-    let of_axis = label(&first.axis);
-    let (factor, unit) = of_axis.scale(
-        edges
-            .iter()
-            .map(|edge| edge.bracket_high)
-            .fold(0.0, f64::max),
-    );
-    let ends = edges.iter().flat_map(|edge| {
-        let interval = edge.edge_interval.map(|Interval { low, high }| [low, high]);
-        [Some([edge.bracket_low, edge.bracket_high]), interval]
-    });
-    let digits = ends.flatten().fold(Digits::FOUR, |digits, ends| {
-        digits.distinguishing(&ascending(ends.into_iter()))
-    });
+    let rows: Vec<SetRow> = edges.iter().map(as_set).collect();
+    for symbol in differing(&rows.iter()) {
+        if symbol != axis
+            && let Ok(values) = Values::of(&rows, key_of(symbol))
+        {
+            add_column(&mut columns, &values, &rows, rows.len());
+        }
+    }
+    let label = label(&first.axis);
+    let brackets = edges.iter().map(|edge| edge.bracket_high);
+    let (factor, unit) = label.scale(brackets.fold(0.0, f64::max));
+    let mut digits = Digits::FOUR;
+    for edge in edges {
+        let interval = edge
+            .edge_interval
+            .map(|interval| [interval.low, interval.high]);
+        for ends in [Some([edge.bracket_low, edge.bracket_high]), interval] {
+            digits = digits.distinguishing(&ascending(ends.into_iter().flatten()));
+        }
+    }
     let number = |value: f64| digits.number(factor * value);
-    let mut add = |head: String, cell: &dyn Fn(&EdgeRow) -> String| {
-        columns.add(
-            true,
-            std::iter::once(head)
-                .chain(edges.iter().map(cell))
-                .collect(),
-        );
-    };
-    add("edge of".to_owned(), &EdgeRow::crossed);
-    add(of_axis.short(unit), &|edge| {
+    columns.words("edge of", edges, EdgeRow::crossed);
+    columns.words(label.short(unit), edges, |edge| {
         edge.edge.map_or_else(|| "none".to_owned(), number)
     });
-    add("95 %".to_owned(), &|edge| match edge.edge_interval {
-        Some(Interval { low, high }) => format!("{} to {}", number(low), number(high)),
-        None => format!(
-            "from {} to {}",
-            number(edge.bracket_low),
-            number(edge.bracket_high)
-        ),
+    columns.words("95 %", edges, |edge| {
+        let (from, low, high) = match edge.edge_interval {
+            Some(Interval { low, high }) => ("", low, high),
+            None => ("from ", edge.bracket_low, edge.bracket_high),
+        };
+        format!("{from}{} to {}", number(low), number(high))
     });
-    add(String::new(), &|edge| {
-        edge.rises
-            .map_or("", |rises| if rises { "rises" } else { "falls" })
-            .to_owned()
+    columns.words("", edges, |edge| {
+        let change = edge
+            .rises
+            .map(|rises| if rises { "rises" } else { "falls" });
+        change.unwrap_or_default().to_owned()
     });
-    add("jobs".to_owned(), &|edge| edge.jobs.to_string());
-    add("ended by".to_owned(), &|edge| edge.ended.word().to_owned());
+    columns.words("jobs", edges, |edge| edge.jobs.to_string());
+    columns.words("ended by", edges, |edge| edge.ended.word().to_owned());
     format!("{columns}\n")
-}
-
-/// The head of a column and its first cells.
-fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
-    let label = values.label();
-    let bound = |set: usize| {
-        rows.get(set)
-            .filter(|_| values.column.name == "tau_mean")?
-            .tau_bound
-    };
-    let shown = |set: usize| {
-        values.numbers[set]
-            .or_else(|| bound(set))
-            .unwrap_or_default()
-            .abs()
-    };
-    let (factor, unit) = label.scale((0..values.numbers.len()).map(shown).fold(0.0, f64::max));
-    let digits = values.digits();
-    let mut cells = vec![label.short(unit)];
-    for (set, &number) in values.numbers.iter().enumerate().take(most) {
-        cells.push(match (number, values.intervals[set]) {
-            (Some(value), _) if values.is_worded() => {
-                values.word(value).unwrap_or_default().to_owned()
-            }
-            (Some(value), Some((low, high))) => {
-                with_interval(factor * value, factor * low, factor * high)
-            }
-            (Some(value), None) => digits.number(factor * value),
-            (None, _) => bound(set).map_or_else(
-                || "–".to_owned(),
-                |tau| format!("> {}", digits.number(factor * tau)),
-            ),
-        });
-    }
-    cells
 }
 
 /// How far the middle of an interval may lie from its value, as a share of the half-width, to be shown as ±.
@@ -459,93 +430,104 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
     }
 }
 
-/// What the lines do not say: jobs that ended otherwise, each kind with a command that shows one, and sets that the sweep
-/// no longer has.
+/// Notes on jobs that ended otherwise, each kind with a command that shows one, and on sets that the sweep no longer has.
 fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
-    let (sweep, mut notes) = (results.sweep(), Vec::new());
-    let without: Vec<&SetRow> = rows
-        .iter()
-        .filter(|row| row.jobs_without_slips > 0)
-        .collect();
-    if !without.is_empty() {
-        let jobs = output::count(
-            without.iter().map(|row| row.jobs_without_slips).sum(),
-            "job",
-        );
-        let sets = output::count(without.len() as u64, "set");
-        let set = without
-            .iter()
-            .find_map(|row| sweep.set_with(&row.parameters.parameters));
-        let job = set.and_then(|set| sweep.jobs_at(set..set + 1).next());
-        let command = job.map_or_else(String::new, |job| {
-            format!("; a job of one such set: {}", sweep.command(&job))
-        });
-        notes.push(format!(
-            "{jobs} of {sets} ended as no further slip came: they slide, or give_up_after is too short{command}"
-        ));
+    let sweep = results.sweep();
+    let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
+    let failed = (failed > 0).then(|| {
+        let jobs = output::count(failed, "job");
+        let root = output::quoted_path(results.layout().root());
+        format!("{jobs} failed: stickslip status {root} says why")
+    });
+    let notes = [
+        note_on_sliding(sweep, rows),
+        note_on_cut_jobs(rows),
+        note_on_few_cycles(rows),
+        failed,
+        note_on_removed_sets(sweep, rows),
+    ];
+    notes.into_iter().flatten().collect()
+}
+
+fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
+    let without = rows.iter().filter(|row| row.jobs_without_slips > 0);
+    let jobs: u64 = without.clone().map(|row| row.jobs_without_slips).sum();
+    if jobs == 0 {
+        return None;
     }
-    let cut: Vec<&SetRow> = rows.iter().filter(|row| row.jobs_cut > Some(0)).collect();
-    if !cut.is_empty() {
-        let off = cut.iter().filter_map(|row| row.tau_off).reduce(f64::min);
-        let off = off.map_or_else(String::new, |off| {
-            format!(", by up to about {:.1} %", -100.0 * off)
-        });
-        notes.push(format!(
-            "{} of {} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` in place \
-             of max_time ends jobs with a slip",
-            output::count(cut.iter().filter_map(|row| row.jobs_cut).sum(), "job"),
-            output::count(cut.len() as u64, "set"),
-        ));
+    let jobs = output::count(jobs, "job");
+    let sets = output::count(without.clone().count() as u64, "set");
+    let mut places = without.filter_map(|row| sweep.set_with(&row.parameters.parameters));
+    let job = places
+        .next()
+        .and_then(|set| sweep.jobs_at(set..set + 1).next());
+    let command = job.map_or_else(String::new, |job| {
+        format!("; a job of one such set: {}", sweep.command(&job))
+    });
+    Some(format!(
+        "{jobs} of {sets} ended because no further slip came: the slider slides, or give_up_after is too short{command}"
+    ))
+}
+
+fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
+    let cut = rows.iter().filter(|row| row.jobs_cut > Some(0));
+    let jobs: u64 = cut.clone().filter_map(|row| row.jobs_cut).sum();
+    if jobs == 0 {
+        return None;
     }
+    let jobs = output::count(jobs, "job");
+    let sets = output::count(cut.clone().count() as u64, "set");
+    let off = cut.filter_map(|row| row.tau_off).reduce(f64::min);
+    let off = off.map_or_else(String::new, |off| {
+        format!(", by up to about {:.1} %", -100.0 * off)
+    });
+    Some(format!(
+        "{jobs} of {sets} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` \
+         in place of max_time ends jobs with a slip"
+    ))
+}
+
+fn note_on_few_cycles(rows: &[SetRow]) -> Option<String> {
     let has_few_cycles = |row: &&SetRow| {
         let period = row.parameters.parameters.modulation_period;
-        row.phase_mean.is_none()
-            && period
-                .zip(row.tau_mean)
-                .is_some_and(|(period, tau)| period >= tau)
+        let times = period.zip(row.tau_mean);
+        row.phase_mean.is_none() && times.is_some_and(|(period, tau)| period >= tau)
     };
     let sets = rows.iter().filter(has_few_cycles).count() as u64;
-    if sets > 0 {
-        notes.push(format!(
-            "{} without a phase: the jobs hold less than two cycles of the modulation; more slips give one",
-            output::count(sets, "set")
-        ));
-    }
-    let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
-    if failed > 0 {
-        let root = output::quoted_path(results.layout().root());
-        notes.push(format!(
-            "{} failed: stickslip status {root} says why",
-            output::count(failed, "job")
-        ));
-    }
+    (sets > 0).then(|| {
+        let sets = output::count(sets, "set");
+        format!(
+            "{sets} without a phase: the jobs hold less than two cycles of the modulation; more slips give one"
+        )
+    })
+}
+
+fn note_on_removed_sets(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let is_gone = |set: &usize| {
         let parameters = &rows[*set].parameters.parameters;
         sweep.set_with(parameters).is_none()
     };
     let gone: Vec<usize> = (0..rows.len()).filter(is_gone).collect();
-    if !gone.is_empty() {
-        let columns: Vec<Values> = differing(&rows.iter())
-            .into_iter()
-            .filter_map(|symbol| Values::of(rows, key_of(symbol)).ok())
-            .collect();
-        let setting = |&set: &usize| {
-            let settings = columns
-                .iter()
-                .filter_map(|values| Some(values.setting(values.numbers[set]?)));
-            settings.collect::<Vec<_>>().join(", ")
-        };
-        let mut named: Vec<String> = gone.iter().take(MAX_NAMED).map(setting).collect();
-        if let Some(more @ 1..) = gone.len().checked_sub(MAX_NAMED) {
-            named.push(format!("{more} more"));
-        }
-        notes.push(format!(
-            "no longer in the sweep: {} of these: {}",
-            output::count(gone.len() as u64, "set"),
-            named.join("; ")
-        ));
+    if gone.is_empty() {
+        return None;
     }
-    notes
+    let columns: Vec<Values> = differing(&rows.iter())
+        .into_iter()
+        .filter_map(|symbol| Values::of(rows, key_of(symbol)).ok())
+        .collect();
+    let setting = |&set: &usize| {
+        let settings = columns
+            .iter()
+            .filter_map(|values| Some(values.setting(values.numbers[set]?)));
+        settings.collect::<Vec<_>>().join(", ")
+    };
+    let mut named: Vec<String> = gone.iter().take(MAX_NAMED).map(setting).collect();
+    if let Some(more @ 1..) = gone.len().checked_sub(MAX_NAMED) {
+        named.push(format!("{more} more"));
+    }
+    let sets = output::count(gone.len() as u64, "set");
+    let named = named.join("; ");
+    Some(format!("no longer in the sweep: {sets} of these: {named}"))
 }
 
 #[cfg(test)]

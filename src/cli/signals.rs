@@ -49,7 +49,7 @@ fn register_all() -> io::Result<()> {
     // Before the flag that it looks at, so that the first SIGINT does not exit.
     register_conditional_shutdown(SIGINT, Exit::Stopped as i32, &INTERRUPTED)?;
     register(SIGINT, &INTERRUPTED)?;
-    // Before the flag that stops, so that whoever stops finds it set.
+    // Before the flag that stops: what stops a run finds it set.
     CANCELLING
         .iter()
         .try_for_each(|&signal| register(signal, &CANCELLED).map(drop))?;

@@ -1,24 +1,30 @@
 //! `stickslip simulate`: one job, everything visible.
 //!
-//! The job is that of a sweep with one point, a file or the text that flags make: values, messages and the id of the job
-//! are the same.
+//! The job is the only one of a sweep: of a file, or of the text that flags make. So values, messages and the id of the job
+//! are those of a sweep.
 
-mod outputs;
-
-use self::outputs::{Tables, check_outputs, write_pictures};
 use super::exit::{Exit, UsageError};
-use super::output::{self, Columns};
+use super::output::{self, TextTable};
+use super::plot::picture_file;
+use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
+use crate::figure::simulation;
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
+use crate::results::destination::{Destination, Kind};
 use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
-use crate::simulate::{self as single, Request};
-use crate::sweep::Change;
-use crate::table::file::Footer;
+use crate::single_job::{self, Records, Request};
+use crate::sweep::{Change, Digits, Sweep};
+use crate::table::columns::Table;
+use crate::table::file::{Footer, TableWriter};
+use crate::table::shown::shown;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use serde_json::json;
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -45,13 +51,13 @@ pub struct Arguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "The job")]
 struct JobFlags {
-    /// Set a parameter of the model, or what else a sweep file has; repeatable
+    /// Set a parameter of the model, or a key of [record] or [solver]; repeatable
     #[arg(long = "set", visible_alias = "record", value_name = "KEY=VALUE")]
     settings: Vec<String>,
     /// Slips to record after start-up [default: that of the file; without one 20, unless --time is given]
     #[arg(long, allow_negative_numbers = true, value_name = "N")]
     slips: Option<String>,
-    /// Model time at which the job ends even without its slips, in s: `max_time` of [record], where `time` waits for a slip
+    /// Longest model time, in s: `max_time` of [record], where `time` waits for a slip
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     time: Option<String>,
     /// Method [default: event-driven]
@@ -60,9 +66,6 @@ struct JobFlags {
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
     #[arg(long, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
-    /// How the event-driven solver resolves motion: on a grid, in Taylor steps, or whichever is better
-    #[arg(long, value_name = "auto|grid|taylor")]
-    resolve: Option<String>,
     /// Step of the fixed-step solver, in s [default: 1e-6]
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
@@ -145,6 +148,24 @@ impl Arguments {
 }
 
 impl PlotFlags {
+    fn check(&self, longest: f64) -> Result<(), String> {
+        let from = self.from;
+        if !(from >= 0.0 && from.is_finite()) {
+            return Err(format!("--from {from}: must be a finite number >= 0, in s"));
+        }
+        if from >= longest {
+            return Err(format!(
+                "--from {from}: must lie before the end, {longest} s"
+            ));
+        }
+        match self.until {
+            Some(until) if !(until > from && until.is_finite()) => Err(format!(
+                "--until {until}: must be a finite number > {from}, the first instant, in s"
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether there is a plot with this panel.
     fn draws(&self, panel: Panel) -> bool {
         !self.files.is_empty() && (self.panel == panel || self.panel == Panel::Both)
@@ -182,71 +203,159 @@ enum Panel {
     Both,
 }
 
-/// Version of the JSON.
-const FORMAT: u32 = 1;
+const JSON_FORMAT: u32 = 1;
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let changes = arguments.job.changes()?;
-    let sweep = sweep::read(
-        arguments.sweep.as_deref(),
-        arguments.preset.preset,
-        &changes,
-    )?;
-    let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &changes)?;
+    let job = single_job::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
-    check_outputs(arguments, &sweep, parameters)?;
+    arguments.check(&sweep, parameters)?;
     output::warn(&sweep.warnings());
     let begin = Instant::now();
     let never = AtomicBool::new(false);
-    let waiting = output::waiting(format!(
-        "simulating; about {} predicted",
-        output::duration(job.cost)
-    ));
-    let (result, recorded) = single::simulate(&sweep, parameters, arguments.request(), &never)?;
+    let predicted = output::duration(job.cost);
+    let waiting = output::waiting(format!("simulating; about {predicted} predicted"));
+    let request = arguments.request();
+    let (measured, records) = single_job::simulate(&sweep, parameters, request, &never)?;
     drop(waiting);
     let wall = begin.elapsed().as_secs_f64();
 
+    let label = tables::label::<DriveAndSeed>(&sweep, parameters);
+    let slips = (measured.slips.iter()).map(|slip| -> SlipRow<'_> { (&label, slip) });
+    let contacts = records.contacts.iter().map(ContactRow::from);
     let footer = Footer::default()
         .with_sweep(sweep.name(), sweep.text())
         .with("parameters", &as_json(parameters));
-    let label = tables::label::<DriveAndSeed>(&sweep, parameters);
-    let slips = result
-        .slips
-        .iter()
-        .map(|slip| -> SlipRow<'_> { (&label, slip) });
     let tables = Tables {
         footer: &footer,
         left_out: &sweep.recording().left_out(),
     };
     let files = &arguments.tables;
-    tables.write(files.trace.as_deref(), recorded.trace.iter().copied())?;
-    tables.write(files.map.as_deref(), recorded.map.iter().copied())?;
-    tables.write(files.profile.as_deref(), recorded.profile.iter().copied())?;
-    let contacts = recorded.contacts.iter().map(ContactRow::from);
+    tables.write(files.trace.as_deref(), records.trace.iter().copied())?;
+    tables.write(files.map.as_deref(), records.map.iter().copied())?;
+    tables.write(files.profile.as_deref(), records.profile.iter().copied())?;
     tables.write(files.contacts.as_deref(), contacts)?;
     tables.write(files.slip_table.as_deref(), slips)?;
-    write_pictures(arguments, parameters, &recorded, &result.slips)?;
-    report(arguments.json, &label.0.job_id, &result, wall)?;
+    arguments.write_plots(parameters, &records, &measured.slips)?;
+
+    let report = Report::new(&label.0.job_id, &measured, wall);
+    if arguments.json {
+        output::json(JSON_FORMAT, &report)?;
+    } else {
+        output::print(&table_of_slips(&measured.slips))?;
+        report.print()?;
+    }
     Ok(Exit::Done)
+}
+
+/// What the tables of a job have in common.
+struct Tables<'a> {
+    footer: &'a Footer,
+    left_out: &'a [Cow<'static, str>],
+}
+
+impl Tables<'_> {
+    /// Writes a table, if there is a file for it.
+    fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
+        let Some(path) = path else { return Ok(()) };
+        Destination::new(path, Kind::PARQUET)?.write(signals::catch, |file| {
+            let mut writer = TableWriter::without(self.left_out, file, self.footer)?;
+            for row in rows {
+                writer.push(&row)?;
+            }
+            Ok(writer.finish()?)
+        })
+    }
+}
+
+impl Arguments {
+    /// Refuses what could not be written or drawn, before anything runs.
+    fn check(&self, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
+        let recording = sweep.recording();
+        let request = self.request().check(parameters, recording);
+        request.map_err(|error| UsageError(format!("--{error}")))?;
+        let longest = recording.max_time.unwrap_or(f64::INFINITY);
+        self.plot.check(longest).map_err(UsageError)?;
+        let tables = &self.tables;
+        let tables = [
+            &tables.trace,
+            &tables.map,
+            &tables.profile,
+            &tables.contacts,
+            &tables.slip_table,
+        ];
+        let mut all = Vec::new();
+        for table in tables.into_iter().flatten() {
+            if table.exists() && !table.is_file() {
+                return Err(UsageError(format!("{}: must be a file", shown(table))).into());
+            }
+            all.push(Destination::new(table, Kind::PARQUET)?);
+        }
+        for file in &self.plot.files {
+            all.push(picture_file(file)?.0);
+        }
+        Ok(Destination::refuse_same(&all)?)
+    }
+
+    /// Draws the plot into each of its files.
+    fn write_plots(
+        &self,
+        parameters: &Parameters,
+        records: &Records,
+        slips: &[Slip],
+    ) -> Result<()> {
+        let PlotFlags { files, from, .. } = &self.plot;
+        if files.is_empty() {
+            return Ok(());
+        }
+        let refused = |problem: String| UsageError(format!("--from {from}: {problem}"));
+        let last = records.trace.last().map(|row| row.time);
+        let last = last
+            .or(records.map.last().map(|row| row.time))
+            .unwrap_or(0.0);
+        if *from >= last {
+            let problem = format!(
+                "the simulation ended at {last} s; take an earlier instant, or a longer --time"
+            );
+            return Err(refused(problem).into());
+        }
+        let shown = self.shown_times();
+        let trace = records.trace.iter().filter(|row| shown.contains(&row.time));
+        let trace: Vec<(f64, f64)> = trace.map(|row| (row.time, row.force)).collect();
+        let map = records.map.iter().filter(|row| shown.contains(&row.time));
+        let map: Vec<_> = map.copied().collect();
+        let onsets: Vec<f64> = slips.iter().map(|slip| slip.onset).collect();
+        let trace = self.plot.draws(Panel::Force).then_some(&*trace);
+        let map = self.plot.draws(Panel::Map).then_some(&*map);
+        let picture = simulation(parameters, trace, map, &onsets);
+        let picture = picture.map_err(|error| refused(error.to_string()))?;
+        for path in files {
+            let (destination, format) = picture_file(path)?;
+            output::write(&destination, &picture.encoded(format)?)?;
+        }
+        Ok(())
+    }
+
+    /// The times of the plot. The sample at an end is shown, however its time is rounded.
+    fn shown_times(&self) -> RangeInclusive<f64> {
+        let slack = 1e-6 * self.tables.sample;
+        self.plot.from - slack..=self.plot.until.unwrap_or(f64::INFINITY) + slack
+    }
 }
 
 impl JobFlags {
     /// What the flags set, each as a key of a sweep file.
     fn changes(&self) -> Result<Vec<Change>, UsageError> {
         let is_fixed = self.solver.as_deref() == Some("fixed-step");
+        let default = is_fixed.then(|| "1e-6".to_owned());
+        let dt = self.dt.clone().or(default);
         let flags = [
             ("slips", &self.slips),
             ("max_time", &self.time),
             ("method", &self.solver),
             ("tolerance", &self.tolerance),
-            ("resolve", &self.resolve),
-            (
-                "dt",
-                &self
-                    .dt
-                    .clone()
-                    .or_else(|| is_fixed.then(|| "1e-6".to_owned())),
-            ),
+            ("dt", &dt),
         ];
         let flags = flags
             .into_iter()
@@ -266,91 +375,106 @@ fn as_json(parameters: &Parameters) -> String {
     serde_json::Value::Object(entries.collect()).to_string()
 }
 
-fn report(in_json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Result<()> {
-    let (slips, summary, averages) = (&measured.slips, &measured.summary, measured.averages);
-    let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
-    let mean =
-        (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
-    let (outcome, regime) = (
-        JobOutcome::of(measured).word(),
-        measured.regime().map(Regime::word),
-    );
-    let friction = averages.map(|averages| averages.friction);
-    let slip_share = averages.map(|averages| averages.slip_share);
-    if in_json {
-        let report = json!({
-            "job_id": job_id,
-            "simulated_seconds": summary.end_time,
-            "slips": slips.len(),
-            "mean_interval_seconds": mean,
-            "outcome": outcome,
-            "regime": regime,
-            "mean_friction_newtons": friction,
-            "attached_fraction": averages.map(|averages| averages.attached_fraction),
-            "slip_share": slip_share,
-            "breaks": summary.breaks,
-            "reattachments": summary.reattachments,
-            "ruptures": measured.ruptures,
-            "steps": summary.steps,
-            "leaps": summary.leaps,
-            "wall_seconds": wall,
-        });
-        return output::json(FORMAT, &report);
-    }
-    let mut columns = Columns::default();
-    let mut add = |head: &str, cell: &dyn Fn(&Slip) -> String| {
-        columns.add(
-            false,
-            std::iter::once(head.to_owned())
-                .chain(slips.iter().map(cell))
-                .collect(),
-        );
-    };
-    add("slip", &|slip| slip.number.to_string());
-    add("onset (s)", &|slip| format!("{:.6}", slip.onset));
-    add("interval (s)", &|slip| {
-        slip.interval
-            .map_or_else(|| "-".to_owned(), |interval| format!("{interval:.6}"))
-    });
-    add("phase (rad)", &|slip| {
-        slip.phase
-            .map_or_else(|| "-".to_owned(), |phase| format!("{phase:.4}"))
-    });
-    add("peak (N)", &|slip| format!("{:.2}", slip.peak_force));
-    add("drop (N)", &|slip| format!("{:.2}", slip.drop));
-    add("precursors", &|slip| slip.precursors.to_string());
-    if !slips.is_empty() {
-        output::print(&columns.to_string())?;
-    }
-    let or_none = |value: Option<f64>, unit: &str| {
-        value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"))
-    };
-    let regime = match regime.zip(slip_share) {
-        None => "none".to_owned(),
-        Some((regime, _)) if slips.is_empty() => regime.to_owned(),
-        Some((regime, share)) => {
-            format!("{regime}, {:.3} % of the time within slips", 100.0 * share)
+/// What is printed of a job.
+#[derive(Serialize)]
+struct Report<'a> {
+    job_id: &'a str,
+    simulated_seconds: f64,
+    slips: usize,
+    mean_interval_seconds: Option<f64>,
+    outcome: &'static str,
+    regime: Option<&'static str>,
+    mean_friction_newtons: Option<f64>,
+    attached_fraction: Option<f64>,
+    slip_share: Option<f64>,
+    breaks: u64,
+    reattachments: u64,
+    ruptures: u64,
+    steps: u64,
+    leaps: u64,
+    wall_seconds: f64,
+}
+
+impl<'a> Report<'a> {
+    fn new(job_id: &'a str, measured: &Measurements, wall_seconds: f64) -> Self {
+        let Measurements {
+            slips,
+            summary,
+            averages,
+            ruptures,
+            ..
+        } = measured;
+        let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
+        let mean = intervals.iter().sum::<f64>() / intervals.len() as f64;
+        Self {
+            job_id,
+            simulated_seconds: summary.end_time,
+            slips: slips.len(),
+            mean_interval_seconds: Some(mean).filter(|mean| mean.is_finite()),
+            outcome: JobOutcome::of(measured).word(),
+            regime: measured.regime().map(Regime::word),
+            mean_friction_newtons: averages.map(|averages| averages.friction),
+            attached_fraction: averages.map(|averages| averages.attached_fraction),
+            slip_share: averages.map(|averages| averages.slip_share),
+            breaks: summary.breaks,
+            reattachments: summary.reattachments,
+            ruptures: *ruptures,
+            steps: summary.steps,
+            leaps: summary.leaps,
+            wall_seconds,
         }
-    };
-    output::pairs(&[
-        ("job", job_id.to_owned()),
-        ("simulated time", format!("{:.6} s", summary.end_time)),
-        ("slips", slips.len().to_string()),
-        ("outcome", outcome.to_owned()),
-        ("regime", regime),
-        ("mean interval", or_none(mean, "s")),
-        ("mean friction", or_none(friction, "N")),
-        (
-            "contacts",
-            format!(
-                "{} breaks, {} reattachments",
-                summary.breaks, summary.reattachments
-            ),
-        ),
-        (
-            "steps",
-            format!("{}, of which {} leaps", summary.steps, summary.leaps),
-        ),
-        ("wall time", output::duration(wall)),
-    ])
+    }
+
+    fn print(&self) -> Result<()> {
+        // A mean of few slips is not better known.
+        let mean = |value: Option<f64>, unit: &str| {
+            let number = value.map(|value| Digits::FOUR.number(value));
+            number.map_or_else(|| "none".to_owned(), |number| format!("{number} {unit}"))
+        };
+        let regime = match self.regime.zip(self.slip_share) {
+            None => "none".to_owned(),
+            Some((regime, _)) if self.slips == 0 => regime.to_owned(),
+            Some((regime, share)) => {
+                format!("{regime}, {:.3} % of the time within slips", 100.0 * share)
+            }
+        };
+        let contacts = format!(
+            "{} breaks, {} reattachments",
+            self.breaks, self.reattachments
+        );
+        let steps = format!("{}, of which {} leaps", self.steps, self.leaps);
+        output::pairs(&[
+            ("job", self.job_id.to_owned()),
+            ("simulated time", format!("{:.6} s", self.simulated_seconds)),
+            ("slips", self.slips.to_string()),
+            ("outcome", self.outcome.to_owned()),
+            ("regime", regime),
+            ("mean interval", mean(self.mean_interval_seconds, "s")),
+            ("mean friction", mean(self.mean_friction_newtons, "N")),
+            ("contacts", contacts),
+            ("steps", steps),
+            ("wall time", output::duration(self.wall_seconds)),
+        ])
+    }
+}
+
+/// A line for each slip; empty without slips.
+fn table_of_slips(slips: &[Slip]) -> String {
+    if slips.is_empty() {
+        return String::new();
+    }
+    let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    let mut columns = TextTable::default();
+    columns.numbers("slip", slips, |slip| slip.number.to_string());
+    columns.numbers("onset (s)", slips, |slip| format!("{:.6}", slip.onset));
+    columns.numbers("interval (s)", slips, |slip| {
+        or_none(slip.interval.map(|interval| format!("{interval:.6}")))
+    });
+    columns.numbers("phase (rad)", slips, |slip| {
+        or_none(slip.phase.map(|phase| format!("{phase:.4}")))
+    });
+    columns.numbers("peak (N)", slips, |slip| format!("{:.2}", slip.peak_force));
+    columns.numbers("drop (N)", slips, |slip| format!("{:.2}", slip.drop));
+    columns.numbers("precursors", slips, |slip| slip.precursors.to_string());
+    columns.to_string()
 }

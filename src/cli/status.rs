@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::run::{Failure, Overview, Present};
+use crate::run::{Present, Status};
 use crate::table::shown::shown_text;
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -29,99 +29,93 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`Status`](crate::run::Status) as JSON.
-const FORMAT: u32 = 3;
+const JSON_FORMAT: u32 = 3;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read_plan(&Layout::new(&Disk, &arguments.directory))?;
     let status = crate::run::status(&results)?;
     let overview = status.overview;
     if arguments.json {
-        output::json(FORMAT, &status)?;
+        output::json(JSON_FORMAT, &status)?;
     } else {
-        let left = match (overview.jobs_missing, status.time_left) {
-            (0, _) => "nothing left to run".to_owned(),
-            (_, Some(seconds)) => format!("{} at the pace so far", output::duration(seconds)),
-            (_, None) => format!(
-                "{} of CPU time predicted",
-                output::duration(overview.predicted_cost_missing)
-            ),
-        };
-        let goes_on = status.rounds.as_ref().is_some_and(|rounds| !rounds.is_over)
-            && overview.jobs_missing > 0;
-        let left = if goes_on {
-            format!("{left}, of this round")
-        } else {
-            left
-        };
-        let kept = match overview.jobs_kept {
-            0 => String::new(),
-            kept => format!(", {kept} of them kept of values that the sweep no longer has"),
-        };
-        let mut pairs = vec![
-            ("sweep", status.name.clone()),
-            ("jobs done", format!("{}{kept}", overview.jobs_done)),
-            ("kept for later", overview.jobs_spilled.to_string()),
-            ("jobs failed", overview.jobs_failed.to_string()),
-            ("jobs missing", overview.jobs_missing.to_string()),
-            (
-                "parts",
-                format!(
-                    "{} done, {} missing",
-                    overview.parts_done, overview.parts_missing
-                ),
-            ),
-            ("time left", left),
-        ];
-        if status.cut.jobs > 0 {
-            let each = status.cut.slips as f64 / status.cut.jobs as f64;
-            let off = format!(
-                "{}, with {each:.1} slips each: tau_mean is too short by about cv^2/{each:.1}, as stickslip show says",
-                status.cut.jobs
-            );
-            pairs.push(("cut by max_time", off));
-        }
-        pairs.extend(
-            status
-                .rounds
-                .as_ref()
-                .map(|rounds| ("round", output::rounds(rounds))),
-        );
-        output::pairs(&pairs)?;
-        for Present { worker, last_beat } in &status.workers {
+        output::pairs(&pairs(&status))?;
+        output::lines(status.workers.iter().map(worker_in_words))?;
+        for failure in &status.failures {
+            let reason = shown_text(&failure.reason);
             output::print(&format!(
-                "worker  process {} on {}: {}, {:.2} jobs/s, last beat {last_beat:.0} s ago\n",
-                worker.process,
-                shown_text(&worker.host),
-                output::count(worker.threads as u64, "thread"),
-                worker.jobs_per_second
-            ))?;
-        }
-        for Failure {
-            job_id,
-            reason,
-            command,
-        } in &status.failures
-        {
-            output::print(&format!(
-                "failed  {job_id}: {}\n  alone: {command}\n",
-                shown_text(reason)
+                "failed  {}: {reason}\n  alone: {}\n",
+                failure.job_id, failure.command
             ))?;
         }
         if overview.jobs_failed > status.failures.len() as u64 {
             output::print(&output::by_reason(&status.failure_reasons))?;
         }
-        for marked in &status.marked {
-            output::print(&format!("deaths  {marked}\n"))?;
-        }
+        let marked = status.marked.iter();
+        output::lines(marked.map(|marked| format!("deaths  {marked}")))?;
     }
-    Ok(match overview {
-        Overview {
-            jobs_missing: 1.., ..
-        } if arguments.check => Exit::Stopped,
-        Overview {
-            jobs_failed: 1.., ..
-        } => Exit::Failed,
-        _ => Exit::Done,
+    Ok(if arguments.check && overview.jobs_missing > 0 {
+        Exit::Stopped
+    } else if overview.jobs_failed > 0 {
+        Exit::Failed
+    } else {
+        Exit::Done
     })
+}
+
+fn pairs(status: &Status) -> Vec<(&'static str, String)> {
+    let overview = &status.overview;
+    let mut done = overview.jobs_done.to_string();
+    if overview.jobs_kept > 0 {
+        let kept = overview.jobs_kept;
+        done = format!("{done}, {kept} of them kept of values that the sweep no longer has");
+    }
+    let parts = format!(
+        "{} done, {} missing",
+        overview.parts_done, overview.parts_missing
+    );
+    let mut pairs = vec![
+        ("sweep", status.name.clone()),
+        ("jobs done", done),
+        ("kept for later", overview.jobs_spilled.to_string()),
+        ("jobs failed", overview.jobs_failed.to_string()),
+        ("jobs missing", overview.jobs_missing.to_string()),
+        ("parts", parts),
+        ("time left", time_left(status)),
+    ];
+    if status.cut.jobs > 0 {
+        let jobs = status.cut.jobs;
+        let each = status.cut.slips as f64 / jobs as f64;
+        let cut = format!(
+            "{jobs}, with {each:.1} slips each: tau_mean is too short by about cv^2/{each:.1}, as stickslip show says"
+        );
+        pairs.push(("cut by max_time", cut));
+    }
+    if let Some(rounds) = &status.rounds {
+        pairs.push(("round", output::rounds(rounds)));
+    }
+    pairs
+}
+
+fn time_left(status: &Status) -> String {
+    if status.overview.jobs_missing == 0 {
+        return "nothing left to run".to_owned();
+    }
+    let cost = status.overview.predicted_cost_missing;
+    let left = match status.time_left {
+        Some(seconds) => format!("{} at the pace so far", output::duration(seconds)),
+        None => format!("{} of CPU time predicted", output::duration(cost)),
+    };
+    match &status.rounds {
+        Some(rounds) if !rounds.is_over => left + ", of this round",
+        _ => left,
+    }
+}
+
+fn worker_in_words(worker: &Present) -> String {
+    let host = shown_text(&worker.host);
+    let threads = output::count(worker.threads as u64, "thread");
+    format!(
+        "worker  process {} on {host}: {threads}, {:.2} jobs/s, last beat {:.0} s ago",
+        worker.process, worker.jobs_per_second, worker.last_beat
+    )
 }

@@ -5,7 +5,7 @@ use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::results::tables::{recorded_schema, tables_of};
-use crate::simulate as single;
+use crate::single_job;
 use crate::sweep::{Change, Sweep, SweepError, varied};
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
@@ -36,19 +36,13 @@ const PRESETS: [Preset; 31] = presets! {
 };
 
 impl Preset {
-    /// What the first line of the file says, without a sentence that goes on in the next line.
+    /// What the first line of the file says, without a sentence that continues in the next line.
     fn about(self) -> &'static str {
-        let line = self
-            .text
-            .lines()
-            .next()
-            .unwrap_or_default()
-            .trim_start_matches(['#', ' ']);
-        let whole = if line.ends_with('.') {
-            line
-        } else {
-            line.rsplit_once([':', '.', ','])
-                .map_or(line, |(whole, _)| whole)
+        let line = self.text.lines().next().unwrap_or_default();
+        let line = line.trim_start_matches(['#', ' ']);
+        let whole = match line.rsplit_once([':', '.', ',']) {
+            Some((whole, _)) if !line.ends_with('.') => whole,
+            _ => line,
         };
         whole.trim_end_matches(['.', ',', ':'])
     }
@@ -98,45 +92,40 @@ const IN_THE_FILE: &str =
 /// What `--set` and `--axis` change.
 pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, UsageError> {
     let mut changes: Vec<Change> = Vec::new();
-    let settings = settings.iter().map(|text| ("--set", "VALUE", "1e-5", text));
-    for (flag, form, example, text) in settings.chain(
-        axes.iter()
-            .map(|text| ("--axis", "VALUES", "1e-5,1e-4", text)),
-    ) {
-        let no_change = || {
-            UsageError(format!(
-                "{flag} {text}: must be KEY={form}, such as {flag} V0={example}"
-            ))
-        };
-        let (key, value) = text.split_once('=').ok_or_else(no_change)?;
-        let (key, value) = (key.trim(), value.trim());
+    let settings = settings.iter().map(|text| ("--set", text));
+    for (flag, text) in settings.chain(axes.iter().map(|text| ("--axis", text))) {
+        let refused = |problem: String| UsageError(format!("{flag} {text}: {problem}"));
+        let (key, value) = text.split_once('=').unwrap_or_default();
+        let key = key.trim();
         if changes.iter().any(|earlier| earlier.key == key) {
-            return Err(UsageError(format!(
-                "{flag} {text}: {key} is set before; keep one"
-            )));
+            return Err(refused(format!("{key} is set before; keep one")));
         }
         if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            return Err(no_change());
+            let form = match flag {
+                "--set" => "KEY=VALUE, such as --set V0=1e-5",
+                _ => "KEY=VALUES, such as --axis V0=1e-5,1e-4",
+            };
+            return Err(refused(format!("must be {form}")));
         }
         changes.push(match flag {
-            "--set" => Change::setting(key, value),
-            _ => Change::axis(key, value)
-                .map_err(|form| UsageError(format!("{flag} {text}: must be {key}={form}")))?,
+            "--set" => Change::setting(key, value.trim()),
+            _ => Change::axis(key, value.trim())
+                .map_err(|form| refused(format!("must be {key}={form}")))?,
         });
     }
     Ok(changes)
 }
 
 /// Reads a sweep file or the sweep of a results directory, or takes a preset, as varied; without either, a sweep with one point, of what is set.
-pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> Result<Sweep> {
-    let sweep = match (file, preset) {
-        // A results directory, of which it is that asked for last.
+pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result<Sweep> {
+    let sweep = match (file, flag.preset) {
+        // A results directory: its current sweep.
         (Some(folder), _) if folder.is_dir() => {
             Ok(Results::read(&Layout::new(&Disk, folder))?.sweep().clone())
         }
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
-        (None, None) => return of_flags(&single::sweep_text(changes)),
+        (None, None) => return of_flags(&single_job::sweep_text(changes)),
     };
     vary(sweep?, changes)
 }
@@ -149,17 +138,15 @@ pub fn warn_of_partitions(root: &Path, sweep: &Sweep) {
         let is_it = |field: &FieldRef| field.name().eq_ignore_ascii_case(name);
         schemas.any(|schema| schema.fields().iter().any(is_it))
     };
-    let path = std::path::absolute(root).unwrap_or_default();
-    let names = path
-        .iter()
-        .filter_map(|folder| folder.to_str()?.split_once('='));
-    for (name, value) in names.filter(|(name, _)| is_column(name)) {
-        let folder = format!("{name}={value}");
-        output::warn(&[format!(
-            "{}: is read as a partition by DuckDB, which returns it as {name} of all rows; rename this folder of the \
-             path, or read with hive_partitioning = false",
-            shown(folder.as_ref())
-        )]);
+    for folder in &std::path::absolute(root).unwrap_or_default() {
+        let name = folder.to_str().and_then(|folder| folder.split_once('='));
+        if let Some((name, _)) = name.filter(|(name, _)| is_column(name)) {
+            let folder = shown(folder.as_ref());
+            output::warn(&[format!(
+                "{folder}: is read as a partition by DuckDB, which returns it as {name} of all rows; rename this folder \
+                 of the path, or read with hive_partitioning = false"
+            )]);
+        }
     }
 }
 
@@ -172,19 +159,15 @@ pub fn vary(sweep: Sweep, changes: &[Change]) -> Result<Sweep> {
     }
 }
 
-/// Reads a text that flags were made into; mistakes are those of the flags.
+/// Reads a text that flags were made into.
 fn of_flags(text: &str) -> Result<Sweep> {
-    Sweep::parse(text, Path::new("flags")).map_err(|error| match error {
-        SweepError::Invalid { mistakes, .. } => {
-            let problem = single::mistakes_in("flags", &mistakes);
-            let hint = if problem.contains("[axes.") {
-                IN_THE_FILE
-            } else {
-                ""
-            };
-            UsageError(problem + hint).into()
+    Sweep::parse_made(text, "flags").map_err(|error| {
+        let problem = error.to_string();
+        if problem.contains("[axes.") {
+            UsageError(problem + IN_THE_FILE).into()
+        } else {
+            error.into()
         }
-        unreadable => unreadable.into(),
     })
 }
 

@@ -29,13 +29,12 @@ pub fn parse(text: &str) -> Result<Duration, String> {
 }
 
 fn by_units(text: &str) -> Option<f64> {
-    let (mut seconds, mut rest) = (0.0, text);
+    let mut seconds = 0.0;
+    let mut rest = text;
     while !rest.is_empty() {
         let (number, tail) = rest.split_at(rest.find(|c: char| !(c.is_ascii_digit() || c == '.'))?);
-        let (unit, after) = tail.split_at(
-            tail.find(|c: char| c.is_ascii_digit())
-                .unwrap_or(tail.len()),
-        );
+        let next = tail.find(|c: char| c.is_ascii_digit());
+        let (unit, after) = tail.split_at(next.unwrap_or(tail.len()));
         let unit = match unit {
             "d" => DAY,
             "h" => HOUR,
@@ -50,9 +49,10 @@ fn by_units(text: &str) -> Option<f64> {
 }
 
 fn by_clock(text: &str) -> Option<f64> {
-    let (days, clock) = text
-        .split_once('-')
-        .map_or((None, text), |(days, clock)| (Some(days), clock));
+    let (days, clock) = match text.split_once('-') {
+        Some((days, clock)) => (Some(days), clock),
+        None => (None, text),
+    };
     // With days the first number after them is hours; without, the last is seconds.
     let fields: Vec<&str> = clock.split(':').collect();
     let units: &[u64] = match (days, fields.len()) {
@@ -60,18 +60,12 @@ fn by_clock(text: &str) -> Option<f64> {
         (None, 2) => &[MINUTE, 1],
         _ => return None,
     };
-    let fields = fields
-        .into_iter()
-        .zip(units)
-        .chain(days.map(|days| (days, &DAY)));
-    fields
-        .map(|(number, unit)| {
-            number
-                .parse::<u32>()
-                .ok()
-                .map(|number| f64::from(number) * *unit as f64)
-        })
-        .sum()
+    let fields = fields.into_iter().zip(units);
+    let mut seconds = 0.0;
+    for (number, unit) in fields.chain(days.map(|days| (days, &DAY))) {
+        seconds += f64::from(number.parse::<u32>().ok()?) * *unit as f64;
+    }
+    Some(seconds)
 }
 
 /// A time with units, in whole seconds.
@@ -82,11 +76,12 @@ pub fn with_units(time: Duration) -> String {
         (seconds % HOUR / MINUTE, "m"),
         (seconds % MINUTE, "s"),
     ];
-    let parts = parts.into_iter().filter(|(number, _)| *number > 0);
-    parts
-        .map(|(number, unit)| format!("{number}{unit}"))
-        .collect::<Vec<_>>()
-        .concat()
+    let mut text = String::new();
+    for (number, unit) in parts.into_iter().filter(|(number, _)| *number > 0) {
+        text += &number.to_string();
+        text += unit;
+    }
+    text
 }
 
 #[cfg(test)]

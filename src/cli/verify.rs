@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::results::verify::{Problem, Verification};
+use crate::results::verification::{Problem, Verification};
 use crate::table::shown::{shown, shown_text};
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -35,8 +35,7 @@ pub struct Arguments {
 /// Names of parts, and ids of jobs of each problem, that are shown; `--json` has all.
 const SHOWN: usize = 3;
 
-/// Version of [`Report`] as JSON.
-const FORMAT: u32 = 5;
+const JSON_FORMAT: u32 = 5;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -55,110 +54,98 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     } else {
         Results::verify(layout)?
     };
-    let repaired = arguments.repair && !verification.whole;
-    let commands = commands(layout, &verification, repaired);
-    if arguments.json {
-        output::json(
-            FORMAT,
-            &Report {
-                verification: &verification,
-                repaired,
-                commands,
-            },
-        )?;
-    } else {
-        print_summary(&verification, &commands, repaired)?;
-    }
-    Ok(
-        match (
-            verification.whole || arguments.repair,
-            verification.missing.is_empty(),
-        ) {
-            (false, _) => Exit::Damaged,
-            (true, false) => Exit::Stopped,
-            (true, true) => Exit::Done,
-        },
-    )
-}
-
-fn commands(layout: &Layout<'_>, verification: &Verification, repaired: bool) -> Vec<String> {
+    let is_damaged = !verification.whole && !arguments.repair;
     let root = output::quoted_path(layout.root());
     let mut commands = Vec::new();
-    if !verification.whole && !repaired {
+    if is_damaged {
         commands.push(format!("stickslip verify {root} --repair"));
     }
     if !verification.whole || !verification.missing.is_empty() {
         commands.push(format!("stickslip run {root}"));
     }
-    commands
+    let report = Report {
+        verification: &verification,
+        repaired: arguments.repair && !verification.whole,
+        commands,
+    };
+    if arguments.json {
+        output::json(JSON_FORMAT, &report)?;
+    } else {
+        report.print()?;
+    }
+    Ok(if is_damaged {
+        Exit::Damaged
+    } else if verification.missing.is_empty() {
+        Exit::Done
+    } else {
+        Exit::Stopped
+    })
 }
 
-fn print_summary(verification: &Verification, commands: &[String], repaired: bool) -> Result<()> {
-    for problem in &verification.problems {
-        output::print(&format!(
-            "{}: {}{}\n",
-            shown(&problem.path),
-            shown_text(&problem.problem),
-            jobs_of(problem)
-        ))?;
-    }
-    let megabytes = verification.bytes as f64 / 1e6;
-    let missing = match verification.missing.len() as u64 {
-        0 => "nothing".to_owned(),
-        parts => {
-            let jobs = output::missing(verification.jobs_missing, verification.jobs_spilled);
-            let names = first_of(&verification.missing);
-            format!("{}, {jobs}: {names}", output::count(parts, "part"))
-        }
-    };
-    let damaged = match verification.problems.len() as u64 {
-        0 => "nothing".to_owned(),
-        problems => {
-            output::count(problems, "problem")
-                + if repaired {
-                    ", moved to run/quarantine"
-                } else {
-                    ""
-                }
-        }
-    };
-    output::pairs(&[
-        (
-            "whole",
-            format!(
-                "{} with {}",
-                output::count(verification.parts, "part"),
-                output::count(verification.jobs, "job")
+impl Report<'_> {
+    fn print(&self) -> Result<()> {
+        let verification = self.verification;
+        output::lines(verification.problems.iter().map(problem_in_words))?;
+        let parts = output::count(verification.parts, "part");
+        let jobs = output::count(verification.jobs, "job");
+        let megabytes = verification.bytes as f64 / 1e6;
+        output::pairs(&[
+            ("intact", format!("{parts} with {jobs}")),
+            (
+                "files",
+                format!("{}, {megabytes:.1} MB", verification.files),
             ),
-        ),
-        (
-            "files",
-            format!("{}, {megabytes:.1} MB", verification.files),
-        ),
-        ("not done", missing),
-        ("damaged", damaged),
-    ])?;
-    for path in &verification.passed_over {
-        output::print(&format!("passed over: {path}\n"))?;
+            ("missing", self.missing()),
+            ("damaged", self.damaged()),
+        ])?;
+        let passed_over = verification.passed_over.iter();
+        output::lines(passed_over.map(|path| format!("passed over: {path}")))?;
+        if !self.commands.is_empty() {
+            output::print("next:\n")?;
+        }
+        output::lines(self.commands.iter().map(|command| format!("  {command}")))
     }
-    if !commands.is_empty() {
-        output::print("to go on:\n")?;
-        commands
-            .iter()
-            .try_for_each(|command| output::print(&format!("  {command}\n")))?;
+
+    fn missing(&self) -> String {
+        let parts = &self.verification.missing;
+        if parts.is_empty() {
+            return "nothing".to_owned();
+        }
+        let count = output::count(parts.len() as u64, "part");
+        let Verification {
+            jobs_missing,
+            jobs_spilled,
+            ..
+        } = *self.verification;
+        let jobs = output::missing(jobs_missing, jobs_spilled);
+        format!("{count}, {jobs}: {}", first_of(parts))
     }
-    Ok(())
+
+    fn damaged(&self) -> String {
+        let problems = self.verification.problems.len() as u64;
+        if problems == 0 {
+            return "nothing".to_owned();
+        }
+        let problems = output::count(problems, "problem");
+        if self.repaired {
+            problems + ", repaired: damaged files are in run/quarantine"
+        } else {
+            problems
+        }
+    }
 }
 
-fn jobs_of(Problem { jobs, .. }: &Problem) -> String {
-    match jobs.len() as u64 {
-        0 => String::new(),
-        count => format!(
-            "; concerns {}: {}",
-            output::count(count, "job"),
-            first_of(jobs)
-        ),
+fn problem_in_words(problem: &Problem) -> String {
+    let path = shown(&problem.path);
+    let text = shown_text(&problem.problem);
+    if problem.jobs.is_empty() {
+        return format!("{path}: {text}");
     }
+    let jobs = output::count(problem.jobs.len() as u64, "job");
+    format!(
+        "{path}: {text}; concerns {jobs}: {}",
+        first_of(&problem.jobs)
+    )
 }
 
 fn first_of(names: &[String]) -> String {

@@ -152,7 +152,7 @@ mod tests {
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{
-        DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel,
+        DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, SlipRow, relabel,
     };
     use crate::results::workers::tests::open;
     use crate::solver::Summary;
@@ -164,7 +164,7 @@ mod tests {
 
     const PERIOD: f64 = 0.01;
 
-    fn label(set: u32, seed: u64, amplitude: f64) -> Label<DriveAndSeed> {
+    fn label(set: u32, seed: u64, amplitude: f64) -> JobLabel<DriveAndSeed> {
         let parameters = Parameters {
             seed,
             modulation_amplitude: amplitude,
@@ -181,7 +181,7 @@ mod tests {
         (names, Selected::new(parameters), loading)
     }
 
-    fn job_result((_, parameters, _): &Label<DriveAndSeed>, slips: u32) -> Measurements {
+    fn job_result((_, parameters, _): &JobLabel<DriveAndSeed>, slips: u32) -> Measurements {
         let slip = |number: u32| Slip {
             number: u64::from(number),
             onset: f64::from(number) * 12.0 * PERIOD,
@@ -244,7 +244,7 @@ mod tests {
             let file = Disk.create(&path).unwrap();
             let mut slip_writer =
                 TableWriter::<SlipRow<'_>>::new(file, &Footer::default()).unwrap();
-            let labels: Vec<Label<DriveAndSeed>> = (0..3)
+            let labels: Vec<JobLabel<DriveAndSeed>> = (0..3)
                 .map(|set| label(set, seed, [0.0, 1e-6, 2e-6][set as usize]))
                 .collect();
             let measured: Vec<Measurements> = labels

@@ -114,14 +114,6 @@ class Chart {
     this.paintOn(ctx, width, height);
   }
 
-  /** The chart as it is seen, as SVG on a background. */
-  svg(background) {
-    const { clientWidth: width, clientHeight: height } = this.plot;
-    const ctx = new SvgContext(width, height, background);
-    this.paintOn(ctx, width, height);
-    return ctx.text();
-  }
-
   paintOn(ctx, width, height) {
     const ranges = [this.range("x"), this.range("y")];
     this.reset.hidden = !this.view;

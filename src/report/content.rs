@@ -1,8 +1,8 @@
-//! All that a page shows.
+//! The data of a page.
 
 use super::ADVICE;
+use super::reduced_columns::{Census, Sets, backbone};
 use super::slips::Slips;
-use super::tables::{Census, Sets, backbone};
 use crate::figure::{INKS, SCALE};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::model::{MODEL_VERSION, RNG_SCHEME, Symbol};
@@ -38,8 +38,7 @@ const STANDING: [&str; 7] = [
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
 
-/// What the scripts of the page read of a directory with reduced data. With `refresh`, the page is loaded again after about
-/// this time.
+/// The data of a directory for the scripts of the page, which reloads itself about every `refresh`.
 pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<Json> {
     let layout = results.layout();
     let sweep = results.sweep();
@@ -63,7 +62,7 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
         "rng_scheme": RNG_SCHEME,
         "plan_version": PLAN_VERSION,
         "directory": shown(layout.root()).to_string(),
-        // Set while a run goes on; times in s, `written` since 1970 UTC.
+        // Set during a run; times in s, `written` since 1970 UTC.
         "live": refresh.map(|refresh| json!({ "refresh": refresh.as_secs_f64(), "written": written })),
         "status": status_with(results, MAX_FAILURES)?,
         "asked": asked(sweep),
@@ -86,21 +85,15 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
     }))
 }
 
-/// The statistics that a sweep in rounds decides by.
+/// The statistics by which an adaptive sweep chooses its next round.
 fn asked(sweep: &Sweep) -> Vec<&'static str> {
-    let rounds = sweep.rounds();
-    let precision = rounds
-        .and_then(|rounds| rounds.precision.as_ref())
-        .map(|precision| &precision.statistics);
-    let refinement = rounds
-        .and_then(|rounds| rounds.refinement.as_ref())
-        .map(|refinement| &refinement.by);
-    precision
-        .or(refinement)
-        .into_iter()
-        .flatten()
-        .map(|statistic| statistic.key)
-        .collect()
+    let precision = sweep.rounds().and_then(|rounds| rounds.precision.as_ref());
+    let refinement = sweep.refinement().map(|refinement| &refinement.by);
+    let asked = precision
+        .map(|precision| &precision.statistics)
+        .or(refinement);
+    let statistics = asked.into_iter().flatten();
+    statistics.map(|statistic| statistic.key).collect()
 }
 
 /// The standing figures as SVG, by name: those that are small.
@@ -111,10 +104,9 @@ fn figures(layout: &Layout<'_>) -> Result<Vec<(String, String)>, StorageError> {
         let file = layout.figures().join(format!("{name}.svg"));
         if layout.storage.exists(&file)? {
             let text = String::from_utf8(layout.storage.read(&file)?).unwrap_or_default();
-            figures.extend(
-                Some((name.to_owned(), text))
-                    .filter(|(_, text)| (1..LARGEST).contains(&text.len())),
-            );
+            if (1..LARGEST).contains(&text.len()) {
+                figures.push((name.to_owned(), text));
+            }
         }
     }
     Ok(figures)
@@ -122,33 +114,30 @@ fn figures(layout: &Layout<'_>) -> Result<Vec<(String, String)>, StorageError> {
 
 /// η, φ_min and its asymptote.
 fn curves() -> Vec<[Option<f64>; 3]> {
-    (0..=CURVE_STEPS)
-        .map(|step| libm::exp10(f64::from(step) / CURVE_STEPS_PER_DECADE))
-        .map(|eta| {
-            [
-                Some(eta),
-                minimum_phase(eta),
-                Some(minimum_phase_asymptote(eta)),
-            ]
-        })
-        .collect()
+    let curves = (0..=CURVE_STEPS).map(|step| {
+        let eta = libm::exp10(f64::from(step) / CURVE_STEPS_PER_DECADE);
+        let asymptote = minimum_phase_asymptote(eta);
+        [Some(eta), minimum_phase(eta), Some(asymptote)]
+    });
+    curves.collect()
 }
 
 /// What the logs say of cost, in s of CPU time, and of runs.
 fn logs(results: &Results<'_>) -> Result<(Json, Vec<Json>), StorageError> {
-    let (mut parts, mut runs) = (Vec::new(), Vec::<Json>::new());
+    let mut parts = Vec::new();
+    let mut runs: Vec<Json> = Vec::new();
     results.events(|event| match event {
         RunEvent::PartCommitted { part, jobs, predicted_cost, measured_cost, .. } => {
             parts.push((part, jobs, predicted_cost, measured_cost));
         }
         RunEvent::Started { host, program, threads, jobs, .. } => {
-            // Not ended if it was killed, or is at work.
+            // Null stays if the run was killed, or still runs.
             runs.push(json!({ "program": program, "host": host, "threads": threads, "jobs": jobs, "ended": null }));
         }
-        // A log holds one run, and logs are gone through one after the other.
+        // A log holds one run.
         RunEvent::Finished(report) => {
             if let Some(run) = runs.last_mut() {
-                // Jobs that it ran, and its wall time in s.
+                // Its jobs, and its wall time in s.
                 run["ended"] = json!([report.jobs_run, report.wall]);
             }
         }

@@ -106,7 +106,7 @@ class Explorer {
     ]);
     const focused = document.activeElement?.closest?.("#free label")?.firstChild?.textContent;
     this.free.controls.className = "tools controls";
-    this.free.controls.replaceChildren(of, choice("y", "y", columns), choice("x", "x", columns), log("x"), log("y"), this.saves());
+    this.free.controls.replaceChildren(of, choice("y", "y", columns), choice("x", "x", columns), log("x"), log("y"), this.saveButton());
     if (focused)
       [...this.free.controls.children]
         .find((label) => label.firstChild.textContent === focused)
@@ -114,22 +114,18 @@ class Explorer {
         ?.focus();
   }
 
-  /** Saves the chart as it is seen. */
-  saves() {
-    const background = () => getComputedStyle(document.body).backgroundColor;
-    const { name } = this.report.status;
-    const picture = () => {
+  /** A button that saves the visible chart on the background of the page. */
+  saveButton() {
+    const onclick = () => {
       const { base } = this.free;
       const copy = Object.assign(document.createElement("canvas"), { width: base.width, height: base.height });
       const ctx = copy.getContext("2d");
-      ctx.fillStyle = background();
+      ctx.fillStyle = getComputedStyle(document.body).backgroundColor;
       ctx.fillRect(0, 0, copy.width, copy.height);
       ctx.drawImage(base, 0, 0);
-      copy.toBlob((blob) => save(`${name}.png`, blob));
+      copy.toBlob((blob) => save(`${this.report.status.name}.png`, blob));
     };
-    const drawing = () => save(`${name}.svg`, new Blob([this.free.svg(background())], { type: "image/svg+xml" }));
-    const button = (words, onclick) => make("button", { type: "button", onclick }, words);
-    return make("span", {}, button("Save as PNG", picture), " ", button("Save as SVG", drawing));
+    return make("button", { type: "button", onclick }, "Save as PNG");
   }
 
   /** The column of an axis of the free chart. */

@@ -1,4 +1,4 @@
-// Puts the page together, follows what the reader does, and loads the page again while a run goes on.
+// Puts the page together, follows the reader's input, and loads the page again during a run.
 
 /** Reloads without a newer page after which it waits for the reader. */
 const PATIENCE = 8;

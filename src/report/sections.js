@@ -126,9 +126,9 @@ function writeCost(report) {
     report.status.jobs_missing && left !== null
       ? ` What is missing takes about ${duration(left)} of wall time at the pace so far.`
       : "";
-  const took = `took ${duration(measured)} of CPU time, predicted were ${duration(predicted)}`;
+  const took = `took ${duration(measured)} of CPU time, ${number(ratio, 3)} times the predicted ${duration(predicted)}`;
   element("cost-note").textContent = jobs
-    ? `${counted(jobs, "job")} in ${counted(parts, "part")} ${took}: a ratio of ${number(ratio, 3)}.${rest}`
+    ? `${counted(jobs, "job")} in ${counted(parts, "part")} ${took}.${rest}`
     : "No log has the cost of a part: the tables were merged or copied from elsewhere.";
   const [x, y] = [2, 3].map((k) => shown.map((part) => part[k]));
   const both = [...x, ...y].filter((value) => value > 0);

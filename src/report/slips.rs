@@ -1,11 +1,10 @@
 //! Slips for the charts, or a sample of them.
 
-use super::tables::Columns;
+use super::reduced_columns::Columns;
 use crate::observe::Slip;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
 use crate::sets::{Label, capitalised, first_clause};
-use crate::table::columns::Column;
 use serde::Serialize;
 use std::collections::HashMap;
 
@@ -50,10 +49,8 @@ impl Slips {
         total: u64,
     ) -> Result<Self, ResultsError> {
         let symbol = |name: &str| {
-            COLUMNS
-                .iter()
-                .find(|(known, _)| *known == name)
-                .map(|known| known.1)
+            let found = COLUMNS.iter().find(|(known, _)| *known == name);
+            found.map(|found| found.1)
         };
         let mut slips = Self {
             every: total.div_ceil(MAX_SLIPS).max(1),
@@ -81,21 +78,11 @@ impl Slips {
                 slips.columns.push(&slip);
             }
         }
-        slips.columns.label(
-            |Column {
-                 name,
-                 unit,
-                 meaning,
-                 ..
-             }| {
-                let what = capitalised(first_clause(meaning));
-                Label {
-                    symbol: symbol(name).unwrap_or_default().to_owned(),
-                    what,
-                    unit,
-                }
-            },
-        );
+        slips.columns.label(|column| Label {
+            symbol: symbol(&column.name).unwrap_or_default().to_owned(),
+            what: capitalised(first_clause(column.meaning)),
+            unit: column.unit,
+        });
         Ok(slips)
     }
 }

@@ -172,7 +172,7 @@ class SetTable {
     const rows = order.slice(page * ROWS, (page + 1) * ROWS).map((set) => this.row(set, names));
     this.table.replaceChildren(head, make("tbody", {}, ...rows));
     element("sets-note").textContent =
-      `${counted(order.length, "set")} of ${many(this.report.setCount)}; all seeds of a set together. Filters and CSV have the names that heads show when pointed at, and SI units.`;
+      `${counted(order.length, "set")} of ${many(this.report.setCount)}; all seeds of a set together. Hover over a heading for the name used in filters and CSV, which are in SI units.`;
     element("page").textContent = `Page ${page + 1} of ${pages}`;
     element("earlier").disabled = page === 0;
     element("later").disabled = page === pages - 1;

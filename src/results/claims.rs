@@ -1,8 +1,8 @@
 //! Claims: which worker runs a part, or reduces, so that nothing is done twice.
 //!
-//! `run/claims/<what>.<generation>` is a link to a file with the worker's name: of several who make it, one wins. Who finds
-//! the winner dead makes the next generation. A claim stays while anybody is at work, as one who has looked before may not
-//! know yet what became of it. Who has lost some claims lists them all, and does not ask for one after the other.
+//! `run/claims/<what>.<generation>` is a link to a file with the worker's name: of several workers that make it, one wins.
+//! A worker that finds the winner dead makes the next generation. A claim stays while any worker runs, as a worker that
+//! looked earlier may not know yet what became of it. A worker that has lost some claims lists them all again.
 
 use crate::results::layout::is_hidden;
 use crate::results::workers::{Living, Member};
@@ -11,7 +11,6 @@ use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ffi::OsStr;
 
-/// The claims as they were when they were listed.
 #[derive(Debug)]
 pub struct Claims<'a> {
     member: &'a Member<'a>,
@@ -28,11 +27,11 @@ pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing<'a> {
-    /// Nobody has it: this generation can be made.
+pub enum ClaimState<'a> {
+    /// No living worker has it: this generation can be made.
     Free(u64),
     Own,
-    /// Another has it that lives.
+    /// This living worker has it.
     Taken(&'a str),
 }
 
@@ -59,7 +58,7 @@ impl<'a> Claims<'a> {
         Ok(())
     }
 
-    /// The last generation of a claim, as far as is known; `None` if nobody has claimed it.
+    /// The last generation of a claim, as far as is known; `None` if no worker has claimed it.
     pub fn last(&self, what: &str) -> Option<u64> {
         self.generations.get(what).copied()
     }
@@ -69,27 +68,27 @@ impl<'a> Claims<'a> {
         &self,
         what: &str,
         living: &'l BTreeMap<String, Living>,
-    ) -> Result<Standing<'l>, StorageError> {
+    ) -> Result<ClaimState<'l>, StorageError> {
         if self.own.contains(what) {
-            return Ok(Standing::Own);
+            return Ok(ClaimState::Own);
         }
         let Some(generation) = self.last(what) else {
-            return Ok(Standing::Free(0));
+            return Ok(ClaimState::Free(0));
         };
         let owner = self.owner(what, generation)?;
         if owner == self.member.name() {
-            return Ok(Standing::Own);
+            return Ok(ClaimState::Own);
         }
         let living = living.get_key_value(&owner).map(|(name, _)| name.as_str());
-        Ok(living.map_or(Standing::Free(generation + 1), Standing::Taken))
+        Ok(living.map_or(ClaimState::Free(generation + 1), ClaimState::Taken))
     }
 
-    /// Makes a claim; false if another was first.
+    /// Makes a claim; false if another worker was first.
     pub fn take(&mut self, what: &str, generation: u64) -> Result<bool, ResultsError> {
         let layout = self.member.layout();
         let path = layout.claims().join(format!("{what}.{generation}"));
         let is_made = layout.storage.link_new(&self.member.claim(), &path)?;
-        // A network file system may have made it and been asked again.
+        // A network file system may have made the link, and have been asked again.
         let is_own = is_made || self.owner(what, generation)? == self.member.name();
         self.generations.insert(what.to_owned(), generation);
         if is_own {
@@ -101,10 +100,8 @@ impl<'a> Claims<'a> {
     /// The worker that has made a claim; empty if it is gone.
     fn owner(&self, what: &str, generation: u64) -> Result<String, StorageError> {
         let layout = self.member.layout();
-        match layout
-            .storage
-            .read(&layout.claims().join(format!("{what}.{generation}")))
-        {
+        let path = layout.claims().join(format!("{what}.{generation}"));
+        match layout.storage.read(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
             name => Ok(String::from_utf8_lossy(&name?).into_owned()),
         }

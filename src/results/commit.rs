@@ -1,10 +1,10 @@
 //! Commit: whole files appear under their names at once, in a given order, and survive a power cut.
 //!
-//! Stage, fsync, rename, fsync the folder. Contract: at every instant a target is absent, or the old file, or the new
-//! one as a whole; a file is there only if all those staged before it are. Staged names are a commit's own, so that two
-//! which prepare the same files at once never write into each other's.
+//! Stage, fsync, rename, fsync the folder. Contract: at every instant a target is absent, or the old file, or the whole
+//! new file; a file is there only if all files staged before it are. Each commit has staged names of its own, so that two
+//! commits of the same files at once never write into the same file.
 
-use crate::results::layout::Layout;
+use crate::results::layout::{Layout, shorter_in_tests};
 use crate::table::storage::{Lock, Storage, StorageError, StoredFile};
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -12,11 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// How long to wait for another process that does the same, such as a reduction.
-const MAX_WAIT: Duration = if cfg!(test) {
-    Duration::from_secs(5)
-} else {
-    Duration::from_mins(10)
-};
+const MAX_WAIT: Duration = shorter_in_tests(Duration::from_mins(10), Duration::from_secs(5));
 
 /// Files that are being prepared for their places. Dropped before [`Commit::publish`], it removes what it can.
 pub struct Commit<'a> {
@@ -62,13 +58,11 @@ impl<'a> Commit<'a> {
         file.sync()
     }
 
-    /// Moves the staged files to their targets, in the order in which they were staged.
-    /// If a move fails, the files before it are in their places.
+    /// Moves the staged files to their targets, in order. If a move fails, the files before it are in their places.
     pub fn publish(mut self) -> Result<(), StorageError> {
         for (staged, target) in &self.staged {
             self.storage.rename(staged, target)?;
-            self.storage
-                .sync_folder(target.parent().unwrap_or(Path::new(".")))?;
+            self.sync_folder_of(target)?;
         }
         self.staged.clear();
         Ok(())
@@ -80,10 +74,14 @@ impl<'a> Commit<'a> {
         let (staged, _) = &self.staged[self.staged.len() - 1];
         let is_new = self.storage.link_new(staged, target)?;
         if is_new {
-            self.storage
-                .sync_folder(target.parent().unwrap_or(Path::new(".")))?;
+            self.sync_folder_of(target)?;
         }
         Ok(is_new)
+    }
+
+    fn sync_folder_of(&self, target: &Path) -> Result<(), StorageError> {
+        let folder = target.parent().unwrap_or(Path::new("."));
+        self.storage.sync_folder(folder)
     }
 }
 
@@ -109,30 +107,22 @@ fn is_staged(name: &OsStr) -> bool {
     token.is_some_and(|token| token.len() == 16 && token.iter().all(u8::is_ascii_hexdigit))
 }
 
-/// Waits until no other process does what this writer does, and removes what a killed one left in its staging folder. A
-/// file system without locks lets in all, and nothing is removed: their files are then whole, but may be of one and of the
-/// other.
+/// Waits until no other process does what this writer does, and removes what a killed process left in its staging folder.
+/// A file system without locks lets in all, and nothing is removed: then some files may come from each process.
 pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
     layout.ensure_folder(&layout.locks())?;
     let file = layout.locks().join(writer);
     let lock = layout.storage.wait_for_lock(&file, MAX_WAIT)?;
     if matches!(lock, Lock::Taken) {
-        let held = io::Error::new(
-            io::ErrorKind::WouldBlock,
-            "another process holds it; try again when it has ended",
-        );
+        let problem = "another process holds it; try again when it has ended";
+        let held = io::Error::new(io::ErrorKind::WouldBlock, problem);
         return Err(StorageError::at("lock", &file)(held));
     }
     if matches!(lock, Lock::Ours(_)) {
         let staging = layout.staging(writer);
-        for name in layout
-            .storage
-            .list(&staging)?
-            .iter()
-            .filter(|name| is_staged(name))
-        {
-            layout.refuse_link(&staging.join(name))?;
-            layout.storage.remove(&staging.join(name))?;
+        let names = layout.storage.list(&staging)?;
+        for name in names.iter().filter(|name| is_staged(name)) {
+            layout.remove(&staging.join(name))?;
         }
     }
     Ok(lock)

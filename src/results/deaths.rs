@@ -1,8 +1,8 @@
-//! Deaths: the parts that workers were at when they died.
+//! Deaths: the parts that workers were running when they died.
 //!
-//! A worker keeps a note of each part that it has taken, in its staging folder. The worker that removes the folder of a dead
-//! one moves its notes to `run/deaths/<part>.<worker>`; one that ends in order leaves none. So a job that ends its process
-//! can be named, and does not stop the others. No job fails for it: kills, power cuts and queues leave the same marks.
+//! A worker keeps a note of each part that it has taken, in its staging folder, until the part is done. The worker that
+//! removes the folder of a dead worker moves its notes to `run/deaths/<part>.<worker>`. So a job that ends its process can
+//! be named, and does not stop the others. No job fails for a mark: kills, power cuts and queues leave marks, too.
 //! A run that ends in order removes the marks of parts that are done.
 
 use crate::results::layout::{Layout, PartName};
@@ -26,7 +26,7 @@ pub(super) type Deaths = HashMap<PartName, Vec<OsString>>;
 /// Parts that [`Pending::marked`] lists, at most.
 const MAX_MARKED: usize = 10;
 
-/// A part at which workers died, and that is to be run.
+/// A missing part at which workers died.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Marked {
     pub part: String,
@@ -78,7 +78,7 @@ impl Layout<'_> {
         Ok(())
     }
 
-    /// The parts that a worker is at.
+    /// The parts that a worker has taken.
     fn notes(&self, worker: &str) -> Result<Vec<PartName>, StorageError> {
         let names = self.storage.list(&self.staging(worker))?;
         let names = names.iter().filter_map(|name| name.to_str());
@@ -97,7 +97,7 @@ impl Layout<'_> {
         Ok(marks)
     }
 
-    /// The same, with the notes of workers that are dead and of which no other has made marks yet.
+    /// The same, with the notes of dead workers that are no marks yet.
     pub(super) fn marks_and_notes(&self) -> Result<Deaths, StorageError> {
         // In this order: a worker that begins in between is not in the list.
         let workers = self.storage.list(&self.staging(""))?;
@@ -113,7 +113,6 @@ impl Layout<'_> {
         Ok(marks)
     }
 
-    /// Removes the marks of parts that are done.
     pub fn tidy_deaths(&self) -> Result<(), StorageError> {
         let marks = self.marks()?;
         if marks.is_empty() {
@@ -122,16 +121,14 @@ impl Layout<'_> {
         let done = self.parts_in(&self.table(tables::JOBS))?;
         let of_done = marks.into_iter().filter(|(part, _)| done.contains(part));
         for mark in of_done.flat_map(|(_, marks)| marks) {
-            let mark = self.deaths().join(mark);
-            self.refuse_link(&mark)?;
-            gone_is_fine(self.storage.remove(&mark))?;
+            self.remove(&self.deaths().join(mark))?;
         }
         Ok(())
     }
 }
 
 impl Pending<'_> {
-    /// The parts that are to be run and at which most workers died.
+    /// The missing parts with the most deaths.
     pub fn marked(&self) -> Vec<Marked> {
         let may_run = |part: &Outline| !self.done.has(part) || self.may_run_again(part);
         let is_marked = |part: &&Outline| self.deaths(part) > 0 && may_run(part);
@@ -140,9 +137,8 @@ impl Pending<'_> {
         parts.truncate(MAX_MARKED);
         let marked = parts.into_iter().map(|outline| {
             let jobs = self.part(outline).jobs;
-            let ends =
-                [0, jobs.len() - 1].map(|position| self.results.sweep().command(&jobs[position]));
-            let mut commands = Vec::from(ends);
+            let ends = [&jobs[0], &jobs[jobs.len() - 1]];
+            let mut commands = Vec::from(ends.map(|job| self.results.sweep().command(job)));
             commands.dedup();
             Marked {
                 part: PartName::from(outline).to_string(),

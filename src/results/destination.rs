@@ -1,7 +1,7 @@
-//! Destinations: files and folders outside of a results directory, where the user says.
+//! Destinations: files and folders that the user names, outside of the data of a results directory.
 //!
-//! They are checked before anything is computed. A draft beside the place, with a name that nobody can guess, takes it at
-//! once. A killed process may leave its draft, which nothing reads.
+//! They are checked before anything is computed, written as a draft with a random name beside their place, and renamed. A
+//! killed process may leave its draft, which nothing reads.
 
 use crate::results::layout::{Layout, RUN};
 use crate::table::error::{ErrorKind, ResultsError};
@@ -14,22 +14,21 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use tempfile::{Builder, TempDir};
 
-/// What the names of drafts begin with.
 const PREFIX: &str = ".stickslip-";
 /// Bytes at the beginning of a file that say what it is.
 const BEGINNING: u64 = 1024;
 const THERE: &str = "is there already and was not changed; choose another name";
 
-/// What a file holds. One that is there is replaced by its own kind only.
+/// What a file holds. An existing file is replaced by its own kind only.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
     name: &'static str,
-    /// What it begins with, and what it has soon after.
+    /// Its first bytes, and bytes that come soon after.
     signs: [&'static [u8]; 2],
 }
 
 impl Kind {
-    /// Of which none is replaced.
+    /// No existing file is replaced.
     pub const NEW: Self = Self::new("", [b"", b""]);
     pub const REPORT: Self = Self::new("a report", [b"<!doctype html>", b"<title>stickslip "]);
     pub const PARQUET: Self = Self::new("a Parquet file", [b"PAR1", b""]);
@@ -38,7 +37,7 @@ impl Kind {
         Self { name, signs }
     }
 
-    /// What the end of a name promises.
+    /// The kind of a file with this ending.
     pub fn of_name(file: &Path) -> Option<Self> {
         match file.extension()?.to_str()? {
             "parquet" => Some(Self::PARQUET),
@@ -50,7 +49,7 @@ impl Kind {
         }
     }
 
-    /// Whether a file that begins so is of this kind, or empty.
+    /// Whether a file with this beginning is of this kind, or empty.
     fn may_be(self, beginning: &[u8]) -> bool {
         let [first, later] = self.signs;
         let has_later = || beginning.windows(later.len()).any(|seen| seen == later);
@@ -64,7 +63,7 @@ pub struct Destination {
     path: PathBuf,
     /// Where links lead.
     place: PathBuf,
-    /// Whether it is a device or a FIFO, which is written to.
+    /// Whether it is a device or a FIFO, which is not replaced.
     is_device: bool,
 }
 
@@ -79,12 +78,13 @@ impl Destination {
         if there.is_some() && kind.name.is_empty() {
             return refused(THERE);
         }
+        let destination = |place: PathBuf, is_device: bool| Self {
+            path: path.to_owned(),
+            place,
+            is_device,
+        };
         if there.as_ref().is_some_and(|there| !there.is_file()) {
-            return Ok(Self {
-                path: path.to_owned(),
-                place: path.to_owned(),
-                is_device: true,
-            });
+            return Ok(destination(path.to_owned(), true));
         }
         let place = resolved(path)?;
         if !place.parent().is_some_and(Path::is_dir) {
@@ -93,10 +93,11 @@ impl Destination {
         refuse_reserved(path)?;
         if there.is_some() {
             let mut beginning = Vec::new();
-            Disk.open(&place)?
+            let read = Disk
+                .open(&place)?
                 .take(BEGINNING)
-                .read_to_end(&mut beginning)
-                .map_err(StorageError::at("read", path))?;
+                .read_to_end(&mut beginning);
+            read.map_err(StorageError::at("read", path))?;
             if !kind.may_be(&beginning) {
                 return refused(&format!(
                     "is not {} and was not replaced; name another file, or remove this one",
@@ -104,11 +105,7 @@ impl Destination {
                 ));
             }
         }
-        Ok(Self {
-            path: path.to_owned(),
-            place,
-            is_device: false,
-        })
+        Ok(destination(place, false))
     }
 
     /// Refuses two names of one file.
@@ -131,8 +128,7 @@ impl Destination {
         self.place == other.place || inode(self).is_some_and(|of_one| Some(of_one) == inode(other))
     }
 
-    /// Writes the file whole, or leaves what was there: after an error, and if the flag of `stop` was set meanwhile. A device,
-    /// which may wait for its reader for ever, asks for no flag.
+    /// Writes the whole file, or leaves the earlier one after an error or if `stop` is set. A device has no flag.
     pub fn write(
         &self,
         stop: impl FnOnce() -> anyhow::Result<&'static AtomicBool>,
@@ -146,7 +142,7 @@ impl Destination {
         }
         let stop = stop()?;
         let before = fs::metadata(place).ok();
-        // What replaces a private file is private from the beginning.
+        // The draft of a private file is private, too.
         let mode = if before.is_some() { 0o600 } else { 0o666 };
         let draft = Builder::new()
             .prefix(PREFIX)
@@ -174,12 +170,11 @@ impl Destination {
 /// A folder that takes its place as a whole.
 pub struct NewFolder {
     pub place: PathBuf,
-    /// Where its files are prepared.
     pub draft: TempDir,
 }
 
 impl NewFolder {
-    /// Refuses a place in a results directory, and one where something is but an empty folder, which is replaced.
+    /// Refuses a place in a results directory, and an existing one, except for an empty folder, which is replaced.
     pub fn new(path: &Path) -> Result<Self, ResultsError> {
         refuse_within_results(path, |_| true)?;
         let place = resolved(path)?;
@@ -207,16 +202,15 @@ impl NewFolder {
         storage.sync_folder(self.draft.path())?;
         storage.ensure_folder(parent)?;
         match storage.rename(self.draft.path(), &self.place) {
-            // Another was first.
+            // Another process was first.
             Err(_) if self.place.exists() => Err(ResultsError::refused(&self.place, THERE)),
-            renamed => renamed
-                .and_then(|()| storage.sync_folder(parent))
-                .map_err(Into::into),
+            Err(error) => Err(error.into()),
+            Ok(()) => Ok(storage.sync_folder(parent)?),
         }
     }
 }
 
-/// Refuses a place among the data of a results directory, where readers would take what is written for a part of them.
+/// Refuses a place among the data of a results directory.
 pub fn refuse_reserved(path: &Path) -> Result<(), ResultsError> {
     let reserved = ["tables", "reduced", RUN];
     refuse_within_results(path, |within| {
@@ -229,15 +223,13 @@ fn refuse_within_results(
     path: &Path,
     is_refused: impl Fn(&Path) -> bool,
 ) -> Result<(), ResultsError> {
-    let place = resolved(path)?;
-    for whole in [path, &place] {
-        let mut above = whole.ancestors().take_while(|above| !above.ends_with(".."));
-        let found =
-            above.find(|root| whole.strip_prefix(root).is_ok_and(&is_refused) && is_results(root));
-        if let Some(root) = found {
-            let root = shown(root);
-            let problem = format!("lies in the results directory {root}; choose another place");
-            return Err(ResultsError::refused(path, problem));
+    for whole in [path, &resolved(path)?] {
+        for root in whole.ancestors().take_while(|above| !above.ends_with("..")) {
+            if whole.strip_prefix(root).is_ok_and(&is_refused) && is_results(root) {
+                let root = shown(root);
+                let problem = format!("lies in the results directory {root}; choose another place");
+                return Err(ResultsError::refused(path, problem));
+            }
         }
     }
     Ok(())
@@ -248,7 +240,7 @@ fn is_results(folder: &Path) -> bool {
     extensions.is_ok_and(|numbers| !numbers.is_empty())
 }
 
-/// A path without links and `..`, also of what is not there yet.
+/// A path without links and `..`, whether or not it exists.
 fn resolved(path: &Path) -> Result<PathBuf, ResultsError> {
     let here = if path == "" { Path::new(".") } else { path };
     let found = fs::canonicalize(here).map_err(StorageError::at("look up", path));

@@ -1,4 +1,4 @@
-//! A results directory as it was found: opened once, valid from then on. Any version is read; only this one is run.
+//! A results directory as it was found: opened once, valid from then on. Any version is read; only the current one is run.
 
 use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
@@ -16,25 +16,22 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
-/// for, since other processes may be at work on it.
+/// A results directory: where it lies, and which sweeps it belongs to. Finished parts are looked up each time.
 #[derive(Clone, Debug)]
 pub struct Results<'a> {
     layout: Layout<'a>,
     records: Vec<Record>,
-    /// At least one; the last is that of the sweep that was asked for last.
+    /// At least one; the last belongs to the current sweep.
     extensions: Vec<Extension>,
     /// What the footers of the parts of each extension hold beside program and place.
     footers: Vec<Arc<Footer>>,
 }
 
-/// What is wrong with the name of a table file.
 pub(super) const STRANGER: &str =
     "no part of this directory has this name, and readers of the folder would take it for one";
 
 impl<'a> Results<'a> {
-    /// Opens the directory of a sweep for a worker: begins it, resumes it, or extends it.
-    /// Nothing is written if the directory is refused.
+    /// Begins, resumes or extends the directory of a sweep. Nothing is written if it is refused.
     fn open(member: &Member<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         let layout = member.layout();
         loop {
@@ -43,8 +40,8 @@ impl<'a> Results<'a> {
                 found.write_copies(|| Ok(member.commit()))?;
                 return Ok(found);
             }
-            // In this order: a worker that was taken for dead and lives can commit nothing any more, and what it has left of
-            // parts that are not done must not stay, since their jobs now belong to the new sweep.
+            // In this order: a living worker that was taken for dead can commit nothing any more. Its files of unfinished
+            // parts must go, since their jobs now belong to the new sweep.
             member.tidy()?;
             let done = found.done_parts()?;
             found.remove_unfinished(&done)?;
@@ -54,8 +51,7 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Joins the workers on the directory of a sweep, opens it, and is one of them while `body` runs. Nothing is written if
-    /// the directory is refused.
+    /// Opens the directory of a sweep as one of its workers, while `body` runs. Nothing is written if it is refused.
     pub fn join<T, E: From<ResultsError>>(
         layout: &Layout<'a>,
         sweep: &Sweep,
@@ -63,25 +59,21 @@ impl<'a> Results<'a> {
         body: impl FnOnce(&Member<'a>, &Self) -> Result<T, E>,
     ) -> Result<T, E> {
         Self::look(layout, sweep)?.done_parts()?;
-        layout
-            .storage
-            .ensure_folder(layout.root())
-            .map_err(ResultsError::from)?;
+        let folder = layout.storage.ensure_folder(layout.root());
+        folder.map_err(ResultsError::from)?;
         workers::join(layout, sweep, threads, |member| {
             let opened = Self::open(member, sweep);
-            let ended = opened
-                .clone()
-                .map_err(E::from)
-                .and_then(|results| body(member, &results));
+            let ended = match &opened {
+                Ok(results) => body(member, results),
+                Err(error) => Err(error.clone().into()),
+            };
             if ended.is_ok() {
                 return ended;
             }
-            // That the directory was moved, or that others have taken over, says more than what was not found in it.
+            // A directory that was moved, or taken over by others, explains any other error.
             let moved = opened.ok().and_then(|results| results.check_place().err());
-            match moved
-                .filter(|moved| moved.kind == ErrorKind::Refused)
-                .or_else(|| member.burial())
-            {
+            let moved = moved.filter(|moved| moved.kind == ErrorKind::Refused);
+            match moved.or_else(|| member.burial()) {
                 Some(reason) => Err(reason.into()),
                 None => ended,
             }
@@ -98,7 +90,7 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Reads a directory as it is, of whatever versions: what it holds is there, and can be read.
+    /// Reads a directory of any version.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
         let results = Self::new(layout, extension_file::read(layout)?.records)?;
         if results.records.is_empty() {
@@ -108,7 +100,7 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Reads a directory whose plan is that of this program: it can be told what is missing.
+    /// Reads a directory whose plan is that of this program, so that missing jobs are known.
     pub fn read_plan(layout: &Layout<'a>) -> Result<Self, ResultsError> {
         let results = Self::read(layout)?;
         results.refuse(
@@ -120,16 +112,14 @@ impl<'a> Results<'a> {
 
     pub(super) fn new(layout: &Layout<'a>, records: Vec<Record>) -> Result<Self, ResultsError> {
         let extensions = extension_file::extensions(layout, &records)?;
-        let footers = records
-            .iter()
-            .zip(&extensions)
-            .map(|(record, extension)| Arc::new(record.footer(extension.sweep.name())))
-            .collect();
+        let all = records.iter().zip(&extensions);
+        let footers =
+            all.map(|(record, extension)| Arc::new(record.footer(extension.sweep.name())));
         Ok(Self {
             layout: layout.clone(),
+            footers: footers.collect(),
             records,
             extensions,
-            footers,
         })
     }
 
@@ -152,40 +142,46 @@ impl<'a> Results<'a> {
                            with --out, or see what `stickslip verify` says of it";
             return Err(ResultsError::refused(layout.root(), problem));
         }
-        let mut differences = found.version_differences();
-        differences.extend(found.sweep().differences(sweep));
+        found.refuse_differences(sweep)?;
+        Ok(found)
+    }
+
+    /// Refuses a sweep with other versions, settings or recording, and values that look like those of existing results.
+    fn refuse_differences(&self, sweep: &Sweep) -> Result<(), ResultsError> {
+        let mut differences = self.version_differences();
+        differences.extend(self.sweep().differences(sweep));
         let mut way_out = "choose another directory with --out, or undo the change".to_owned();
-        let [before, now] = [found.sweep(), sweep].map(|sweep| sweep.recording().slips);
+        let [before, now] = [self.sweep(), sweep].map(|sweep| sweep.recording().slips);
         if let (Some(before), Some(now)) = (before, now)
             && differences.len() == 1
             && now > before
         {
             way_out = format!(
-                "for more slips add seeds here and keep slips = {before}, or choose another directory with --out; both cost the \
-                 same, as no job can go on where it ended"
+                "for more slips add seeds here and keep slips = {before}, or choose another directory with --out: a \
+                 finished job cannot be lengthened"
             );
         }
-        found.refuse(&differences, &way_out)?;
-        if !found.is_of(sweep) {
-            let done = found.done_parts()?.0;
-            let has_results = |number| done.iter().any(|part| part.extension == number);
-            let known = (0..found.extensions.len()).filter(|number| has_results(*number));
-            let twin = |number: usize| sweep.twin_of(&found.extensions[number].sweep);
-            if let Some(problem) = known.into_iter().find_map(twin) {
-                return Err(ResultsError::refused(layout.root(), problem));
-            }
+        self.refuse(&differences, &way_out)?;
+        if self.is_of(sweep) {
+            return Ok(());
         }
-        Ok(found)
+        let done = self.done_parts()?.0;
+        let has_results = |number| done.iter().any(|part| part.extension == number);
+        let mut known = (0..self.extensions.len()).filter(|number| has_results(*number));
+        match known.find_map(|number| sweep.twin_of(&self.extensions[number].sweep)) {
+            Some(problem) => Err(ResultsError::refused(self.layout.root(), problem)),
+            None => Ok(()),
+        }
     }
 
-    /// Whether this sweep was the one asked for last.
+    /// Whether this is the current sweep.
     pub(super) fn is_of(&self, sweep: &Sweep) -> bool {
         self.extensions
             .last()
             .is_some_and(|last| last.sweep.text() == sweep.text())
     }
 
-    /// In what versions differ from those of this program. There is one extension at least.
+    /// Differences of versions from those of this program.
     pub(super) fn version_differences(&self) -> Vec<String> {
         let all = self.records.iter().zip(&self.extensions);
         all.map(|(record, extension)| record.difference(&extension.sweep))
@@ -204,8 +200,7 @@ impl<'a> Results<'a> {
         Err(ResultsError::refused(self.layout.root(), problem))
     }
 
-    /// The same with this sweep after the others: what is done stays where it is; what is not belongs to the new sweep, or to
-    /// none. Walks through the plan.
+    /// The same with this sweep after the others, which keep their finished parts. Walks through the plan.
     fn extended(&self, sweep: &Sweep, done: &DoneParts) -> Self {
         let last = self.extensions.len().checked_sub(1);
         let kept = last.map(|last| Plan::new(&self.extensions).ranges(last, |part| done.has(part)));
@@ -243,7 +238,7 @@ impl<'a> Results<'a> {
         Ok(Some(self))
     }
 
-    /// Writes the files of extensions that are lost, or that a killed worker did not come to. Another may do so at once.
+    /// Writes missing files of extensions. Another worker may do so at the same time.
     pub(super) fn write_copies(
         &self,
         begin: impl Fn() -> Result<Commit<'a>, StorageError>,
@@ -251,10 +246,8 @@ impl<'a> Results<'a> {
         let listed = self.layout.listed_extensions()?;
         for (number, record) in self.records.iter().enumerate() {
             for file in self.layout.files_of_extension(number) {
-                if !listed
-                    .get(&number)
-                    .is_some_and(|there| there.contains(&file))
-                {
+                let there = listed.get(&number);
+                if !there.is_some_and(|there| there.contains(&file)) {
                     self.layout.ensure_folder(&self.layout.copies())?;
                     begin()?.create_new(&file, record.text().as_bytes())?;
                 }
@@ -263,8 +256,7 @@ impl<'a> Results<'a> {
         Ok(())
     }
 
-    /// Makes sure that the directory is still the one that was opened. Another that has taken its place belongs to other
-    /// sweeps, so rows of these must not get into it.
+    /// Makes sure that the directory is still the one that was opened: another one must not get rows of its sweeps.
     pub fn check_place(&self) -> Result<(), ResultsError> {
         let last = self.records.len() - 1;
         for file in self.layout.files_of_extension(last) {
@@ -296,22 +288,20 @@ impl<'a> Results<'a> {
         Ok(parts)
     }
 
-    /// All files of a table as they are now, each of them that of a part.
+    /// The files of all parts in a table.
     pub fn dataset(&self, table: &str) -> Result<Dataset<'a>, ResultsError> {
-        let files = self
-            .parts_of(table)?
-            .into_iter()
-            .map(|part| self.file_in(&self.layout.tables(), table, part));
+        let tables = self.layout.tables();
+        let parts = self.parts_of(table)?.into_iter();
+        let files = parts.map(|part| self.file_in(&tables, table, part));
         Ok(Dataset::of(self.layout.storage, files.collect()))
     }
 
-    /// The file of a part in a table, as a dataset.
     pub(super) fn dataset_of(&self, table: &str, part: PartName) -> Dataset<'a> {
         let file = self.file_in(&self.layout.tables(), table, part);
         Dataset::of(self.layout.storage, vec![file])
     }
 
-    /// The file of a part of a table, below the tables or what is spilled of them.
+    /// The file of a part of a table, below the tables or the spill.
     pub(super) fn file_in(&self, place: &Path, table: &str, part: PartName) -> DataFile {
         DataFile {
             path: place.join(table).join(part.file()),
@@ -320,46 +310,34 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Looks up which parts are done.
     pub fn done_parts(&self) -> Result<DoneParts, ResultsError> {
-        let tables: Vec<&str> = if self.extensions.is_empty() {
-            Vec::new()
-        } else {
-            self.tables().collect()
-        };
-        // The jobs first: whoever has its jobs there has had the rest there before.
-        let parts = tables
-            .into_iter()
-            .rev()
-            .map(|table| self.parts_of(table))
-            .collect::<Result<Vec<_>, _>>()?;
-        Ok(DoneParts(
-            parts
-                .into_iter()
-                .reduce(|done, parts| &done & &parts)
-                .unwrap_or_default(),
-        ))
+        if self.extensions.is_empty() {
+            return Ok(DoneParts::default());
+        }
+        // The jobs first: a part that has its jobs had its other files before.
+        let mut done: Option<BTreeSet<PartName>> = None;
+        for table in self.tables().rev() {
+            let parts = self.parts_of(table)?;
+            done = Some(done.map_or(parts.clone(), |done| &done & &parts));
+        }
+        Ok(DoneParts(done.unwrap_or_default()))
     }
 
-    /// Removes what earlier runs have left of parts that are not done: files of some of their tables, and spilled jobs.
+    /// Removes what earlier runs left of unfinished parts: files of some of their tables, and spilled jobs.
     fn remove_unfinished(&self, done: &DoneParts) -> Result<(), StorageError> {
-        let (layout, storage) = (&self.layout, self.layout.storage);
-        for table in TABLES {
-            for (folder, is_spill) in [
-                (layout.table(table), false),
-                (layout.spill().join(table), true),
-            ] {
-                let mut parts: Vec<_> = layout.parts_in(&folder)?.into_iter().collect();
-                // Whoever begins the same sweep at once may be at the parts of the next extension.
-                parts.retain(|part| {
-                    part.extension < self.extensions.len() && (is_spill || !done.0.contains(part))
-                });
+        let layout = &self.layout;
+        let spill = layout.spill();
+        for above in [layout.tables(), spill.clone()] {
+            for folder in TABLES.map(|table| above.join(table)) {
+                let mut parts = layout.parts_in(&folder)?;
+                // A worker that begins the same sweep now may run parts of the next extension.
+                parts.retain(|part| part.extension < self.extensions.len());
+                parts.retain(|part| above == spill || !done.0.contains(part));
                 for part in &parts {
-                    layout.refuse_link(&folder.join(part.file()))?;
-                    storage.remove(&folder.join(part.file()))?;
+                    layout.remove(&folder.join(part.file()))?;
                 }
                 if !parts.is_empty() {
-                    storage.sync_folder(&folder)?;
+                    layout.storage.sync_folder(&folder)?;
                 }
             }
         }
@@ -369,16 +347,14 @@ impl<'a> Results<'a> {
     /// Refuses folders on another disk than that of the staging folder, as no file could be moved to them.
     pub fn check_disks(&self) -> Result<(), ResultsError> {
         let layout = &self.layout;
-        let above = [
+        let mut folders = vec![
             layout.tables(),
             layout.spill(),
             layout.reduced(),
             layout.figures(),
         ];
-        for folder in above
-            .into_iter()
-            .chain(TABLES.map(|table| layout.table(table)))
-        {
+        folders.extend(TABLES.map(|table| layout.table(table)));
+        for folder in folders {
             if !layout.storage.is_one_disk(&layout.staging(""), &folder) {
                 let problem = "is on another disk or mount than run/staging, and no file can be moved to it as a whole; \
                                make it a plain folder, or place the whole results directory on the other disk with --out";
@@ -388,8 +364,7 @@ impl<'a> Results<'a> {
         Ok(())
     }
 
-    /// Moves staged files to their targets, if the directory is still in its place. Should it be moved after this check,
-    /// the staged files, which lie in it, are not found.
+    /// Moves staged files to their targets, if the directory, in which they lie, is still in its place.
     pub fn publish(&self, commit: Commit<'_>) -> Result<(), ResultsError> {
         self.check_place()?;
         Ok(commit.publish()?)
@@ -403,17 +378,16 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Where it and everything in it lie.
     pub const fn layout(&self) -> &Layout<'a> {
         &self.layout
     }
 
-    /// What was run here, one sweep after the other.
+    /// The sweeps that were run here, in order.
     pub fn extensions(&self) -> &[Extension] {
         &self.extensions
     }
 
-    /// The sweep that was asked for last.
+    /// The current sweep: the one that was run last.
     pub fn sweep(&self) -> &Sweep {
         &self.extensions[self.extensions.len() - 1].sweep
     }
@@ -427,7 +401,7 @@ impl<'a> Results<'a> {
         Footer::default().and(&self.footers[extension]).at(file)
     }
 
-    /// What the footers of files hold that are made from all tables: the sweep that was asked for last.
+    /// The footer of files that are made from all tables: it has the current sweep.
     pub fn footer_of_all(&self) -> Footer {
         Footer::default().with_sweep(self.sweep().name(), self.sweep().text())
     }
@@ -437,30 +411,28 @@ impl<'a> Results<'a> {
         tables_of(self.sweep().recording())
     }
 
-    /// The id of a job of a part.
     pub fn job_id(&self, part: &Part, position: usize) -> String {
         self.extensions[part.extension]
             .sweep
             .job_id(&part.jobs[position].parameters)
     }
 
-    /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a
-    /// folder, and the sync after it leaves names that are seen but would not survive a power cut.
+    /// Syncs the names of results, as a process may have been killed between a rename and the sync after it.
     pub fn sync_names(&self) -> Result<(), StorageError> {
-        for above in self.layout.root().ancestors().skip(1) {
-            // Most are not ours, and who made the folders in them synced them if that is possible at all.
-            let _ = self.layout.storage.sync_folder(above);
-        }
         let layout = &self.layout;
-        let tables = TABLES.map(|table| layout.table(table));
-        let above = [
+        for above in layout.root().ancestors().skip(1) {
+            // Most of these belong to others, and need not allow it.
+            let _ = layout.storage.sync_folder(above);
+        }
+        let mut folders = vec![
             layout.root().to_owned(),
             layout.run(),
             layout.copies(),
             layout.tables(),
         ];
-        for folder in above.into_iter().chain(tables) {
-            match self.layout.storage.sync_folder(&folder) {
+        folders.extend(TABLES.map(|table| layout.table(table)));
+        for folder in folders {
+            match layout.storage.sync_folder(&folder) {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 synced => synced?,
             }
@@ -473,13 +445,11 @@ impl<'a> Results<'a> {
 pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
     let storage = layout.storage;
     let holds_only = |folder: &Path, known: &[&str]| -> Result<bool, StorageError> {
-        let names = storage.list(folder)?;
-        Ok(names
-            .iter()
-            .all(|name| is_hidden(name) || known.iter().any(|known| name == known)))
+        let mut names = storage.list(folder)?.into_iter();
+        Ok(names.all(|name| is_hidden(&name) || known.iter().any(|known| name == *known)))
     };
     match holds_only(layout.root(), &[RUN]) {
-        // A file at this place is somebody else's.
+        // Another program's file stands in its place.
         Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(false),
         is_fresh => Ok(is_fresh? && holds_only(&layout.run(), &RUN_FOLDERS)?),
     }

@@ -1,9 +1,9 @@
 //! The files that say what the tables of a directory belong to: one for each extension, written once.
 //!
 //! `run/extension-EEE.json` holds versions, columns, the text of the sweep and all that decides which part has which job.
-//! Each holds the checksum of the one before, so the last one stands for all. `run/copies/` holds a second copy of each: the
-//! first that is whole counts. Both are made exclusively, the first one decides which worker was first; a worker that opens
-//! the directory writes the copies that are missing.
+//! Each holds the checksum of the file before, so the last one stands for all. `run/copies/` holds a second copy of each:
+//! the first that is whole counts. Both are made exclusively. The first file decides which worker was first; a worker that
+//! opens the directory writes missing copies.
 //!
 //! A sweep that differs from the last one in axes, conditions or bounds alone is a further extension; anything else, such
 //! as another model, solver, recording or version, is refused before anything is written.
@@ -45,7 +45,7 @@ pub(super) struct Record {
     part_cost: f64,
     /// The points that the extension before keeps from when this one began; all, if this is the next round of its sweep.
     kept_before: Option<Vec<RangeInclusive<u64>>>,
-    /// Of a sweep that decides for itself.
+    /// The round of an adaptive sweep.
     round: Option<Round>,
     /// Checksum of the file before.
     before: Option<String>,
@@ -59,18 +59,11 @@ struct Format {
     format: u32,
 }
 
-/// Names of the columns of each table of a sweep.
 fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
     let columns = |table: &str| {
         let schema = recorded_schema(table, sweep.recording());
-        (
-            table.to_owned(),
-            schema
-                .fields()
-                .iter()
-                .map(|field| field.name().clone())
-                .collect(),
-        )
+        let names = schema.fields().iter().map(|field| field.name().clone());
+        (table.to_owned(), names.collect())
     };
     tables_of(sweep.recording()).map(columns).collect()
 }
@@ -78,15 +71,11 @@ fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
 impl Record {
     /// That of this program for an extension which begins after these.
     pub fn new(
-        Extension {
-            sweep,
-            part_cost,
-            round,
-            ..
-        }: &Extension,
+        extension: &Extension,
         before: &[Self],
         kept_before: Option<Vec<RangeInclusive<u64>>>,
     ) -> Self {
+        let sweep = &extension.sweep;
         Self {
             format: FORMAT,
             program: PROGRAM.to_owned(),
@@ -95,15 +84,14 @@ impl Record {
             plan_version: PLAN_VERSION,
             identity: sweep.job_id(&Parameters::default()),
             tables: columns_of(sweep),
-            part_cost: *part_cost,
+            part_cost: extension.part_cost,
             kept_before,
-            round: round.clone(),
+            round: extension.round.clone(),
             before: before.last().map(|last| checksum::of_text(&last.text())),
             sweep: sweep.text().to_owned(),
         }
     }
 
-    /// The text of the file.
     pub fn text(&self) -> String {
         // It always has a form as JSON: it holds texts and numbers alone.
         checksum::to_json(self).unwrap_or_default()
@@ -116,11 +104,9 @@ impl Record {
             sweep: String::new(),
             ..self.clone()
         };
+        let rest = serde_json::to_string(&rest).unwrap_or_default();
         let footer = Footer::empty().with_sweep(name, &self.sweep);
-        footer.with(
-            "extension",
-            &serde_json::to_string(&rest).unwrap_or_default(),
-        )
+        footer.with("extension", &rest)
     }
 
     /// In what it differs from that of this program for the same sweep.
@@ -138,16 +124,15 @@ impl Record {
         compare("plan version", &plan, &PLAN_VERSION.to_string());
         // Versions enter it.
         if differences.is_empty() && self.identity != sweep.job_id(&Parameters::default()) {
+            let program = shown_text(&self.program);
             differences.push(format!(
-                "ids of jobs: those of {} -> others of this program",
-                shown_text(&self.program)
+                "ids of jobs: those of {program} -> others of this program"
             ));
         }
         for (name, after) in &columns_of(sweep) {
-            let Some(before) = self.tables.get(name) else {
-                continue;
-            };
-            if before != after {
+            if let Some(before) = self.tables.get(name)
+                && before != after
+            {
                 let gone: Vec<_> = before.iter().filter(|name| !after.contains(name)).collect();
                 let new: Vec<_> = after.iter().filter(|name| !before.contains(name)).collect();
                 differences.push(format!(
@@ -179,10 +164,10 @@ impl Record {
             return Err(ResultsError::refused(path, problem));
         }
         let record: Self = serde_json::from_str(&text).map_err(unreadable)?;
-        record
-            .check(number)
-            .map_err(|problem| damaged(problem.to_owned()))?;
-        Ok(record)
+        match record.problem(number) {
+            Some(problem) => Err(damaged(problem.to_owned())),
+            None => Ok(record),
+        }
     }
 
     /// Whether it is that of the extension after this one.
@@ -190,25 +175,22 @@ impl Record {
         self.before == Some(checksum::of_text(&before.text()))
     }
 
-    /// Looks whether a program can have written this as the file of the extension with this number.
-    fn check(&self, number: usize) -> Result<(), &'static str> {
+    /// Why no program can have written this as the file of the extension with this number.
+    fn problem(&self, number: usize) -> Option<&'static str> {
         let is_ordered = |ranges: &Vec<RangeInclusive<u64>>| {
+            let mut pairs = ranges.windows(2);
             ranges.iter().all(|range| range.start() <= range.end())
-                && ranges
-                    .windows(2)
-                    .all(|pair| pair[0].end() < pair[1].start())
+                && pairs.all(|pair| pair[0].end() < pair[1].start())
         };
-        let ranges = self
-            .kept_before
-            .iter()
-            .chain(self.round.iter().map(|round| &round.points));
-        match () {
-            () if self.before.is_some() != (number > 0) => Err("it is that of another extension"),
-            () if !(self.part_cost.is_finite() && self.part_cost >= 0.0) => {
-                Err("the cost of a part makes no sense")
-            }
-            () if !ranges.into_iter().all(is_ordered) => Err("its points are not in order"),
-            () => Ok(()),
+        let points = self.round.as_ref().map(|round| &round.points);
+        if self.before.is_some() != (number > 0) {
+            Some("it is that of another extension")
+        } else if !(self.part_cost.is_finite() && self.part_cost >= 0.0) {
+            Some("the cost of a part makes no sense")
+        } else if !self.kept_before.iter().chain(points).all(is_ordered) {
+            Some("its points are not in order")
+        } else {
+            None
         }
     }
 }
@@ -296,7 +278,7 @@ pub(super) fn extensions(
             }
         };
         if sweep.rounds().is_some() != record.round.is_some() {
-            let problem = "its sweep has rounds where it decides nothing, or none where it does";
+            let problem = "its sweep is adaptive and the file has no round, or the other way round";
             return Err(ResultsError::damaged(&layout.extension(number), problem));
         }
         if let Some(last) = extensions.last_mut() {

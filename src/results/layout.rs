@@ -1,4 +1,4 @@
-//! Layout of a results directory: where everything lies, and which parts are done, as names say it.
+//! Layout of a results directory: where everything lies, and which parts its names say are done.
 //!
 //! ```text
 //! results/<name>/tables/{slips,precursors,jobs}/part-EEE-FFFFFF.parquet   committed files only, at every instant
@@ -12,13 +12,13 @@
 //! ```
 //!
 //! EEE is the number of the extension, FFFFFF that of the part in it. Staging lies on the same file system as the tables,
-//! so that a rename moves a whole file at once, but outside their folders: a stray file of any name there breaks some
-//! reader.
+//! so that a rename moves a whole file at once, but outside their folders: a stray file there breaks some reader.
 
 use crate::sweep::{Outline, Sweep};
 use crate::table::error::ResultsError;
 use crate::table::file::FILE_EXTENSION;
-use crate::table::storage::{Storage, StorageError};
+use crate::table::shown::shown;
+use crate::table::storage::{Storage, StorageError, gone_is_fine};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::{OsStr, OsString};
 use std::fmt;
@@ -28,20 +28,18 @@ use std::time::{Duration, Instant};
 
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
-/// Folder of the results directories that nobody placed elsewhere.
+/// Default folder of results directories.
 const RESULTS: &str = "results";
 pub const RUN_FOLDERS: [&str; 8] = [
     "staging", "lock", "log", "workers", "claims", "spill", "batch", "deaths",
 ];
-/// What the name of an extension's file begins with.
 const EXTENSION: &str = "extension-";
 
-/// Paths within a results directory, and the storage on which it lies.
 #[derive(Clone)]
 pub struct Layout<'a> {
     pub storage: &'a dyn Storage,
     root: PathBuf,
-    /// Where what is made from the tables lies, if not in the directory.
+    /// Where reduced data lie, if not in the directory.
     elsewhere: Option<PathBuf>,
 }
 
@@ -70,7 +68,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// What reduced data, and what it takes to make them, lie below.
+    /// The folder of reduced data, and of what making them needs.
     fn reduced_root(&self) -> &Path {
         self.elsewhere.as_deref().unwrap_or(&self.root)
     }
@@ -84,37 +82,36 @@ impl<'a> Layout<'a> {
         &self.root
     }
 
-    /// A directory that is none of ours, for those who look at one.
+    /// The error of a command that reads results where there are none.
     pub(super) fn no_results(&self) -> ResultsError {
         let is_there = self.storage.exists(&self.root).unwrap_or(true);
-        let problem = if is_there {
-            "is no results directory (it has no run/extension-000.json)"
+        let is_sweep = self.root.extension().is_some_and(|ending| ending == "toml");
+        let problem = if is_there && is_sweep {
+            let name = Path::new(RESULTS).join(self.root.file_stem().unwrap_or_default());
+            format!("is a sweep file; did you mean {}?", shown(&name))
+        } else if is_there {
+            format!(
+                "is no results directory (it has no run/extension-000.json); name one that a run made, such as {RESULTS}/fig3"
+            )
         } else {
-            "there is no such directory"
+            format!("there is no such directory; name one that a run made, such as {RESULTS}/fig3")
         };
-        ResultsError::refused(
-            &self.root,
-            format!("{problem}; name one that a run made, such as {RESULTS}/fig3"),
-        )
+        ResultsError::refused(&self.root, problem)
     }
 
     pub fn table(&self, name: &str) -> PathBuf {
         self.tables().join(name)
     }
 
-    /// The names in a folder; none where a file lies on the way, which is somebody else's.
+    /// The names in a folder; none where another program's file stands in its place.
     fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
-        self.storage.list(folder).or_else(|error| {
-            if error.is_missing() {
-                Ok(Vec::new())
-            } else {
-                Err(error)
-            }
-        })
+        match self.storage.list(folder) {
+            Err(error) if error.is_missing() => Ok(Vec::new()),
+            names => names,
+        }
     }
 
-    /// The names of table files in a folder. What file managers, network file systems and other programs leave there is
-    /// passed over: hidden names, and those with another ending.
+    /// The names of table files in a folder. Hidden names and other endings, which other programs leave, are passed over.
     pub fn table_files(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
         let mut names = self.names_in(folder)?;
         names.retain(|name| is_table_file(name));
@@ -123,14 +120,13 @@ impl<'a> Layout<'a> {
 
     /// The parts that have a file in a folder.
     pub(super) fn parts_in(&self, folder: &Path) -> Result<BTreeSet<PartName>, StorageError> {
-        Ok(self
-            .names_in(folder)?
-            .into_iter()
+        let names = self.names_in(folder)?.into_iter();
+        Ok(names
             .filter_map(|name| PartName::of_path(name.as_ref()))
             .collect())
     }
 
-    /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.
+    /// Creates a folder of the directory, which must be there: a directory that was moved away is not begun again.
     pub fn ensure_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.storage
             .ensure_folder_below(self.reduced_root(), folder)
@@ -148,7 +144,6 @@ impl<'a> Layout<'a> {
         self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
     }
 
-    /// What is known of an extension.
     pub fn extension(&self, number: usize) -> PathBuf {
         self.run().join(extension_name(number))
     }
@@ -158,8 +153,7 @@ impl<'a> Layout<'a> {
         [self.run(), self.copies()].map(|folder| folder.join(extension_name(number)))
     }
 
-    /// The files of extensions that the folders list, by their numbers, copies last: a network file system may not yet find
-    /// them by their names.
+    /// The listed files of extensions, by number, copies last. A network file system may list a file before it finds it.
     pub(super) fn listed_extensions(&self) -> Result<BTreeMap<usize, Vec<PathBuf>>, StorageError> {
         // In this order: where a copy is listed, its first file was there before.
         let copies = self.names_in(&self.copies())?;
@@ -175,17 +169,22 @@ impl<'a> Layout<'a> {
         Ok(listed)
     }
 
-    /// Refuses to remove something through a link below the root: where it leads may be somebody else's.
+    /// Removes a file, unless a link below the root leads to it, whose target may belong to somebody else.
+    pub fn remove(&self, path: &Path) -> Result<(), StorageError> {
+        self.refuse_link(path)?;
+        gone_is_fine(self.storage.remove(path))
+    }
+
+    /// Refuses a path through a link below the root.
     pub fn refuse_link(&self, path: &Path) -> Result<(), StorageError> {
         let roots = [self.root.as_path(), self.reduced_root()];
         let folders = path.ancestors().skip(1);
         let mut below = folders.take_while(|folder| !roots.contains(folder));
-        below
-            .find(|folder| folder.is_symlink())
-            .map_or(Ok(()), |link| {
-                let problem = io::Error::other("it is a link; put the folder itself in its place");
-                Err(StorageError::at("remove anything in it", link)(problem))
-            })
+        if let Some(link) = below.find(|folder| folder.is_symlink()) {
+            let problem = io::Error::other("it is a link; put the folder itself in its place");
+            return Err(StorageError::at("remove anything in it", link)(problem));
+        }
+        Ok(())
     }
 
     /// Where one writer, known by a name of its own, prepares files.
@@ -194,16 +193,14 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Whether a name is one that no program means to be read, by what most take for such.
+/// Whether most programs pass over a file of this name.
 pub(super) fn is_hidden(name: &OsStr) -> bool {
     matches!(name.as_encoded_bytes().first(), Some(b'.' | b'_'))
 }
 
 pub(super) fn is_table_file(name: &OsStr) -> bool {
-    !is_hidden(name)
-        && Path::new(name)
-            .extension()
-            .is_some_and(|ending| ending == FILE_EXTENSION)
+    let extension = Path::new(name).extension();
+    !is_hidden(name) && extension.is_some_and(|extension| extension == FILE_EXTENSION)
 }
 
 fn extension_name(number: usize) -> String {
@@ -212,11 +209,8 @@ fn extension_name(number: usize) -> String {
 
 fn extension_number(name: &OsStr) -> Option<usize> {
     let name = name.to_str()?;
-    let number = name
-        .strip_prefix(EXTENSION)?
-        .strip_suffix(".json")?
-        .parse()
-        .ok()?;
+    let digits = name.strip_prefix(EXTENSION)?.strip_suffix(".json")?;
+    let number = digits.parse().ok()?;
     (extension_name(number) == name).then_some(number)
 }
 
@@ -306,20 +300,17 @@ impl DoneParts {
     }
 }
 
-/// How long to wait: longer than a network file system shows an old name, and the time between two looks.
-const LATE: Duration = if cfg!(test) {
-    Duration::from_millis(300)
-} else {
-    Duration::from_mins(1)
-};
-const PAUSE: Duration = if cfg!(test) {
-    Duration::ZERO
-} else {
-    Duration::from_millis(200)
-};
+/// A duration that is shorter in tests.
+pub const fn shorter_in_tests(usual: Duration, in_tests: Duration) -> Duration {
+    if cfg!(test) { in_tests } else { usual }
+}
 
-/// Looks until there is something to be seen, for a minute at most: a host of a network disk may not see yet what a folder
-/// lists.
+/// How long to wait for a file: longer than a network file system shows an old listing.
+const LATE: Duration = shorter_in_tests(Duration::from_mins(1), Duration::from_millis(300));
+/// Time between two looks.
+const PAUSE: Duration = shorter_in_tests(Duration::from_millis(200), Duration::ZERO);
+
+/// Looks again until something is found, for a minute at most: a host of a network disk may not see yet what a folder lists.
 pub(super) fn settled<T>(
     mut look: impl FnMut() -> Result<Option<T>, ResultsError>,
 ) -> Result<Option<T>, ResultsError> {

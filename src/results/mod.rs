@@ -3,36 +3,36 @@
 //! ```text
 //! tables.rs                   what is written: slips, precursors, jobs
 //! commit.rs                   files that appear whole or not at all
-//! layout.rs                   where everything lies, and what names say
+//! layout.rs                   where everything lies, and what names mean
 //! extension_file.rs           which sweeps the tables belong to
-//! directory.rs                a directory as it was found
+//! directory.rs                an opened directory
 //!   parts.rs                  the rows of a part, in all tables at once
 //!   pending.rs                what runs again
-//!   rounds.rs                 what a sweep that decides for itself runs next
-//!   workers.rs, claims.rs     who is at work, and at what
-//!   deaths.rs                 at what workers died
-//!   events.rs                 what happens, and its log
-//!   verify.rs                 what is damaged, and its repair
-//!   controls.rs               which rows belong to controls
-//!   export.rs                 a few large files for other tools
-//! destination.rs              files and folders outside of it, which a command writes
+//!   next_round.rs             what an adaptive sweep runs next
+//!   workers.rs, claims.rs     running workers, and the parts that they run
+//!   deaths.rs                 parts at which workers died
+//!   log.rs                    events of runs, and their log
+//!   verification.rs           damage, and its repair
+//!   joined.rs                 tables with columns of their jobs
+//!   exported.rs               a few large files for other tools
+//! destination.rs              files and folders outside of the data, which a command writes
 //! ```
 
 pub mod claims;
 pub mod commit;
-pub mod controls;
 pub mod deaths;
 pub mod destination;
 pub mod directory;
-pub mod events;
-pub mod export;
+pub mod exported;
 mod extension_file;
+pub mod joined;
 pub mod layout;
+pub mod log;
+pub mod next_round;
 pub mod parts;
 pub mod pending;
-pub mod rounds;
 pub mod tables;
-pub mod verify;
+pub mod verification;
 pub mod workers;
 
 pub use crate::table::error::{ErrorKind, ResultsError};

@@ -9,7 +9,7 @@ use crate::results::commit::Commit;
 use crate::results::directory::Results;
 use crate::results::layout::PartName;
 use crate::results::tables::{
-    self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow,
+    self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
     label, relabel,
 };
 use crate::results::workers::Member;
@@ -17,7 +17,7 @@ use crate::sweep::{Outline, Part};
 use crate::table::columns::{Table, columns};
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
-use crate::table::storage::{StorageError, gone_is_fine};
+use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -50,7 +50,6 @@ impl<'a> Results<'a> {
         Ok(Dataset::of(self.layout().storage, files))
     }
 
-    /// The file of a part in a table.
     pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
         self.layout().table(table).join(PartName::from(part).file())
     }
@@ -66,13 +65,8 @@ impl<'a> Results<'a> {
         let is_finished =
             |position: &usize| outcomes.contains_key(position) || spilled.contains(position);
         let spill = self.layout().spill();
-        self.write(
-            member,
-            part,
-            outcomes,
-            is_finished,
-            ((!spilled.is_empty()).then_some(&spill), &spill),
-        )
+        let from = (!spilled.is_empty()).then_some(&spill);
+        self.write(member, part, outcomes, is_finished, (from, &spill))
     }
 
     /// Commits a part. Jobs without an outcome keep the rows that they have, in the tables or, at these positions, spilled.
@@ -84,26 +78,20 @@ impl<'a> Results<'a> {
         outcomes: &Outcomes,
         spilled: &BTreeSet<usize>,
     ) -> Result<(), ResultsError> {
-        let (tables, spill) = (self.layout().tables(), self.layout().spill());
+        let tables = self.layout().tables();
+        let spill = self.layout().spill();
         let from = if spilled.is_empty() { &tables } else { &spill };
-        let keeps = outcomes.len() < part.jobs.len();
-        self.write(
-            member,
-            part,
-            outcomes,
-            |_| true,
-            (keeps.then_some(from), &tables),
-        )?;
-        if spilled.is_empty() {
-            Ok(())
-        } else {
-            Ok(self.remove_spilled(part)?)
+        let from = (outcomes.len() < part.jobs.len()).then_some(from);
+        self.write(member, part, outcomes, |_| true, (from, &tables))?;
+        if !spilled.is_empty() {
+            self.remove_spilled(part)?;
         }
+        Ok(())
     }
 
-    /// Removes what is spilled of those of these parts that are done, as who committed them may have died at that.
+    /// Removes spilled jobs of those of these parts that are done: the worker that committed them may have died before.
     pub fn tidy_spill(&self, parts: &[Outline]) -> Result<(), ResultsError> {
-        // All tables: who removed them may have been killed at that, too.
+        // All tables: a worker may also have died while it removed them.
         let mut spilled = HashSet::new();
         for table in self.tables() {
             spilled.extend(self.layout().parts_in(&self.layout().spill().join(table))?);
@@ -112,25 +100,23 @@ impl<'a> Results<'a> {
             return Ok(());
         }
         let done = self.done_parts()?;
-        let is_over = |part: &&Outline| spilled.contains(&PartName::from(*part)) && done.has(part);
-        Ok(parts
-            .iter()
-            .filter(is_over)
-            .try_for_each(|part| self.remove_spilled(part))?)
-    }
-
-    fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
-        // Jobs first: what is spilled without them is nothing.
-        for table in self.tables().rev() {
-            let file = self.file_in(&self.layout().spill(), table, part.into());
-            self.layout().refuse_link(&file.path)?;
-            gone_is_fine(self.layout().storage.remove(&file.path))?;
+        for part in parts {
+            if spilled.contains(&PartName::from(part)) && done.has(part) {
+                self.remove_spilled(part)?;
+            }
         }
         Ok(())
     }
 
-    /// Writes files of a part with some of its jobs: new rows of those with an outcome, the old ones of the others. From and to
-    /// are the tables or the spill.
+    fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
+        // Jobs first: without them the other files do not count.
+        self.tables().rev().try_for_each(|table| {
+            let file = self.file_in(&self.layout().spill(), table, part.into());
+            self.layout().remove(&file.path)
+        })
+    }
+
+    /// Writes files of a part, from and to the tables or the spill: new rows of jobs with an outcome, old ones of others.
     fn write(
         &self,
         member: &Member<'_>,
@@ -147,10 +133,8 @@ impl<'a> Results<'a> {
             .collect();
         let mut commit = member.commit();
         self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
-            outcome
-                .iter()
-                .flat_map(|result| &result.slips)
-                .try_for_each(|slip| writer.push(&(job, slip)))
+            let mut slips = outcome.iter().flat_map(|measured| &measured.slips);
+            slips.try_for_each(|slip| writer.push(&(job, slip)))
         })?;
         if sweep.recording().precursors {
             self.stage::<PrecursorRow<'_>>(
@@ -159,16 +143,14 @@ impl<'a> Results<'a> {
                 places,
                 &jobs,
                 |writer, job, outcome| {
-                    let mut precursors = outcome.iter().flat_map(|result| &result.precursors);
+                    let mut precursors = outcome.iter().flat_map(|measured| &measured.precursors);
                     precursors.try_for_each(|precursor| writer.push(&(job, precursor)))
                 },
             )?;
         }
         self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
-            writer.push(&(
-                relabel(job),
-                JobRecord::new(outcome.as_ref().map_err(String::as_str)),
-            ))
+            let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
+            writer.push(&(relabel(job), record))
         })?;
         self.publish(commit)
     }
@@ -182,14 +164,14 @@ impl<'a> Results<'a> {
         jobs: &'j Jobs<'_>,
         write: impl Fn(
             &mut TableWriter<R>,
-            &'j Label<DriveAndSeed>,
+            &'j JobLabel<DriveAndSeed>,
             &'j Outcome,
         ) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
         let file = |place: &PathBuf| self.file_in(place, R::NAME, PartName::from(&**part));
         let target = file(to).path;
-        // The tables are there from the beginning of a run on.
+        // A run makes the folder of the tables when it begins.
         let top = if *to == self.layout().spill() {
             &self.layout().run()
         } else {
@@ -197,15 +179,10 @@ impl<'a> Results<'a> {
         };
         storage.ensure_folder_below(top, &to.join(R::NAME))?;
         let kept = KeptRows::read(Dataset::of(storage, from.map(file).into_iter().collect()))?;
-        let left_out = self.extensions()[part.extension]
-            .sweep
-            .recording()
-            .left_out();
-        let mut writer = TableWriter::without(
-            &left_out,
-            commit.stage(&target)?,
-            &self.footer(part.extension, &target),
-        )?;
+        let sweep = &self.extensions()[part.extension].sweep;
+        let left_out = sweep.recording().left_out();
+        let footer = self.footer(part.extension, &target);
+        let mut writer = TableWriter::without(&left_out, commit.stage(&target)?, &footer)?;
         for (job, outcome) in jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,
@@ -217,7 +194,7 @@ impl<'a> Results<'a> {
 }
 
 /// The jobs of a part, those that were run with their outcomes.
-type Jobs<'a> = Vec<(Label<DriveAndSeed>, Option<&'a Outcome>)>;
+type Jobs<'a> = Vec<(JobLabel<DriveAndSeed>, Option<&'a Outcome>)>;
 
 columns! {
     /// What the jobs table says about the rows of a job in other tables.
@@ -230,8 +207,7 @@ columns! {
 }
 
 impl RowsOfJob {
-    /// How many rows the job has in a table. One that may run again, as it failed or was ended by a time limit, may have more:
-    /// a run that was killed while it replaced them left them, and the same command puts that right.
+    /// How many rows the job has in a table. A job that may run again may have more, which a killed run wrote.
     pub(super) fn count(&self, table: &str) -> RowCount {
         let rows = if table == tables::SLIPS {
             self.slips
@@ -273,16 +249,13 @@ impl KeptRows {
         let mut kept = Self::default();
         for batch in before.batches() {
             let batch = batch?;
+            let number = kept.batches.len();
             let mut begin = 0;
-            for rows in batch
-                .rows_of::<RowOfJob>()?
-                .chunk_by(|row, next| row.job_id == next.job_id)
-            {
+            let ids: Vec<RowOfJob> = batch.rows_of()?;
+            for rows in ids.chunk_by(|row, next| row.job_id == next.job_id) {
                 let end = begin + rows.len();
-                kept.by_job
-                    .entry(rows[0].job_id.clone())
-                    .or_default()
-                    .push((kept.batches.len(), begin..end));
+                let stretches = kept.by_job.entry(rows[0].job_id.clone()).or_default();
+                stretches.push((number, begin..end));
                 begin = end;
             }
             kept.batches.push(batch);

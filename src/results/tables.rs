@@ -78,7 +78,7 @@ impl Selection for All {
 }
 
 /// What every row says about its job: names, parameters, η.
-pub type Label<S> = (Names, Selected<S>, Loading);
+pub type JobLabel<S> = (Names, Selected<S>, Loading);
 
 /// Names of the tables, which are those of their folders.
 pub const SLIPS: &str = <SlipRow<'_> as Table>::NAME;
@@ -105,7 +105,7 @@ pub fn recorded_schema(table: &str, recording: &Recording) -> SchemaRef {
 }
 
 /// The label of a job of a sweep.
-pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
+pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> JobLabel<S> {
     (
         Names {
             job_id: sweep.job_id(parameters),
@@ -117,7 +117,7 @@ pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
 }
 
 /// The same label with other parameters.
-pub fn relabel<S, T>(label: &Label<S>) -> Label<T> {
+pub fn relabel<S, T>(label: &JobLabel<S>) -> JobLabel<T> {
     let (names, selected, loading) = label;
     (
         names.clone(),
@@ -126,9 +126,9 @@ pub fn relabel<S, T>(label: &Label<S>) -> Label<T> {
     )
 }
 
-pub type SlipRow<'a> = (&'a Label<DriveAndSeed>, &'a Slip);
-pub type PrecursorRow<'a> = (&'a Label<DriveAndSeed>, &'a Precursor);
-pub type JobRow = (Label<All>, JobRecord);
+pub type SlipRow<'a> = (&'a JobLabel<DriveAndSeed>, &'a Slip);
+pub type PrecursorRow<'a> = (&'a JobLabel<DriveAndSeed>, &'a Precursor);
+pub type JobRow = (JobLabel<All>, JobRecord);
 
 tables! {
     SlipRow<'_> = "slips", "One row per slip past start-up";

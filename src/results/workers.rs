@@ -1,17 +1,16 @@
-//! Workers: the processes that are at work on a directory, known to each other by a file each.
+//! Workers: the processes that run jobs of a directory, known to each other by a file each.
 //!
-//! `run/workers/<name>` says host, process and threads, and is rewritten every [`BEAT`] while the process lives
-//! and removed when it ends. On its own host a process is looked up; elsewhere it lives if its file is at most
-//! [`SILENCE`] older than the newest of one's own. Both times are the file server's, so no clocks are compared.
+//! `run/workers/<name>` holds host, process and threads. The worker writes it again every [`BEAT`], and removes it when it
+//! ends. On its own host a process is looked up. On another host it lives if its file is at most [`SILENCE`] older than
+//! that of the worker that looks: both times are the file server's, so no clocks are compared.
 //!
-//! A worker commits from its staging folder alone. Whoever takes over the work of one that it takes for dead, or begins
-//! another sweep, removes that folder first. So a worker that was suspended and wakes can commit nothing any more, and says
-//! why. All workers that live are at the same sweep: of two that join for different sweeps at once, one at least sees the
-//! other, and leaves.
+//! A worker commits from its staging folder alone. A worker that takes over the parts of a dead worker, or begins another
+//! sweep, removes the dead worker's folder first. So a suspended worker that wakes commits nothing, and reports why. All
+//! living workers run the same sweep: of two that join for different sweeps at once, one at least sees the other, and leaves.
 
 use crate::results::claims;
 use crate::results::commit::{Commit, own_number};
-use crate::results::layout::Layout;
+use crate::results::layout::{Layout, shorter_in_tests};
 use crate::sweep::Sweep;
 use crate::table::checksum;
 use crate::table::error::{ErrorKind, ResultsError};
@@ -28,17 +27,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant, SystemTime};
 
-pub const BEAT: Duration = if cfg!(test) {
-    Duration::from_secs(1)
-} else {
-    Duration::from_secs(5)
-};
-/// A worker of another host is dead if its file is older than one's own by this time.
-pub const SILENCE: Duration = if cfg!(test) {
-    Duration::from_secs(4)
-} else {
-    Duration::from_mins(1)
-};
+pub const BEAT: Duration = shorter_in_tests(Duration::from_secs(5), Duration::from_secs(1));
+/// A worker of another host is dead if its file is older by this time than the file of the worker that looks.
+pub const SILENCE: Duration = shorter_in_tests(Duration::from_mins(1), Duration::from_secs(4));
 pub(crate) const BEAT_THREAD: &str = "beat";
 /// What the names of workers, and of their staging folders, begin with.
 pub(super) const PREFIX: &str = "worker-";
@@ -53,21 +44,21 @@ pub struct Worker {
     pub host: String,
     /// Id of the process there.
     pub process: u32,
-    /// Which processes it can look up: those of the same boot and name space. Empty if that is not known.
+    /// Boot and name space of its processes, within which it can look them up. Empty if unknown.
     system: String,
-    /// When it began, in the ticks of its system: another process may get its id.
+    /// When it began, in the ticks of its system: a later process may have the same id.
     process_start: Option<u64>,
-    /// The directory that it works at, if its host says.
+    /// Its results directory, if its host tells directories apart.
     #[serde(default)]
     directory: Option<Directory>,
-    /// Checksum of the sweep file that it works at.
+    /// Checksum of its sweep file.
     sweep: String,
     pub threads: usize,
     /// Jobs that it has finished, in a second.
     pub jobs_per_second: f64,
 }
 
-/// What a host knows a directory by, wherever it is moved.
+/// What identifies a directory on a host, also once it was moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Directory {
     device: u64,
@@ -84,7 +75,7 @@ impl Directory {
     }
 }
 
-/// Names of the workers of this process, and their threads: one that died under a test leaves a file like a living one's.
+/// Names of the workers of this process, and their threads. In tests, a worker may die and its process live on.
 static OWN: Mutex<BTreeMap<String, ThreadId>> = Mutex::new(BTreeMap::new());
 
 fn own() -> MutexGuard<'static, BTreeMap<String, ThreadId>> {
@@ -119,10 +110,9 @@ impl Worker {
             return Some(false);
         }
         match (self.directory, directory) {
-            // The file of one that works at the original came with a copy.
+            // A copy of a directory has the files of the workers of the original.
             (Some(its), Some(here)) if its.device == here.device => Some(its.inode == here.inode),
-            // Another device may be another mount of the same directory: its beats decide, and taking a living worker
-            // for dead is worse than waiting.
+            // Another device may be another mount of the same directory: heartbeats decide.
             (Some(_), Some(_)) => None,
             _ => Some(true),
         }
@@ -132,16 +122,13 @@ impl Worker {
 /// Name of this host, or "unknown".
 pub fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    let name = name
-        .or_else(|| std::env::var("HOSTNAME").ok())
-        .or_else(|| std::env::var("COMPUTERNAME").ok());
-    let name = name
-        .map(|name| name.trim().to_owned())
-        .filter(|name| !name.is_empty());
-    name.unwrap_or_else(|| "unknown".to_owned())
+    let name = name.or_else(|| std::env::var("HOSTNAME").ok());
+    match name.as_deref().map(str::trim) {
+        None | Some("") => "unknown".to_owned(),
+        Some(name) => name.to_owned(),
+    }
 }
 
-/// The name of a host as names of files hold it.
 pub fn plain(host: &str) -> String {
     host.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-', "_")
 }
@@ -162,11 +149,9 @@ fn process_start(process: u32) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // Behind the name in brackets: state, ..., the 22nd field of all.
     let mut fields = status.rsplit_once(')')?.1.split_whitespace();
-    let has_ended = matches!(fields.next()?, "Z" | "X");
-    if has_ended {
-        None
-    } else {
-        fields.nth(18)?.parse().ok()
+    match fields.next()? {
+        "Z" | "X" => None,
+        _ => fields.nth(18)?.parse().ok(),
     }
 }
 
@@ -174,9 +159,9 @@ fn process_start(process: u32) -> Option<u64> {
 #[derive(Clone, Debug)]
 pub struct Living {
     pub worker: Worker,
-    /// When it was written, by the clock of the file system.
+    /// Its last heartbeat, by the clock of the file system.
     pub beat: SystemTime,
-    /// Whether that is certain, as the process was looked up.
+    /// Whether the process was looked up.
     pub is_certain: bool,
 }
 
@@ -185,7 +170,7 @@ pub struct Living {
 pub struct Member<'a> {
     layout: Layout<'a>,
     name: String,
-    /// A number that no other has.
+    /// A number that no other worker has.
     number: u64,
     worker: Worker,
     begin: Instant,
@@ -224,45 +209,46 @@ impl Layout<'_> {
         let mut living = BTreeMap::new();
         let directory = Directory::of(self.root());
         for name in self.storage.list(&self.workers())? {
-            let (name, path) = (
-                name.to_string_lossy().into_owned(),
-                self.workers().join(&name),
-            );
+            let path = self.workers().join(&name);
+            let name = name.to_string_lossy().into_owned();
             if !name.starts_with(PREFIX) || name.ends_with(NEW) {
                 continue;
             }
-            let read = || {
-                Ok::<_, StorageError>((self.storage.read(&path)?, self.storage.modified(&path)?))
+            let (text, beat) = match self.read_beat(&path) {
+                // The worker ends at this moment.
+                Err(error) if error.is_missing() || error.is_no_file() => continue,
+                // A worker whose file cannot be read may still be running.
+                found => found?,
             };
-            // A beat may have replaced it while it was read.
-            let is_stale =
-                |error: &StorageError| error.kind() == io::ErrorKind::StaleNetworkFileHandle;
-            let (text, beat) =
-                match read().or_else(|error| if is_stale(&error) { read() } else { Err(error) }) {
-                    // One that ends at this moment.
-                    Err(error) if error.is_missing() || error.is_no_file() => continue,
-                    // Who cannot be read may well be at work.
-                    found => found?,
-                };
-            // What a power cut left has no sense.
+            // A power cut can leave a file that does not parse.
             let Ok(worker) = serde_json::from_slice::<Worker>(&text) else {
                 continue;
             };
             let lives_here = worker.lives_here(&name, directory);
-            let is_recent =
-                || now.duration_since(beat).is_ok_and(|age| age < SILENCE) || beat > now;
-            if lives_here.unwrap_or_else(is_recent) {
+            let is_certain = lives_here.is_some();
+            let age = now.duration_since(beat).unwrap_or_default();
+            if lives_here.unwrap_or(age < SILENCE) {
                 living.insert(
                     name,
                     Living {
                         worker,
                         beat,
-                        is_certain: lives_here.is_some(),
+                        is_certain,
                     },
                 );
             }
         }
         Ok(living)
+    }
+
+    /// The text of a worker's file, and when it was written.
+    fn read_beat(&self, path: &Path) -> Result<(Vec<u8>, SystemTime), StorageError> {
+        let read = || Ok((self.storage.read(path)?, self.storage.modified(path)?));
+        read().or_else(|error: StorageError| match error.kind() {
+            // A heartbeat has replaced the file while it was read.
+            io::ErrorKind::StaleNetworkFileHandle => read(),
+            _ => Err(error),
+        })
     }
 }
 
@@ -281,19 +267,12 @@ impl<'a> Member<'a> {
             jobs: AtomicU64::new(0),
         };
         layout.ensure_folder(&layout.workers())?;
-        // First, so that nobody takes what follows for a dead one's.
+        // First, so that no other worker takes the staging folder for that of a dead worker.
         member.beat()?;
-        let folder = layout.ensure_folder(&member.staging());
-        let claim = || {
-            layout
-                .storage
-                .create(&member.claim())?
-                .write(member.name.as_bytes())
-        };
-        folder
-            .and_then(|()| claim())
-            .map_err(|error| member.burial().unwrap_or_else(|| error.into()))?;
-        Ok(member)
+        match member.stage_claim() {
+            Ok(()) => Ok(member),
+            Err(error) => Err(member.burial().unwrap_or_else(|| error.into())),
+        }
     }
 
     pub(super) const fn layout(&self) -> &Layout<'a> {
@@ -312,7 +291,6 @@ impl<'a> Member<'a> {
         self.layout.staging(&self.name)
     }
 
-    /// A file that holds its name.
     pub(super) fn claim(&self) -> PathBuf {
         self.staging().join(CLAIM)
     }
@@ -331,17 +309,14 @@ impl<'a> Member<'a> {
         };
         // It always has a form as JSON: it holds texts and numbers alone.
         let text = serde_json::to_string(&worker).unwrap_or_default();
-        let (storage, new) = (
-            self.layout.storage,
-            self.layout.workers().join(format!("{}{NEW}", self.name)),
-        );
+        let storage = self.layout.storage;
+        let new = self.layout.workers().join(format!("{}{NEW}", self.name));
         loop {
             // A beat that failed may have left it.
             let _ = storage.remove(&new);
             storage.create(&new)?.write(text.as_bytes())?;
             match storage.rename(&new, &self.file()) {
-                // A worker that does not see this one yet, nor any other, took it for a dead one's, and does so each time that
-                // it tidies up: a few times in its life.
+                // A worker that saw no other took it for that of a dead worker, which happens a few times at most.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => (),
                 renamed => return renamed,
             }
@@ -361,78 +336,82 @@ impl<'a> Member<'a> {
         Ok(living)
     }
 
-    /// Leaves if another is there that works at another sweep.
-    fn check_peace(&self) -> Result<(), ResultsError> {
-        let other = self
-            .others()?
-            .into_values()
-            .find(|other| other.worker.sweep != self.worker.sweep);
-        other.map_or(Ok(()), |Living { worker: Worker { host, process, .. }, .. }| {
-            let problem = format!(
-                "is being run by process {process} on {}, for another sweep file; wait for it or stop it, or choose another \
-                 directory with --out",
-                shown_text(&host)
-            );
-            Err(ResultsError::new(ErrorKind::Busy, self.layout.root(), problem))
-        })
+    /// Makes the staging folder, and the file whose links are the claims of this worker.
+    fn stage_claim(&self) -> Result<(), StorageError> {
+        self.layout.ensure_folder(&self.staging())?;
+        let mut claim = self.layout.storage.create(&self.claim())?;
+        claim.write(self.name.as_bytes())
     }
 
-    /// Why it can commit nothing any more, if others took it for dead: the listing is true also on a network disk.
+    /// Refuses to run beside a worker that runs another sweep.
+    fn check_peace(&self) -> Result<(), ResultsError> {
+        let mut others = self.others()?.into_values().map(|other| other.worker);
+        let Some(other) = others.find(|other| other.sweep != self.worker.sweep) else {
+            return Ok(());
+        };
+        let process = other.process;
+        let host = shown_text(&other.host);
+        let problem = format!(
+            "is being run by process {process} on {host}, for another sweep file; wait for it or stop it, or choose \
+             another directory with --out"
+        );
+        Err(ResultsError::new(
+            ErrorKind::Busy,
+            self.layout.root(),
+            problem,
+        ))
+    }
+
+    /// Why it can commit nothing any more, if others took it for dead. A listing is true also on a network disk.
     pub(super) fn burial(&self) -> Option<ResultsError> {
-        let is_listed = |folder: &Path, name: &str| {
-            self.layout
-                .storage
-                .list(folder)
-                .map_or(true, |names| names.iter().any(|there| there == name))
+        let is_listed = |folder: &Path, name: &str| match self.layout.storage.list(folder) {
+            Ok(names) => names.iter().any(|there| there == name),
+            Err(_) => true,
         };
         let is_buried = is_listed(&self.layout.run(), "staging")
             && !is_listed(&self.layout.staging(""), &self.name);
+        let silence = SILENCE.as_secs();
         let problem = format!(
-            "this worker gave no sign of life for over {} s, as on a machine that was suspended, so others have taken over \
-             its work; nothing that was committed is lost, and the same command goes on",
-            SILENCE.as_secs()
+            "this worker gave no sign of life for over {silence} s, as on a machine that was suspended, so others have \
+             taken over its work; nothing that was committed is lost, and the same command resumes"
         );
         is_buried.then(|| ResultsError::new(ErrorKind::Stopped, self.layout.root(), problem))
     }
 
-    /// Begins to prepare files for their places.
     pub(super) fn commit(&self) -> Commit<'a> {
         Commit::within(self.layout.storage, &self.staging())
     }
 
-    /// Removes what dead workers left, and marks the parts that they were at. Their claims go only once nobody else is there,
-    /// as another may have looked up what is done before they ended.
+    /// Removes what dead workers left, and marks the parts that they were running. Their claims go only once this worker is
+    /// alone: another may have looked up what is done before they ended.
     pub fn tidy(&self) -> Result<(), StorageError> {
-        let (layout, storage) = (&self.layout, self.layout.storage);
-        // In this order: whoever comes later is not in these lists, and whoever came before is among the living.
+        let layout = &self.layout;
+        let storage = layout.storage;
+        // Listed before the living, so that a worker that joins in between is not in these lists.
         let claims = storage.list(&layout.claims())?;
         let mut left = storage.list(&layout.workers())?;
         left.extend(storage.list(&layout.staging(""))?);
         let others = self.others()?;
-        let is_dead = |name: &str| {
-            let is_new = name.ends_with(NEW) && !others.is_empty();
-            name.starts_with(PREFIX) && !is_new && name != self.name && !others.contains_key(name)
-        };
-        for name in left
-            .iter()
-            .map(|name| name.to_string_lossy())
-            .filter(|name| is_dead(name))
-        {
+        for name in left {
+            let name = name.to_string_lossy();
+            let may_join = name.ends_with(NEW) && !others.is_empty();
+            let is_living = *name == self.name || others.contains_key(&*name);
+            if !name.starts_with(PREFIX) || may_join || is_living {
+                continue;
+            }
             layout.refuse_link(&layout.staging(&name))?;
             layout.mark_deaths(&name)?;
             storage.remove_folder(&layout.staging(&name))?;
             let file = layout.workers().join(&*name);
             if storage.exists(&file)? {
-                layout.refuse_link(&file)?;
-                gone_is_fine(storage.remove(&file))?;
+                layout.remove(&file)?;
             }
         }
         if others.is_empty() {
             layout.refuse_link(&layout.claims().join("any"))?;
-            claims
-                .iter()
-                .filter(|name| claims::claim(name).is_some())
-                .try_for_each(|claim| gone_is_fine(storage.remove(&layout.claims().join(claim))))?;
+            for claim in claims.iter().filter(|name| claims::claim(name).is_some()) {
+                gone_is_fine(storage.remove(&layout.claims().join(claim)))?;
+            }
         }
         Ok(())
     }
@@ -451,7 +430,7 @@ impl Drop for Member<'_> {
 pub(crate) mod tests {
     use super::*;
     use crate::results::ErrorKind;
-    use crate::results::claims::{Claims, Standing};
+    use crate::results::claims::{ClaimState, Claims};
     use crate::results::directory::Results;
     use crate::sweep::Sweep;
     use crate::table::storage::over_disk::{Access, OverDisk};
@@ -535,7 +514,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn who_was_killed_here_is_dead_at_once_and_elsewhere_after_a_silence() {
+    fn a_worker_killed_here_is_dead_at_once_and_elsewhere_after_a_silence() {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());
         let layout = results.layout();
@@ -563,7 +542,7 @@ pub(crate) mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn a_worker_that_cannot_be_read_may_live_and_what_is_no_file_is_none() {
+    fn a_worker_that_cannot_be_read_may_live_and_a_folder_is_no_worker() {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());
         join(&results, |member| {
@@ -681,9 +660,9 @@ pub(crate) mod tests {
             let standing = |claims: &Claims<'_>, member: &Member<'_>| match claims
                 .standing("part", &member.others().unwrap())
             {
-                Ok(Standing::Taken(owner)) => Err(owner.to_owned()),
-                Ok(Standing::Free(generation)) => Ok(Some(generation)),
-                Ok(Standing::Own) => Ok(None),
+                Ok(ClaimState::Taken(owner)) => Err(owner.to_owned()),
+                Ok(ClaimState::Free(generation)) => Ok(Some(generation)),
+                Ok(ClaimState::Own) => Ok(None),
                 Err(error) => panic!("{error}"),
             };
             assert_eq!(standing(&claims, first), Ok(None));

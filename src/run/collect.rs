@@ -1,13 +1,11 @@
-//! The collector: hands jobs to the threads, puts their outcomes together into parts, and commits them. It alone uses the
-//! disk.
+//! The collector hands jobs to the threads, puts their outcomes together into parts, and commits them. Only it uses the disk.
 
 use crate::results::ResultsError;
-use crate::results::layout::PartName;
+use crate::results::layout::{PartName, shorter_in_tests};
 use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
 use crate::run::take::{PartJob, Taken, Work};
-use crate::run::walltime::Walltime;
-use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, cpu, memory};
+use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, memory_limits, threads};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
 use std::any::Any;
@@ -20,28 +18,18 @@ use std::time::{Duration, Instant};
 
 /// How often the collector looks at the stop flag.
 const STOP_POLL: Duration = Duration::from_millis(if cfg!(test) { 2 } else { 20 });
-/// How often it lets the display know that time passes.
-const TICK: Duration = if cfg!(test) {
-    Duration::from_millis(20)
-} else {
-    Duration::from_secs(1)
-};
-/// How often it looks what others have done.
+/// Time between two ticks for the display.
+const TICK: Duration = shorter_in_tests(Duration::from_secs(1), Duration::from_millis(20));
+/// How often it counts the parts that others have done.
 const LOOK_AT_OTHERS: Duration = Duration::from_secs(10);
 /// A job is reported as long once it has run for this time and this multiple of its predicted cost, and again each time
 /// that its time has doubled.
-const LONG: Duration = if cfg!(test) {
-    Duration::from_millis(50)
-} else {
-    Duration::from_secs(5)
-};
+const LONG: Duration = shorter_in_tests(Duration::from_secs(5), Duration::from_millis(50));
 const LONG_BY_PREDICTION: f64 = 20.0;
-/// Threads have jobs in advance, to work on during a commit: as many as are predicted to take this time on each thread, in
-/// s, and at most [`MAX_AHEAD`] for each.
+/// Predicted time of the jobs that wait for each thread, to be run during a commit, in s; at most [`MAX_AHEAD`] jobs.
 const AHEAD: f64 = 0.5;
 const MAX_AHEAD: usize = 256;
 
-/// What becomes of a job.
 struct Ended {
     job: PartJob,
     /// `None` if it was interrupted.
@@ -49,14 +37,13 @@ struct Ended {
     time: JobTime,
 }
 
-/// What a job took, in s.
 #[derive(Clone, Copy, Debug, Default)]
 struct JobTime {
     cpu: f64,
     wall: f64,
 }
 
-/// A job that a worker is at.
+/// A job that a thread runs.
 struct UnderWay {
     job: PartJob,
     begin: Instant,
@@ -87,7 +74,7 @@ impl Out {
         self.cost -= job.job().cost;
         self.memory -= job.memory;
         if self.jobs == 0 {
-            // Without roundings, and what infinity leaves.
+            // Without rounding errors, or what infinity leaves.
             *self = Self::default();
         }
     }
@@ -105,7 +92,6 @@ struct OpenPart {
 pub(super) struct Collector<'a, 'e> {
     joined: &'a Joined<'a>,
     pending: &'a Pending<'a>,
-    walltime: &'a Walltime,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
     open: BTreeMap<(usize, u64), OpenPart>,
@@ -117,14 +103,12 @@ impl<'a, 'e> Collector<'a, 'e> {
     pub fn new(
         joined: &'a Joined<'a>,
         pending: &'a Pending<'a>,
-        walltime: &'a Walltime,
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
         Self {
             joined,
             pending,
-            walltime,
             events,
             report,
             open: BTreeMap::new(),
@@ -132,30 +116,27 @@ impl<'a, 'e> Collector<'a, 'e> {
         }
     }
 
-    /// Runs pending jobs until none is left for this worker, the flag turns true, the
-    /// time is over, or something fails that is not a job. Returns whether it took all that it could.
+    /// Runs pending jobs until none is left for this worker, the flag turns true, the time is over, or something other than
+    /// a job fails. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
+        let mut threads = self.joined.threads;
         let work = Work::new(
             self.pending,
             self.joined.member,
-            self.walltime,
-            self.joined.threads,
+            &self.joined.walltime,
+            threads,
         )?;
-        // Each thread takes address space of its own.
-        let threads = if work.is_all_alone() {
-            1
-        } else {
-            self.joined.threads
-        };
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|error| {
-                let problem =
-                    format!("cannot start {threads} threads: {error}; take fewer with --threads");
-                ResultsError::refused(self.pending.results.layout().root(), problem)
-            })?;
-        // Apart from the caller's flag, since an error here also ends the workers.
+        if work.is_all_alone() {
+            // Each thread takes address space.
+            threads = 1;
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|error| {
+            let problem =
+                format!("cannot start {threads} threads: {error}; take fewer with --threads");
+            ResultsError::refused(self.pending.results.layout().root(), problem)
+        })?;
+        // Not the caller's flag, as an error here also ends the threads.
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = channel();
@@ -163,7 +144,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             let hand_out = |job: PartJob| {
                 let sender = sender.clone();
                 workers.spawn(move |_| {
-                    // That nobody listens any more means that the run has ended.
+                    // Without a receiver the run has ended.
                     let _ = sender.send(run_job(job, kernel, interrupt, under_way));
                 });
             };
@@ -177,7 +158,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         Ok(all_run)
     }
 
-    /// Keeps the finished jobs of parts that are not whole.
+    /// Keeps the finished jobs of unfinished parts.
     fn spill(&mut self) -> Result<(), ResultsError> {
         for open in std::mem::take(&mut self.open).values() {
             if open.of.again {
@@ -213,13 +194,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         loop {
             if last_look.elapsed() >= LOOK_AT_OTHERS {
                 last_look = Instant::now();
-                let (jobs, cost) = self.pending.done_since()?;
-                let jobs = jobs.saturating_sub(self.own.0);
-                let predicted_cost = (cost - self.own.1).max(0.0);
-                self.events.send(&RunEvent::OthersDone {
-                    jobs,
-                    predicted_cost,
-                })?;
+                self.report_others()?;
             }
             if last_tick.elapsed() >= TICK {
                 last_tick = Instant::now();
@@ -244,13 +219,13 @@ impl<'a, 'e> Collector<'a, 'e> {
                     self.take(&job, Err(reason), JobTime::default())?;
                     continue;
                 }
-                if out.memory + memory::beside_threads(job.memory, threads) > free {
+                if out.memory + memory_limits::beside_threads(job.memory, threads) > free {
                     let is_limit = out.jobs < threads && job.memory.is_finite();
                     if is_limit && !std::mem::replace(&mut is_short_of_memory, true) {
-                        self.events.send(&RunEvent::ShortOfMemory {
-                            allowed: free - out.memory,
-                            needed: job.memory,
-                        })?;
+                        let allowed = free - out.memory;
+                        let needed = job.memory;
+                        self.events
+                            .send(&RunEvent::ShortOfMemory { allowed, needed })?;
                     }
                     if out.jobs > 0 {
                         work.put_back(job);
@@ -260,7 +235,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 out.add(&job);
                 hand_out(job);
             }
-            if !is_out_of_time && self.walltime.has_refused() {
+            if !is_out_of_time && self.joined.walltime.has_refused() {
                 is_out_of_time = true;
                 self.events.send(&RunEvent::OutOfTime)?;
             }
@@ -277,7 +252,6 @@ impl<'a, 'e> Collector<'a, 'e> {
         }
     }
 
-    /// Tells of jobs that take long.
     fn report_long_jobs(&mut self, under_way: &AllUnderWay) -> Result<(), ResultsError> {
         for long in locked(under_way).values_mut() {
             let elapsed = long.begin.elapsed();
@@ -292,6 +266,17 @@ impl<'a, 'e> Collector<'a, 'e> {
             }
         }
         Ok(())
+    }
+
+    /// Reports what other workers have done since the run began.
+    fn report_others(&mut self) -> Result<(), ResultsError> {
+        let (jobs, cost) = self.pending.done_since()?;
+        let jobs = jobs.saturating_sub(self.own.0);
+        let predicted_cost = (cost - self.own.1).max(0.0);
+        Ok(self.events.send(&RunEvent::OthersDone {
+            jobs,
+            predicted_cost,
+        })?)
     }
 
     fn take(&mut self, of: &PartJob, outcome: Outcome, time: JobTime) -> Result<(), ResultsError> {
@@ -341,17 +326,14 @@ impl<'a, 'e> Collector<'a, 'e> {
             .commit(self.joined.member, part, &whole.outcomes, spilled)?;
         let name = PartName::from(&**part);
         self.joined.member.end_part(name)?;
-        self.walltime
-            .committed(whole.of.begin.elapsed(), begin.elapsed());
+        let took = whole.of.begin.elapsed();
+        self.joined.walltime.committed(took, begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);
         }
         let jobs = whole.outcomes.len();
-        let failed = whole
-            .outcomes
-            .values()
-            .filter(|outcome| outcome.is_err())
-            .count();
+        let outcomes = whole.outcomes.values();
+        let failed = outcomes.filter(|outcome| outcome.is_err()).count();
         let report = &mut *self.report;
         report.parts_committed += 1;
         report.jobs_run += jobs as u64;
@@ -389,25 +371,20 @@ fn run_job(
             time: JobTime::default(),
         };
     }
-    let (begin, task) = (Instant::now(), job.job());
-    let long_after = Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost)
-        .unwrap_or(Duration::MAX)
-        .max(LONG);
-    let key = (job.of.part.extension, job.of.part.index, job.position);
-    locked(under_way).insert(
-        key,
-        UnderWay {
-            job: job.clone(),
-            begin,
-            long_after,
-        },
-    );
-    let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
-    locked(under_way).remove(&key);
-    let time = JobTime {
-        cpu,
-        wall: begin.elapsed().as_secs_f64(),
+    let begin = Instant::now();
+    let task = job.job();
+    let long_after = Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost);
+    let long = UnderWay {
+        job: job.clone(),
+        begin,
+        long_after: long_after.unwrap_or(Duration::MAX).max(LONG),
     };
+    let key = (job.of.part.extension, job.of.part.index, job.position);
+    locked(under_way).insert(key, long);
+    let (cpu, outcome) = threads::timed(|| outcome(task, kernel, interrupt));
+    locked(under_way).remove(&key);
+    let wall = begin.elapsed().as_secs_f64();
+    let time = JobTime { cpu, wall };
     Ended { job, outcome, time }
 }
 

@@ -1,42 +1,36 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
-//! take.rs     parts that are not there, in outline, claimed -> their jobs (walltime.rs: while there is time)
+//! take.rs     outlines of missing parts, claimed -> their jobs (walltime.rs: while there is time)
 //! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
-//! All but the kernel is done on the calling thread.
-//! What is done is what is committed, so a killed run resumes by looking which part files are missing. The same command,
-//! started several times, shares the parts.
-//! A sweep that decides for itself goes on in rounds: when all parts are done, who finds that first adds those of the next
-//! (`rounds/`), and nobody ends before the last.
+//! Only the kernel runs on other threads than the calling one.
+//! A killed run resumes by looking which part files are missing. The same command, started several times, shares the parts.
+//! An adaptive sweep runs in rounds: the worker that first finds all parts done adds those of the next round (`rounds/`),
+//! and no worker ends before the last round.
 //! Contract: the bytes of the tables depend on neither threads nor workers nor interruptions. Memory: the parts with a
 //! job in flight.
 
 mod collect;
-pub mod cpu;
-mod memory;
-mod reasons;
+mod memory_limits;
 mod shard;
-mod status;
+mod state;
 mod take;
-mod tally;
 #[cfg(test)]
 mod tests;
 pub mod threads;
 mod walltime;
 
-pub use crate::results::events::{RunEvent, RunReport};
+pub use crate::results::log::{RunEvent, RunReport};
 pub use crate::results::pending::Overview;
-pub use reasons::Reasons;
 pub use shard::Shard;
-pub use status::{Failure, MAX_FAILURES, Present, Status, status, status_with};
-pub use tally::Tally;
+pub use state::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status, status_with};
 
 use crate::observe::Measurements;
-use crate::results::claims::{Claims, Standing};
-use crate::results::events::Log;
+use crate::results::claims::{ClaimState, Claims};
 use crate::results::layout::Layout;
+use crate::results::log::Log;
 use crate::results::pending::{Pending, Retry};
 use crate::results::workers::{Member, host};
 use crate::results::{Results, ResultsError};
@@ -53,11 +47,11 @@ use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// What runs a job: until it is done, cannot continue, or the flag turns true, which is [`SimulationError::Interrupted`].
+/// Runs a job until it is done, cannot continue, or the flag turns true, which is [`SimulationError::Interrupted`].
 pub type Kernel<'a> =
     dyn Fn(&Job, &AtomicBool) -> Result<Measurements, SimulationError> + Sync + 'a;
 
-/// What the claim of the reduction is called, and the mark of one that has ended, which has its generation.
+/// Name of the claim of the reduction, and of the mark of a finished reduction, which has the generation of its claim.
 const REDUCTION: &str = "reduce";
 const REDUCED: &str = "reduced";
 
@@ -69,13 +63,13 @@ pub struct Options<'a> {
     pub stop: &'a AtomicBool,
     /// Whether to run failed jobs again.
     pub retry_failed: bool,
-    /// The share of the parts to look after.
+    /// The share of the parts to run.
     pub shard: Shard,
     /// Ends within this time after the run's beginning, and takes no part for which it is too short.
     pub walltime: Option<Duration>,
 }
 
-/// Who hears of events: the log, once there is one, and a display.
+/// Receivers of events: the log, once there is one, and a display.
 struct Events<'a> {
     log: Option<Log>,
     display: &'a mut dyn FnMut(&RunEvent),
@@ -88,7 +82,7 @@ impl Events<'_> {
     }
 }
 
-/// A worker at the results of a sweep.
+/// A worker that has joined the others on the directory of a sweep.
 pub struct Joined<'a> {
     results: &'a Results<'a>,
     parts: &'a [Outline],
@@ -101,7 +95,7 @@ pub struct Joined<'a> {
     options: Options<'a>,
 }
 
-/// Joins those who work on the directory of a sweep, while `body` runs.
+/// Joins the workers on the directory of a sweep, while `body` runs.
 pub fn join<T, E: From<ResultsError>>(
     layout: &Layout<'_>,
     sweep: &Sweep,
@@ -117,9 +111,8 @@ pub fn join<T, E: From<ResultsError>>(
     }
     Results::join(layout, sweep, threads, |member, results| {
         let parts: Vec<Outline> = options.shard.parts(results.plan().outlines()).collect();
-        layout
-            .ensure_folder(&layout.tables())
-            .map_err(ResultsError::from)?;
+        let tables = layout.ensure_folder(&layout.tables());
+        tables.map_err(ResultsError::from)?;
         results.check_disks()?;
         let ended = body(&Joined {
             results,
@@ -128,7 +121,7 @@ pub fn join<T, E: From<ResultsError>>(
             begin,
             walltime: Walltime::new(begin, options.walltime),
             threads,
-            allowed_memory: memory::allowed(),
+            allowed_memory: memory_limits::allowed(),
             options,
         })?;
         member
@@ -140,7 +133,7 @@ pub fn join<T, E: From<ResultsError>>(
 }
 
 impl Joined<'_> {
-    /// Runs jobs of the sweep that are not yet in the directory, beside the other workers, until none is left for this one.
+    /// Runs missing jobs of the sweep, beside other workers, until none is left for this worker.
     ///
     /// A job that fails or panics becomes a row with its reason. Events come on the calling thread.
     /// On an error, what was committed is kept, and the same command resumes.
@@ -151,20 +144,20 @@ impl Joined<'_> {
     ) -> Result<RunReport, ResultsError> {
         self.results.sync_names()?;
         self.member.tidy()?;
-        let (mut events, mut report) = (Events { log: None, display }, RunReport::default());
+        let mut events = Events { log: None, display };
+        let mut report = RunReport::default();
         let mut retry_failed = self.options.retry_failed;
         let mut round = (Cow::Borrowed(self.results), Cow::Borrowed(self.parts));
         loop {
             let (results, parts) = &round;
-            self.run_parts(
-                results,
-                parts,
-                retry_failed,
-                kernel,
-                &mut events,
-                &mut report,
-            )?;
-            // Those that failed in this run fail again.
+            let retry = Retry {
+                all: retry_failed,
+                memory: self.allowed_memory,
+            };
+            let pending = Pending::look_up(results, parts, retry)?;
+            self.run_parts(&pending, kernel, &mut events, &mut report)?;
+            results.tidy_spill(parts)?;
+            // Jobs that failed in this run would fail again.
             retry_failed = false;
             if report.jobs_left > 0 {
                 break;
@@ -198,25 +191,17 @@ impl Joined<'_> {
 
     /// Memory that all jobs together may take now, in bytes.
     fn memory(&self) -> f64 {
-        self.allowed_memory.min(memory::available())
+        self.allowed_memory.min(memory_limits::available())
     }
 
-    /// Runs the parts that are there now: all, or those of the rounds so far.
+    /// Runs the parts of the rounds so far.
     fn run_parts(
         &self,
-        results: &Results<'_>,
-        parts: &[Outline],
-        retry_failed: bool,
+        pending: &Pending<'_>,
         kernel: &Kernel<'_>,
         events: &mut Events<'_>,
         report: &mut RunReport,
     ) -> Result<(), ResultsError> {
-        let member = self.member;
-        let retry = Retry {
-            all: retry_failed,
-            memory: self.allowed_memory,
-        };
-        let pending = Pending::look_up(results, parts, retry)?;
         let mut jobs_again = 0;
         let mut cost_again = 0.0;
         let overview = pending.overview(false, |part, position, why| {
@@ -229,77 +214,101 @@ impl Joined<'_> {
         report.jobs_failed += jobs_again;
         report.jobs_left = overview.jobs_missing + jobs_again;
         if jobs_again > 0 {
-            // The reduction after these jobs: what another reduces meanwhile, or has reduced, lacks them.
-            let mut claims = Claims::list(member)?;
+            // What another worker reduces meanwhile, or has reduced, lacks these jobs.
+            let mut claims = Claims::list(self.member)?;
             while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
         }
-        if report.jobs_left > 0 {
-            let jobs = report.jobs_left;
-            let predicted_cost = overview.predicted_cost_missing + cost_again;
-            if let (Some(_), Some(rounds)) = (&events.log, results.rounds_so_far()) {
-                events.send(&RunEvent::RoundBegun {
-                    jobs,
-                    predicted_cost,
-                    rounds,
-                })?;
-            } else {
-                events.log = Some(results.begin_log()?);
-                events.send(&RunEvent::Started {
-                    host: host(),
-                    process: std::process::id(),
-                    program: PROGRAM.to_owned(),
-                    shard: self.options.shard.to_string(),
-                    others: member.others()?.len(),
-                    threads: self.threads,
-                    jobs,
-                    jobs_there: overview.jobs_done + overview.jobs_spilled + overview.jobs_failed
-                        - jobs_again,
-                    predicted_cost,
-                })?;
-            }
-            let mut collector = Collector::new(self, &pending, &self.walltime, events, report);
-            let ended = loop {
-                match collector.run(kernel) {
-                    Ok(true) => (),
-                    ended => break ended.map(|_| None),
-                }
-                let left = loop {
-                    match pending.left(member) {
-                        // There may be work for this one in the next round.
-                        Ok(Left {
-                            jobs: 1..,
-                            has_abandoned: false,
-                            ..
-                        }) if results.round().is_some() && !self.must_end() => {
-                            std::thread::sleep(LOOK);
-                        }
-                        left => break left,
-                    }
-                };
-                match left {
-                    // Their worker has died since this one looked.
-                    Ok(Left {
-                        has_abandoned: true,
-                        ..
-                    }) => (),
-                    Ok(Left { jobs: 1.., .. }) if self.must_end() => break Ok(None),
-                    left => break left.map(Some),
-                }
-            };
-            report.wall = self.begin.elapsed().as_secs_f64();
-            let left = ended.inspect_err(|error| {
-                // The disk may be what failed: the first error counts.
-                let _ = events.send(&RunEvent::Error {
-                    error: error.to_string(),
-                });
-            })?;
-            report.stopped = left.is_none() && report.jobs_left > 0;
-            if let Some(left) = left {
+        if report.jobs_left == 0 {
+            return Ok(());
+        }
+        let there = overview.jobs_done + overview.jobs_spilled + overview.jobs_failed - jobs_again;
+        let predicted_cost = overview.predicted_cost_missing + cost_again;
+        self.report_begin(
+            pending.results,
+            report.jobs_left,
+            there,
+            predicted_cost,
+            events,
+        )?;
+        let mut collector = Collector::new(self, pending, events, report);
+        let ended = self.collect(&mut collector, pending, kernel);
+        report.wall = self.begin.elapsed().as_secs_f64();
+        let left = ended.inspect_err(|error| {
+            // The disk may be what failed: the first error counts.
+            let _ = events.send(&RunEvent::Error {
+                error: error.to_string(),
+            });
+        })?;
+        match left {
+            None => report.stopped = report.jobs_left > 0,
+            Some(left) => {
+                report.stopped = false;
                 report.jobs_left = left.jobs;
                 report.hosts = left.hosts.into_iter().collect();
             }
         }
-        results.tidy_spill(parts)
+        Ok(())
+    }
+
+    /// Sends the event of a run, or a round, that begins.
+    fn report_begin(
+        &self,
+        results: &Results<'_>,
+        jobs: u64,
+        jobs_there: u64,
+        predicted_cost: f64,
+        events: &mut Events<'_>,
+    ) -> Result<(), ResultsError> {
+        if let (Some(_), Some(rounds)) = (&events.log, results.rounds_so_far()) {
+            return Ok(events.send(&RunEvent::RoundBegun {
+                jobs,
+                predicted_cost,
+                rounds,
+            })?);
+        }
+        events.log = Some(results.begin_log()?);
+        Ok(events.send(&RunEvent::Started {
+            host: host(),
+            process: std::process::id(),
+            program: PROGRAM.to_owned(),
+            shard: self.options.shard.to_string(),
+            others: self.member.others()?.len(),
+            threads: self.threads,
+            jobs,
+            jobs_there,
+            predicted_cost,
+        })?)
+    }
+
+    /// Runs jobs until this worker has none left, and reports what other workers still run; `None` if it was stopped.
+    fn collect(
+        &self,
+        collector: &mut Collector<'_, '_>,
+        pending: &Pending<'_>,
+        kernel: &Kernel<'_>,
+    ) -> Result<Option<Left>, ResultsError> {
+        let has_rounds = pending.results.round().is_some();
+        while collector.run(kernel)? {
+            loop {
+                let left = pending.left(self.member)?;
+                if left.has_abandoned {
+                    // Their worker has died meanwhile.
+                    break;
+                }
+                if left.jobs == 0 {
+                    return Ok(Some(left));
+                }
+                if self.must_end() {
+                    return Ok(None);
+                }
+                if !has_rounds {
+                    return Ok(Some(left));
+                }
+                // The next round may have jobs for this worker.
+                std::thread::sleep(LOOK);
+            }
+        }
+        Ok(None)
     }
 
     /// Reduces with `body`, once every job is done; `None` if another worker does so, or has.
@@ -317,15 +326,15 @@ impl Joined<'_> {
 
     /// Claims the reduction; `None` if another worker has it, or has ended it.
     fn take_reduction(&self) -> Result<Option<(Claims<'_>, u64)>, ResultsError> {
-        // In this order: who has ended has left its mark before.
+        // In this order: a worker that has ended left its mark before.
         let others = self.member.others()?;
         let mut claims = Claims::list(self.member)?;
         let last = claims.last(REDUCTION);
         let is_taken = match claims.standing(REDUCTION, &others)? {
-            Standing::Own => true,
-            Standing::Taken(_) => false,
-            Standing::Free(_) if last.is_some() && claims.last(REDUCED) == last => false,
-            Standing::Free(generation) => claims.take(REDUCTION, generation)?,
+            ClaimState::Own => true,
+            ClaimState::Taken(_) => false,
+            ClaimState::Free(_) if last.is_some() && claims.last(REDUCED) == last => false,
+            ClaimState::Free(generation) => claims.take(REDUCTION, generation)?,
         };
         let generation = claims.last(REDUCTION).unwrap_or_default();
         Ok(is_taken.then_some((claims, generation)))

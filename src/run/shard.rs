@@ -1,4 +1,4 @@
-//! Shards: a share of the parts for each of several runs that work side by side on one directory.
+//! Shards: a share of the parts for each of several runs without a common disk.
 //!
 //! Parts are dealt in the order of the plan, each to the shard with the least predicted cost so far. Contract: a
 //! function of the plan alone, so each part belongs to one shard of N whatever the others do; an extension deals on,
@@ -32,13 +32,11 @@ impl FromStr for Shard {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let parsed = text.split_once('/').and_then(|(number, count)| {
-            let shard = Self {
-                number: number.parse().ok()?,
-                count: count.parse().ok()?,
-            };
-            (1..=shard.count.get())
-                .contains(&shard.number)
-                .then_some(shard)
+            let number: u64 = number.parse().ok()?;
+            let count: NonZeroU64 = count.parse().ok()?;
+            (1..=count.get())
+                .contains(&number)
+                .then_some(Self { number, count })
         });
         parsed.ok_or_else(|| {
             format!("{text:?}: must be K/N with whole numbers 1 <= K <= N, such as 2/8")
@@ -53,7 +51,7 @@ impl fmt::Display for Shard {
 }
 
 impl Shard {
-    /// Its own of all parts of a plan. Memory: a few bytes for each of the N.
+    /// The parts of a plan that belong to this shard. Memory: a few bytes for each of the N.
     pub fn parts<P: Iterator<Item = Outline>>(
         self,
         plan: P,

@@ -1,16 +1,16 @@
-//! What is left of a directory, and what of it this worker takes.
+//! Which of the missing parts this worker takes.
 //!
-//! Workers take parts by claims, in two passes. The first goes through the plan, from a place of its own if others are at
-//! work, and takes what nobody has. The second takes what those had who live no more, until nothing is left but parts that
-//! others are at. Parts that may not fit in memory come later, and those at which workers died last, after some deaths
-//! alone: a job that ends its process must not take others with it.
+//! Workers take parts by claims, in two passes. The first goes through the plan, from a place of its own if others run, and
+//! takes unclaimed parts. The second takes the parts of dead workers, until living workers have all that are left. Parts
+//! that may not fit in memory come later, and parts at which workers died last; after some deaths they run alone, as a job
+//! that ends its process must not end others.
 
-use crate::results::claims::{Claims, Standing};
-use crate::results::layout::PartName;
+use crate::results::claims::{ClaimState, Claims};
+use crate::results::layout::{PartName, shorter_in_tests};
 use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
-use crate::run::memory;
+use crate::run::memory_limits;
 use crate::run::walltime::Walltime;
 use crate::sweep::{Job, Outline, Part, predicted_memory};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -20,18 +20,13 @@ use std::vec::IntoIter;
 
 /// Lost claims after which all are listed.
 const LOSSES: u32 = 3;
-/// Time between two looks at workers who may have died, for one that has nothing else to do, and for one that has.
-pub(super) const LOOK: Duration = if cfg!(test) {
-    Duration::ZERO
-} else {
-    Duration::from_millis(500)
-};
+/// Time between two looks for dead workers, by an idle worker and by a busy one.
+pub(super) const LOOK: Duration = shorter_in_tests(Duration::from_millis(500), Duration::ZERO);
 const LOOK_BUSY: Duration = Duration::from_secs(5);
 
 /// Deaths of workers after which a part runs alone, one job after the other.
 const DEATHS: usize = 3;
 
-/// A part that this worker has taken.
 #[derive(Debug)]
 pub(super) struct Taken {
     pub part: Part,
@@ -50,7 +45,7 @@ pub(super) struct PartJob {
     pub of: Arc<Taken>,
     pub position: usize,
     pub failed_before: bool,
-    /// Memory that it is predicted to take, in bytes; all that there is if it is to run alone.
+    /// Memory that it is predicted to take, in bytes; infinite if it must run alone.
     pub memory: f64,
 }
 
@@ -60,44 +55,44 @@ impl PartJob {
     }
 }
 
-/// What a worker leaves when it has nothing to do.
+/// What is left when a worker has nothing to do.
 #[derive(Debug, Default)]
 pub(super) struct Left {
-    /// Jobs of the parts that are not done.
     pub jobs: u64,
-    /// Names of the hosts that are at them.
+    /// Hosts of the workers that run them.
     pub hosts: BTreeSet<String>,
-    /// Whether nobody is at some of them.
+    /// Whether no worker runs some of them.
     pub has_abandoned: bool,
 }
 
 impl Pending<'_> {
-    /// Number and predicted cost of the jobs of the parts that were done since they were looked up.
+    /// Number and predicted cost of the jobs of parts that were finished since they were looked up.
     pub(super) fn done_since(&self) -> Result<(u64, f64), ResultsError> {
         let done = self.results.done_parts()?;
-        let new = self
-            .parts
-            .iter()
-            .filter(|part| done.has(part) && !self.done.has(part));
-        Ok(new.fold((0, 0.0), |(jobs, cost), part| {
-            (jobs + part.job_count as u64, cost + part.cost)
-        }))
+        let is_new = |part: &&Outline| done.has(part) && !self.done.has(part);
+        let mut jobs = 0;
+        let mut cost = 0.0;
+        for part in self.parts.iter().filter(is_new) {
+            jobs += part.job_count as u64;
+            cost += part.cost;
+        }
+        Ok((jobs, cost))
     }
 
-    /// What is left now, once this worker has committed all that it has taken. The last of all workers to look finds
-    /// nothing.
+    /// What is left once this worker has committed all its parts; nothing for the last worker that looks.
     pub(super) fn left(&self, member: &Member<'_>) -> Result<Left, ResultsError> {
-        let (others, claims) = (member.others()?, Claims::list(member)?);
+        let others = member.others()?;
+        let claims = Claims::list(member)?;
         let done = self.results.done_parts()?;
         let mut left = Left::default();
         for part in self.parts.iter().filter(|part| !done.has(part)) {
             left.jobs += part.job_count as u64;
             match claims.standing(&PartName::from(part).to_string(), &others)? {
-                Standing::Taken(owner) => {
+                ClaimState::Taken(owner) => {
                     left.hosts.insert(others[owner].worker.host.clone());
                 }
-                Standing::Free(_) => left.has_abandoned = true,
-                Standing::Own => {
+                ClaimState::Free(_) => left.has_abandoned = true,
+                ClaimState::Own => {
                     let path = self.results.part_file(tables::JOBS, part);
                     return Err(ResultsError::damaged(&path, "it was committed and is gone"));
                 }
@@ -131,18 +126,16 @@ impl<'a> Work<'a> {
         walltime: &'a Walltime,
         threads: usize,
     ) -> Result<Self, ResultsError> {
-        let (others, claims) = (member.others()?, Claims::list(member)?);
-        let parts = pending
-            .parts
-            .iter()
-            .filter(|part| !pending.done.has(part) || pending.may_run_again(part));
-        let mut pass: Vec<&Outline> = parts.collect();
+        let others = member.others()?;
+        let claims = Claims::list(member)?;
+        let is_left = |part: &&Outline| !pending.done.has(part) || pending.may_run_again(part);
+        let mut pass: Vec<&Outline> = pending.parts.iter().filter(is_left).collect();
         if !others.is_empty() && !pass.is_empty() {
             let place = member.number() % pass.len() as u64;
             pass.rotate_left(usize::try_from(place).unwrap_or_default());
         }
         pass.sort_by_key(|part| {
-            let needed = memory::beside_threads(part.memory, threads);
+            let needed = memory_limits::beside_threads(part.memory, threads);
             let may_not_fit = needed > pending.retry.memory;
             (pending.deaths(part), may_not_fit, pending.done.has(part))
         });
@@ -172,8 +165,8 @@ impl<'a> Work<'a> {
         self.jobs.push_front(job);
     }
 
-    /// The next job; `None` if there is none now for this worker, which may be busy with others.
-    /// With `is_ahead`, it would wait for a thread.
+    /// The next job; `None` if there is none now for this worker. With `is_busy`, other jobs run; with `is_ahead`, the job
+    /// would wait for a thread.
     pub fn next(&mut self, is_busy: bool, is_ahead: bool) -> Result<Option<PartJob>, ResultsError> {
         if self.jobs.is_empty() && !self.has_ended {
             self.take_next(is_busy, is_ahead)?;
@@ -181,7 +174,7 @@ impl<'a> Work<'a> {
         Ok(self.jobs.pop_front())
     }
 
-    /// Whether the next part is not to be taken yet: one at which workers died must not have others with it that only wait.
+    /// Whether the next part must wait: with a part at which workers died, no job may wait for a thread.
     fn must_wait(&self, is_busy: bool, is_ahead: bool) -> bool {
         let next = self.pass.as_slice().first();
         match next.map_or(1, |part| self.pending.deaths(part)) {
@@ -214,8 +207,7 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// Time between two looks at workers who may have died; none for one that was alone, has nothing else to do, and has
-    /// rounds before it.
+    /// Time between two looks for dead workers; none for an idle worker that was alone and has rounds before it.
     fn pause(&self, is_busy: bool) -> Duration {
         let has_rounds = self.pending.results.round().is_some();
         match (is_busy, self.others.is_empty() && has_rounds) {
@@ -225,23 +217,21 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Takes a part in the first pass: one that nobody has claimed; or one that is done, if its jobs may run again and
-    /// nobody is at it.
+    /// Takes a part in the first pass: unclaimed, or finished with jobs that may run again and no worker that runs them.
     fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
         let name = PartName::from(outline).to_string();
         if !self.pending.done.has(outline) {
             return Ok(self.claims.last(&name).is_none() && self.take_part(outline, 0)?);
         }
         match self.claims.standing(&name, &self.others)? {
-            Standing::Free(generation) => self.take_part(outline, generation),
+            ClaimState::Free(generation) => self.take_part(outline, generation),
             _ => Ok(false),
         }
     }
 
-    /// Takes a part that is not done and whose claim is a dead worker's. Returns whether there is none, and it is certain
-    /// that the owners of all others live.
+    /// Takes a part of a dead worker. Returns whether there is none, and the owners of all other parts certainly live.
     fn take_abandoned(&mut self) -> Result<bool, ResultsError> {
-        // In this order: who has ended has committed or spilled before.
+        // In this order: a worker that has ended committed or spilled before.
         let others = self.member.others()?;
         self.claims.refresh()?;
         self.pending.look_at_spill()?;
@@ -249,21 +239,15 @@ impl<'a> Work<'a> {
         let mut is_certain = true;
         let mut free = Vec::new();
         for part in self.pending.parts.iter().filter(|part| !done.has(part)) {
-            match self
-                .claims
-                .standing(&PartName::from(part).to_string(), &others)?
-            {
-                Standing::Own => (),
-                Standing::Taken(owner) => {
-                    let Living {
-                        beat,
-                        is_certain: is_known,
-                        ..
-                    } = &others[owner];
-                    let has_beaten = self.beats.entry(owner.to_owned()).or_insert(*beat) != beat;
-                    is_certain &= *is_known || has_beaten;
+            let name = PartName::from(part).to_string();
+            match self.claims.standing(&name, &others)? {
+                ClaimState::Own => (),
+                ClaimState::Taken(owner) => {
+                    let living = &others[owner];
+                    let first = self.beats.entry(owner.to_owned()).or_insert(living.beat);
+                    is_certain &= living.is_certain || *first != living.beat;
                 }
-                Standing::Free(generation) => free.push((part, generation)),
+                ClaimState::Free(generation) => free.push((part, generation)),
             }
         }
         if free.is_empty() {
@@ -278,7 +262,7 @@ impl<'a> Work<'a> {
                 break;
             }
         }
-        // If they go to others, the next look decides.
+        // If other workers get them, the next look decides.
         Ok(false)
     }
 
@@ -290,16 +274,15 @@ impl<'a> Work<'a> {
             let jobs = left.map(|position| (position, false)).collect();
             return self.take(self.pending.part(outline), spilled, jobs, generation);
         }
-        let mut again = self.pending.results.again(outline)?;
+        let again = self.pending.results.again(outline)?;
         if again.is_empty() {
             return Ok(false);
         }
         let part = self.pending.part(outline);
-        again.retain(|&position, why| self.pending.runs_again(&part.jobs[position], why));
-        let again = again.into_iter();
-        let jobs: Vec<_> = again
-            .map(|(position, why)| (position, why != Again::CutOff))
-            .collect();
+        let runs = |position: usize, why| self.pending.runs_again(&part.jobs[position], why);
+        let again = again.iter().filter(|(position, why)| runs(**position, why));
+        let again = again.map(|(&position, why)| (position, *why != Again::CutOff));
+        let jobs: Vec<_> = again.collect();
         Ok(!jobs.is_empty() && self.take(part, BTreeSet::new(), jobs, generation)?)
     }
 
@@ -334,17 +317,18 @@ impl<'a> Work<'a> {
             begin: Instant::now(),
         });
         let recording = self.pending.results.sweep().recording();
-        let job = |(position, failed_before): (usize, bool)| PartJob {
-            of: Arc::clone(&taken),
-            position,
-            failed_before,
-            memory: if is_alone {
-                f64::INFINITY
-            } else {
-                predicted_memory(&taken.part.jobs[position].parameters, recording)
-            },
-        };
-        self.jobs.extend(jobs.into_iter().map(job));
+        for (position, failed_before) in jobs {
+            let mut memory = predicted_memory(&taken.part.jobs[position].parameters, recording);
+            if is_alone {
+                memory = f64::INFINITY;
+            }
+            self.jobs.push_back(PartJob {
+                of: Arc::clone(&taken),
+                position,
+                failed_before,
+                memory,
+            });
+        }
         Ok(true)
     }
 }

@@ -1,4 +1,4 @@
-//! The number of threads: as asked for, by what a batch system grants, or all cores.
+//! Threads: their number, as asked for, as a batch system grants, or all cores; and their CPU time.
 
 use crate::table::shown::shown;
 use std::ffi::OsString;
@@ -14,66 +14,57 @@ const VARIABLES: [&str; 5] = [
     "LSB_DJOB_NUMPROC",
 ];
 
-/// Most threads of one process: nearly no machine has more cores. Starting this many takes seconds, and four times as
-/// many minutes, in which no signal stops a run.
+/// Most threads of one process. Starting more would take minutes, in which no signal stops a run.
 pub const MAX_THREADS: usize = 1024;
 
-/// What is no number of threads.
+/// A bad number of threads.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ThreadsError(String);
 
-/// How many threads, and who said so.
+/// A number of threads, and where it is from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Threads {
     /// `None`: one for each core.
     pub count: Option<NonZeroUsize>,
-    /// The variable that they are from.
+    /// The environment variable that it is from.
     pub variable: Option<&'static str>,
 }
 
 impl Threads {
-    /// Those that are asked for, else those of the first variable that is set, else all cores.
+    /// As many as `asked`, else as the first variable that is set says, else one for each core.
     pub fn choose(
         asked: Option<NonZeroUsize>,
         environment: impl Fn(&str) -> Option<OsString>,
     ) -> Result<Self, ThreadsError> {
-        let granted = |variable| {
-            Some((
-                variable,
-                environment(variable).filter(|value| !value.is_empty())?,
-            ))
-        };
-        let Some((variable, value)) = VARIABLES
-            .into_iter()
-            .find_map(granted)
-            .filter(|_| asked.is_none())
-        else {
-            let count = asked.map(|count| {
-                parse(&count.to_string()).map_err(|must| format!("{count} threads: {must}"))
-            });
+        if let Some(asked) = asked {
+            let count = parse(&asked.to_string());
+            let count = count.map_err(|must| ThreadsError(format!("{asked} threads: {must}")))?;
             return Ok(Self {
-                count: count.transpose().map_err(ThreadsError)?,
+                count: Some(count),
                 variable: None,
             });
-        };
-        // OpenMP's may be a list, of one number for each level of nesting.
-        let count = parse(
-            value
-                .to_str()
-                .and_then(|value| value.split(',').next())
-                .unwrap_or_default()
-                .trim(),
-        );
-        let refuse = |must| {
-            format!(
-                "{variable}={}: {must}; unset it, or give --threads",
-                shown(value.as_ref())
-            )
-        };
+        }
+        for variable in VARIABLES {
+            let Some(value) = environment(variable).filter(|value| !value.is_empty()) else {
+                continue;
+            };
+            // OpenMP's may be a list, with one number for each level of nesting.
+            let first = value.to_str().and_then(|value| value.split(',').next());
+            let count = parse(first.unwrap_or_default().trim()).map_err(|must| {
+                let value = shown(value.as_ref());
+                ThreadsError(format!(
+                    "{variable}={value}: {must}; unset it, or give --threads"
+                ))
+            })?;
+            return Ok(Self {
+                count: Some(count),
+                variable: Some(variable),
+            });
+        }
         Ok(Self {
-            count: Some(count.map_err(refuse).map_err(ThreadsError)?),
-            variable: Some(variable),
+            count: None,
+            variable: None,
         })
     }
 }
@@ -92,6 +83,19 @@ pub fn parse(text: &str) -> Result<NonZeroUsize, String> {
         .ok()
         .filter(|count: &NonZeroUsize| count.get() <= MAX_THREADS);
     count.ok_or_else(|| format!("must be a whole number from 1 to {MAX_THREADS}"))
+}
+
+/// CPU time that the calling thread has used since some instant, in s.
+pub fn thread_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+/// CPU seconds of the calling thread that a computation takes, and its result.
+pub fn timed<T>(compute: impl FnOnce() -> T) -> (f64, T) {
+    let start = thread_seconds();
+    let result = compute();
+    (thread_seconds() - start, result)
 }
 
 #[cfg(test)]
@@ -143,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn too_many_are_refused_whoever_asks_for_them() {
+    fn too_many_threads_are_refused_from_flags_and_from_python() {
         assert_eq!(choose(Some(1024), &[]).unwrap(), threads(1024, None));
         for count in [1025, 1 << 62] {
             let error = choose(Some(count), &[]).unwrap_err().to_string();
@@ -168,5 +172,14 @@ mod tests {
                 "{error}"
             );
         }
+    }
+
+    #[test]
+    fn a_thread_that_sleeps_uses_no_processor_time() {
+        let (asleep, ()) = timed(|| std::thread::sleep(std::time::Duration::from_millis(30)));
+        let (busy, sum) =
+            timed(|| (0..3_000_000).fold(0.0_f64, |sum, i| (sum + f64::from(i)).sqrt()));
+        assert!(asleep < 0.02, "{asleep}");
+        assert!(busy > 0.0 && sum > 0.0);
     }
 }

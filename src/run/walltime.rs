@@ -1,21 +1,21 @@
-//! Walltime: a run ends in time, with all that it finished kept.
+//! Walltime: a run ends in time, and keeps all finished jobs.
 //!
-//! No part is taken when less time is left than the dearest part took so far, from when it was taken until it was
-//! committed. Should one take longer after all, it is interrupted at the end, and its finished jobs are kept.
+//! No part is taken when less time is left than the longest part took so far, until it was committed. A part that takes
+//! longer is interrupted at the end, and its finished jobs are kept.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-/// Least time set aside for ending: for the last commits and for those who wait.
+/// Least time set aside for the last commits and for the end of the program.
 const MIN_RESERVE: Duration = Duration::from_millis(500);
 /// More is set aside where commits are slow: this many times the slowest.
 const COMMITS_IN_RESERVE: u32 = 3;
 
 /// The time that a run has.
 pub(super) struct Walltime {
-    /// When the run must have ended; `None`: whenever it likes.
+    /// When the run must have ended; `None`: at any time.
     end: Option<Instant>,
-    dearest_part: Cell<Duration>,
+    longest_part: Cell<Duration>,
     slowest_commit: Cell<Duration>,
     has_refused: Cell<bool>,
 }
@@ -27,7 +27,7 @@ impl Walltime {
         let end = longest.and_then(|longest| begin.checked_add(longest));
         Self {
             end,
-            dearest_part: Cell::default(),
+            longest_part: Cell::default(),
             slowest_commit: Cell::default(),
             has_refused: Cell::default(),
         }
@@ -35,36 +35,33 @@ impl Walltime {
 
     /// Whether another part may be taken. Once it may not, none may.
     pub fn admits_part(&self) -> bool {
-        let is_short = |left: Duration| left.is_zero() || left < self.dearest_part.get();
+        let is_short = |left: Duration| left.is_zero() || left < self.longest_part.get();
         self.has_refused
             .update(|has_refused| has_refused || self.left().is_some_and(is_short));
         !self.has_refused.get()
     }
 
-    /// Whether a part was left for want of time.
+    /// Whether a part was left for lack of time.
     pub fn has_refused(&self) -> bool {
         self.has_refused.get()
     }
 
     /// A part was committed: how long it took, and its commit alone.
     pub fn committed(&self, part: Duration, commit: Duration) {
-        self.dearest_part.update(|dearest| dearest.max(part));
+        self.longest_part.update(|longest| longest.max(part));
         self.slowest_commit.update(|slowest| slowest.max(commit));
     }
 
-    /// Whether what is under way must be given up.
+    /// Whether running jobs must be interrupted.
     pub fn is_over(&self) -> bool {
         self.left().is_some_and(|left| left.is_zero())
     }
 
-    /// Time left but for what is set aside.
+    /// Time left, without the reserve.
     fn left(&self) -> Option<Duration> {
         let reserve = MIN_RESERVE.max(COMMITS_IN_RESERVE * self.slowest_commit.get());
-        Some(
-            self.end?
-                .saturating_duration_since(Instant::now())
-                .saturating_sub(reserve),
-        )
+        let left = self.end?.saturating_duration_since(Instant::now());
+        Some(left.saturating_sub(reserve))
     }
 }
 
@@ -75,7 +72,7 @@ mod tests {
     const SECOND: Duration = Duration::from_secs(1);
 
     #[test]
-    fn no_part_is_taken_when_less_time_is_left_than_the_dearest_took() {
+    fn no_part_is_taken_when_less_time_is_left_than_the_longest_took() {
         let walltime = Walltime::new(Instant::now(), Some(100 * SECOND));
         walltime.committed(90 * SECOND, SECOND);
         walltime.committed(2 * SECOND, SECOND);

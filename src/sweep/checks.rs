@@ -46,14 +46,13 @@ impl<'a> Places<'a> {
         if let Some(place) = self.set.iter().find(clash) {
             let key = quantity.key();
             let other = place.quantity.key();
-            let there = place.section;
-            let line = self.source.line(place.at);
+            let here = self.source.in_section(section);
+            let there = self.source.in_section(place.section);
+            let line = self.source.line_in_words(place.at);
             let problem = if place.quantity == quantity {
-                format!("{key} in {section}: is set in {there}, too (line {line}); keep one")
+                format!("{key}{here}: is set{there}, too{line}; keep one")
             } else {
-                format!(
-                    "{key} in {section}: fixes the period, as does {other} in {there} (line {line}); keep one"
-                )
+                format!("{key}{here}: fixes the period, as does {other}{there}{line}; keep one")
             };
             self.source.refuse(at, problem);
         } else {

@@ -185,14 +185,33 @@ impl Sweep {
     /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
     /// that read back to the same bits.
     pub fn command(&self, job: &Job) -> String {
+        let mut words = vec![self.command_of_set(&job.parameters)];
+        let seed = job.parameters.seed;
+        if seed != Parameters::default().seed {
+            words.push(format!("--set seed={seed}"));
+        }
+        words.push(self.command_end());
+        words.retain(|word| !word.is_empty());
+        words.join(" ")
+    }
+
+    /// The beginning of the command of a job, which all jobs of its set have in common.
+    pub fn command_of_set(&self, parameters: &Parameters) -> String {
         let mut words = vec!["stickslip simulate".to_owned()];
         let defaults = Parameters::default();
         for symbol in Symbol::ALL {
-            let value = job.parameters.get(symbol);
-            if value != defaults.get(symbol) && value != Value::Null {
+            let value = parameters.get(symbol);
+            let is_default = value == defaults.get(symbol) || value == Value::Null;
+            if symbol != Symbol::Seed && !is_default {
                 words.push(format!("--set {}={value}", symbol.key()));
             }
         }
+        words.join(" ")
+    }
+
+    /// The end of the command of a job, behind its seed, which all jobs of the sweep have in common.
+    pub fn command_end(&self) -> String {
+        let mut words = Vec::new();
         // `simulate` has another default.
         words.extend(self.recording.slips.map(|slips| format!("--slips {slips}")));
         // A single job has no control.
@@ -208,13 +227,12 @@ impl Sweep {
             }
         }
         let defaults = solver_settings(Solver::default());
-        let mut settings = solver_settings(self.solver);
-        settings.retain(|setting| !defaults.contains(setting));
-        words.extend(
-            settings
-                .iter()
-                .map(|(key, value)| format!("--set {key}={value}")),
-        );
+        for setting in solver_settings(self.solver) {
+            if !defaults.contains(&setting) {
+                let (key, value) = setting;
+                words.push(format!("--set {key}={value}"));
+            }
+        }
         words.join(" ")
     }
 

@@ -43,6 +43,12 @@ impl Sweep {
         read(&source, true, PLAN_VERSION).map_err(|_| source.error())
     }
 
+    /// The same with a text that was made of something, such as flags.
+    pub fn parse_made(text: &str, of: &str) -> Result<Self, SweepError> {
+        let source = Source::made(of, text);
+        read(&source, true, PLAN_VERSION).map_err(|_| source.error())
+    }
+
     /// The same with a text that a results directory holds, under its version of the plan: what its sweep was allowed when it
     /// began stays readable.
     pub fn parse_stored(text: &str, path: &Path, plan_version: u32) -> Result<Self, SweepError> {

@@ -38,6 +38,9 @@ pub enum SweepError {
         /// At least one, in the order of their lines.
         mistakes: Vec<Mistake>,
     },
+    /// Flags, or other things that a text was made of, do not say what to run.
+    #[error("{}", listed_without_lines(of, problems))]
+    Made { of: String, problems: Vec<String> },
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,6 +73,11 @@ fn listed(path: &Path, mistakes: &[Mistake]) -> String {
     lines.join("\n  ")
 }
 
+fn listed_without_lines(of: &str, problems: &[String]) -> String {
+    let between = if problems.len() > 1 { "\n  " } else { " " };
+    format!("in the {of}:{between}{}", problems.join(between))
+}
+
 /// Something was refused, and its [`Source`] has the mistake.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refused(());
@@ -83,6 +91,8 @@ pub(super) fn all<T>(read: impl Iterator<Item = Result<T, Refused>>) -> Result<V
 pub(super) struct Source<'a> {
     path: &'a Path,
     pub text: &'a str,
+    /// What the text was made of, such as flags: its author knows no lines of it, and no `[model]`.
+    made_of: Option<&'a str>,
     /// Each with the byte of the text that it is about.
     mistakes: RefCell<Vec<(usize, String)>>,
 }
@@ -92,7 +102,16 @@ impl<'a> Source<'a> {
         Self {
             path,
             text,
+            made_of: None,
             mistakes: RefCell::new(Vec::new()),
+        }
+    }
+
+    /// A text that a program made of something, such as flags.
+    pub fn made(of: &'a str, text: &'a str) -> Self {
+        Self {
+            made_of: Some(of),
+            ..Self::new(Path::new(of), text)
         }
     }
 
@@ -114,6 +133,13 @@ impl<'a> Source<'a> {
         mistakes.sort_unstable();
         // A misspelt key is met twice where it stands for one that must be there.
         mistakes.dedup();
+        if let Some(of) = self.made_of {
+            let problems = mistakes.into_iter().map(|(_, problem)| problem).collect();
+            return SweepError::Made {
+                of: of.to_owned(),
+                problems,
+            };
+        }
         let placed = |(at, problem)| Mistake {
             line: self.line(at),
             problem,
@@ -121,6 +147,23 @@ impl<'a> Source<'a> {
         SweepError::Invalid {
             path: self.path.to_owned(),
             mistakes: mistakes.into_iter().map(placed).collect(),
+        }
+    }
+
+    /// Where a key stands, as messages name it.
+    pub fn in_section(&self, title: &str) -> String {
+        if self.made_of.is_some() && title == "[model]" {
+            String::new()
+        } else {
+            format!(" in {title}")
+        }
+    }
+
+    /// The line of a byte of the text, as messages name it; empty where nobody knows lines.
+    pub fn line_in_words(&self, at: usize) -> String {
+        match self.made_of {
+            Some(_) => String::new(),
+            None => format!(" (line {})", self.line(at)),
         }
     }
 
@@ -251,7 +294,8 @@ impl<'a> Entry<'a> {
             }
             key => hint(key, allowed),
         };
-        self.refuse(format!("unknown key in {title}; {hint}"))
+        let place = self.source.in_section(title);
+        self.refuse(format!("unknown key{place}; {hint}"))
     }
 
     /// The values of a list, each at its own place.

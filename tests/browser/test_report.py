@@ -54,23 +54,6 @@ def test_a_sweep_under_modulation_has_all_its_charts(browser, report):
     assert "stickslip 0" in browser.text("#versions")
 
 
-def test_a_chart_as_svg_has_its_points_and_words_within_its_edges(browser, report, tmp_path):
-    browser.open(report(MODULATED))
-    browser.settle()
-    of_chart = """const chart = charts.find(({ name }) => name === "free");
-    return [chart.svg("white"), chart.places[0].at.length, chart.y.label]"""
-    svg, points, label = browser.run(of_chart)
-    (tmp_path / "chart.svg").write_text(svg)
-    browser.driver.get((tmp_path / "chart.svg").as_uri())
-    outside = """const edge = document.documentElement.getBoundingClientRect();
-    const isOutside = ({ left, right, top, bottom }) => left < 0 || top < 0 || right > edge.width || bottom > edge.height;
-    return [...document.querySelectorAll("text")].filter((text) => isOutside(text.getBoundingClientRect())).map((text) => text.textContent)"""
-    assert browser.run(outside) == []
-    assert browser.run("return [...document.querySelectorAll('text')].map((text) => text.textContent)").count(label) == 1
-    circles = "return [...document.querySelectorAll('path')].filter((path) => path.getAttribute('d').includes('a')).length"
-    assert browser.run(circles) == points > 0
-
-
 def test_the_page_opens_with_the_result_and_its_table_and_shows_the_figures(browser, report):
     browser.open(report(MODULATED))
     assert [section.get_property("id") for section in browser.all("main > section")][:4] == ["explore", "sets", "slips", "figures"]

@@ -373,9 +373,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ),
         (
             "status good.toml",
-            &[
-                "good.toml: is no results directory (it has no run/extension-000.json); name one that a run",
-            ],
+            &["good.toml: is a sweep file; did you mean results/good?"],
         ),
         (
             "status theirs",

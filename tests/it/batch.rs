@@ -109,7 +109,7 @@ fn submit(folder: &Folder, engine: &str, flags: &[&str], options: &[&str]) -> En
 }
 
 #[test]
-fn the_script_for_slurm_submits_as_it_is_and_its_job_runs_what_is_left() {
+fn the_script_for_slurm_submits_unchanged_and_its_job_runs_missing_jobs() {
     let folder = folder_with_engines();
     let flags = [
         "--time",
@@ -230,7 +230,7 @@ fn more_starts_than_workers_keep_so_many_at_work_until_all_is_done() {
 }
 
 #[test]
-fn the_script_for_hyperqueue_submits_as_it_is_and_its_tasks_run_what_is_left() {
+fn the_script_for_hyperqueue_submits_unchanged_and_its_tasks_run_missing_jobs() {
     let folder = folder_with_engines();
     let flags = ["--time", "4h", "--", "--priority", "3"];
     let ended = submit(&folder, "hyperqueue", &flags, &["--pin=taskset"]);

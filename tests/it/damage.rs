@@ -822,7 +822,7 @@ fn what_is_not_yet_done_is_no_damage() {
     .unwrap();
     let text = folder.ends(3, "verify r").stdout;
     assert!(
-        text.contains("not done  1 part, 1 job missing: part-000-000000\ndamaged   nothing\n"),
+        text.contains("missing  1 part, 1 job missing: part-000-000000\ndamaged  nothing\n"),
         "{text}"
     );
     let report = json(&folder.ends(3, "verify r --json").stdout);

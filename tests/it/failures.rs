@@ -28,7 +28,7 @@ tolerance = 3e-7
 ";
 
 #[test]
-fn a_failing_job_becomes_a_row_with_its_reason_and_the_others_go_on() {
+fn a_failing_job_becomes_a_row_with_its_reason_and_the_others_continue() {
     let folder = Folder::new();
     folder.write("failing.toml", FAILING);
     let ended = folder.ends(1, "run failing.toml --out r");

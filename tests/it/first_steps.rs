@@ -4,7 +4,7 @@ use super::program::Folder;
 use std::fs;
 
 #[test]
-fn a_sweep_file_to_start_from_plans_as_it_is_and_is_not_overwritten() {
+fn a_sweep_file_to_start_from_plans_unchanged_and_is_not_overwritten() {
     let folder = Folder::new();
     let said = folder.ends(0, "init mine.toml").stderr;
     assert!(said.contains("stickslip plan mine.toml"), "{said}");

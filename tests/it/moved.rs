@@ -53,7 +53,7 @@ fn a_run_whose_directory_is_moved_or_removed_ends_and_begins_no_other_at_its_pla
 }
 
 #[test]
-fn a_run_whose_directory_is_replaced_by_that_of_another_sweep_leaves_that_as_it_is() {
+fn a_run_whose_directory_is_replaced_by_that_of_another_sweep_leaves_that_unchanged() {
     let folder = Folder::new();
     folder.write("other.toml", OTHER);
     folder.ends(0, "run other.toml --out other");

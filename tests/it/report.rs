@@ -207,7 +207,7 @@ fn a_directory_without_jobs_has_no_report() {
 }
 
 #[test]
-fn the_page_reloads_while_a_run_goes_on_and_no_longer_when_it_has_stopped() {
+fn the_page_reloads_while_a_run_continues_and_no_longer_when_it_has_stopped() {
     let folder = Folder::new();
     folder.write("many.toml", &MANY.replace("28000", "4000000"));
     let mut child = folder.start("run many.toml --out r --report --threads 1");

@@ -95,7 +95,7 @@ fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
 }
 
 #[test]
-fn an_interrupted_round_goes_on_and_decides_the_same() {
+fn an_interrupted_round_resumes_and_decides_the_same() {
     let folder = Folder::new();
     folder.write("map.toml", MAP);
     folder.ends(0, "run map.toml --out whole --no-reduce");

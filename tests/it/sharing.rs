@@ -74,7 +74,7 @@ fn processes_side_by_side_run_each_part_once_and_make_the_same_tables_reduced_da
 }
 
 #[test]
-fn the_parts_of_a_killed_process_are_taken_over_and_the_status_shows_who_is_there() {
+fn the_parts_of_a_killed_process_are_taken_over_and_the_status_shows_living_workers() {
     let folder = Folder::new();
     folder.write("dear.toml", DEAR);
     folder.ends(0, "run dear.toml --out whole --no-reduce");
@@ -85,9 +85,7 @@ fn the_parts_of_a_killed_process_are_taken_over_and_the_status_shows_who_is_ther
     let workers = status["workers"].as_array().unwrap();
     assert_eq!(workers.len(), 2, "{status}");
     assert!(
-        workers
-            .iter()
-            .all(|worker| worker["threads"] == 1 && worker["sweep"] == workers[0]["sweep"]),
+        workers.iter().all(|worker| worker["threads"] == 1),
         "{status}"
     );
     folder.ends(3, "status r --check");
@@ -191,7 +189,7 @@ fn a_shard_without_parts_has_nothing_to_reduce_and_says_so() {
 }
 
 #[test]
-fn a_walltime_is_kept_and_the_same_command_goes_on_until_all_is_done() {
+fn a_walltime_is_kept_and_the_same_command_resumes_until_all_is_done() {
     let folder = Folder::new();
     folder.write("many.toml", &MANY.replace("count = 28000", "count = 60000"));
     let begin = Instant::now();

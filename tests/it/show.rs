@@ -41,7 +41,7 @@ fn all_sets_of_a_value_of_an_eta_axis_have_that_value_one_bin_and_one_window_of_
 }
 
 #[test]
-fn run_ends_with_the_result_and_show_tells_it_again() {
+fn run_ends_with_the_result_and_show_prints_it_again() {
     let folder = Folder::new();
     folder.write("small.toml", SWEEP);
     let run = folder.ends(0, "run small.toml --out out").stdout;
@@ -280,15 +280,14 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
 }
 
 #[test]
-fn jobs_without_slips_are_told_with_a_command_that_shows_one() {
+fn jobs_without_slips_are_reported_with_a_command_that_shows_one() {
     let folder = Folder::new();
     folder.write(
         "fast.toml",
         "name = \"fast\"\n[model]\nN = 5\nNs = 5\n[axes]\nV0 = [1e-4, 1]\nseed = { count = 2 }\n[record]\nslips = 4\ngive_up_after = 0.5\n",
     );
     let run = folder.ends(0, "run fast.toml --out out").stdout;
-    let note =
-        "2 jobs of 1 set ended as no further slip came: they slide, or give_up_after is too short";
+    let note = "2 jobs of 1 set ended because no further slip came: the slider slides, or give_up_after is too short";
     assert!(
         run.contains(&format!(
             "{note}; a job of one such set: stickslip simulate "

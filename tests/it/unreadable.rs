@@ -218,10 +218,10 @@ fn a_fifo_makes_no_command_wait() {
 fn names_and_keys_pass_for_no_other_line_of_a_message() {
     let folder = folder();
     let names: [&[u8]; 6] = [
-        b"a\nto go on:\n  rm -r x.parquet",
+        b"a\nnext:\n  rm -r x.parquet",
         b"\x1b[31mred.parquet",
         b"\xff\xfe.parquet",
-        b"a\nto go on:\n  rm -r y",
+        b"a\nnext:\n  rm -r y",
         b"\x1b[31mblue",
         b"\xff\xff",
     ];
@@ -234,17 +234,17 @@ fn names_and_keys_pass_for_no_other_line_of_a_message() {
     }
     let text = folder.ends(4, "verify r").stdout;
     for shown in [
-        r"jobs/a\nto go on:\n  rm -r x.parquet: no",
+        r"jobs/a\nnext:\n  rm -r x.parquet: no",
         r"jobs/\u{1b}[31mred.parquet: no",
         r"jobs/\xff\xfe.parquet: no",
-        r"passed over: r/tables/jobs/a\nto go on:\n  rm -r y",
+        r"passed over: r/tables/jobs/a\nnext:\n  rm -r y",
         r"passed over: r/tables/jobs/\u{1b}[31mblue",
         r"passed over: r/tables/jobs/\xff\xff",
     ] {
         assert!(text.contains(shown), "{shown}: {text}");
     }
     assert_eq!(
-        text.lines().filter(|line| *line == "to go on:").count(),
+        text.lines().filter(|line| *line == "next:").count(),
         1,
         "{text}"
     );
@@ -259,7 +259,7 @@ fn names_and_keys_pass_for_no_other_line_of_a_message() {
         paths,
         [
             "r/tables/jobs/\u{1b}[31mred.parquet",
-            "r/tables/jobs/a\nto go on:\n  rm -r x.parquet",
+            "r/tables/jobs/a\nnext:\n  rm -r x.parquet",
             r"r/tables/jobs/\xff\xfe.parquet"
         ]
     );

@@ -309,7 +309,7 @@ fn a_retry_that_is_killed_before_its_last_rename_leaves_nothing_that_looks_damag
 }
 
 #[test]
-fn failing_and_panicking_jobs_become_rows_others_go_on_and_a_retry_mends_them() {
+fn failing_and_panicking_jobs_become_rows_others_continue_and_a_retry_mends_them() {
     let root = tempfile::tempdir().unwrap();
     let report = run_all(root.path(), &sweep(SEEDS, ""), &|job, _| faulty(job, true));
     assert_eq!(
@@ -938,7 +938,7 @@ fn events_account_for_every_job() {
 }
 
 #[test]
-fn what_was_done_since_it_was_looked_up_is_counted_whoever_did_it() {
+fn parts_done_since_the_last_look_are_counted_whichever_worker_did_them() {
     let root = tempfile::tempdir().unwrap();
     let (layout, stop) = (Layout::new(&Disk, root.path()), AtomicBool::new(false));
     let results = open(&layout, &sweep(SEEDS, "")).unwrap();
@@ -958,7 +958,7 @@ fn what_was_done_since_it_was_looked_up_is_counted_whoever_did_it() {
 }
 
 #[test]
-fn a_job_that_takes_long_is_told_while_it_runs() {
+fn a_job_that_takes_long_is_reported_while_it_runs() {
     let root = tempfile::tempdir().unwrap();
     let text = "name = \"test\"\n[axes]\nseed = [7]\n[record]\nslips = 1\ndiscard = 0\n";
     let sweep = Sweep::parse(text, Path::new("test.toml")).unwrap();

@@ -10,7 +10,7 @@ use super::*;
 use crate::reduce::{NoJobs, reduce};
 use crate::results::commit::tests::{KNOWN_NUMBER, own_number};
 use crate::results::tables::Names;
-use crate::results::verify::Verification;
+use crate::results::verification::Verification;
 use crate::table::formats::Format;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;

@@ -59,7 +59,7 @@ fn write_again<R: Row>(file: &Path, results: &Results<'_>) {
 }
 
 #[test]
-fn a_directory_of_another_version_is_reduced_and_exported_as_it_is_and_not_run() {
+fn a_directory_of_another_version_is_reduced_and_exported_unchanged_and_not_run() {
     let root = tempfile::tempdir().unwrap();
     run_all(root.path(), &sweep(SEEDS, ""), &fine);
     let layout = Layout::new(&Disk, root.path());

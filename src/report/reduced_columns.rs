@@ -1,12 +1,11 @@
 //! Reduced tables, column by column: a reader of the page needs each column as a whole, and columns compress best.
 
-use crate::model::Parameters;
 use crate::observe::Regime;
 use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, swept};
 use crate::results::ResultsError;
 use crate::results::layout::Layout;
 use crate::sets::{Label, label};
-use crate::sweep::{Job, Sweep};
+use crate::sweep::Sweep;
 use crate::table::columns::{Column, Row, Table, Value, columns};
 use crate::table::file::Dataset;
 use crate::table::value::floored;
@@ -24,7 +23,7 @@ pub(super) struct Columns {
     #[serde(rename = "columns")]
     described: Vec<Json>,
     values: Vec<Vec<Json>>,
-    /// Those of the rows, and whether the page has them.
+    /// All columns of the rows, and whether the page has them.
     #[serde(skip)]
     all: Vec<(Column, bool)>,
 }
@@ -32,49 +31,34 @@ pub(super) struct Columns {
 impl Columns {
     /// The columns of a row type with these names.
     pub(super) fn of<R: Row>(is_shown: impl Fn(&str) -> bool) -> Self {
-        let all: Vec<(Column, bool)> = R::columns()
-            .into_iter()
-            .map(|column| (column.clone(), is_shown(&column.name)))
-            .collect();
-        let described: Vec<Json> = all
-            .iter()
-            .filter(|column| column.1)
-            .map(
-                |(
-                    Column {
-                        name,
-                        unit,
-                        meaning,
-                        kind,
-                        ..
-                    },
-                    _,
-                )| {
-                    json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind.word() })
-                },
-            )
-            .collect();
-        let values = described.iter().map(|_| Vec::new()).collect();
-        Self {
-            described,
-            values,
-            all,
+        let mut columns = Self {
+            described: Vec::new(),
+            values: Vec::new(),
+            all: Vec::new(),
+        };
+        for column in R::columns() {
+            let is_shown = is_shown(&column.name);
+            if is_shown {
+                let Column { name, unit, .. } = &column;
+                let meaning = column.meaning;
+                let kind = column.kind.word();
+                columns
+                    .described
+                    .push(json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind }));
+                columns.values.push(Vec::new());
+            }
+            columns.all.push((column, is_shown));
         }
+        columns
     }
 
     /// Gives each column its label in the unit in which its values are read best, and the factor to that.
     pub(super) fn label(&mut self, label: impl Fn(&Column) -> Label) {
-        let labels = self
-            .all
-            .iter()
-            .filter(|column| column.1)
-            .map(|column| label(&column.0));
+        let shown = self.all.iter().filter(|column| column.1);
+        let labels = shown.map(|column| label(&column.0));
         for ((column, values), label) in self.described.iter_mut().zip(&self.values).zip(labels) {
-            let largest = values
-                .iter()
-                .filter_map(Json::as_f64)
-                .fold(0.0, |most, value| value.abs().max(most));
-            let (factor, unit) = label.scale(largest);
+            let sizes = values.iter().filter_map(Json::as_f64).map(f64::abs);
+            let (factor, unit) = label.scale(sizes.fold(0.0, f64::max));
             column["label"] = label.axis(unit).into();
             column["symbol"] = label.symbol.into();
             column["unit"] = unit.into();
@@ -83,7 +67,8 @@ impl Columns {
     }
 
     pub(super) fn push<R: Row>(&mut self, row: &R) {
-        let (mut all, mut values) = (self.all.iter(), self.values.iter_mut());
+        let mut all = self.all.iter();
+        let mut values = self.values.iter_mut();
         row.cells(&mut |cell| {
             if all.next().is_some_and(|column| column.1)
                 && let Some(column) = values.next()
@@ -140,21 +125,16 @@ impl Census {
                 census.sets += 1;
                 census.slips += set.slips;
                 census.jobs_cut += set.jobs_cut.unwrap_or(0);
-                census.tau_off = census
-                    .tau_off
-                    .into_iter()
-                    .chain(set.tau_off)
-                    .reduce(f64::min);
-                *census
-                    .regimes
-                    .entry(set.regime.map_or("", Regime::word))
-                    .or_default() += 1;
+                let off = census.tau_off.into_iter().chain(set.tau_off);
+                census.tau_off = off.reduce(f64::min);
+                let regime = set.regime.map_or("", Regime::word);
+                *census.regimes.entry(regime).or_default() += 1;
             }
         }
         Ok(census)
     }
 
-    /// Of so many sets one is shown.
+    /// Every so many sets, one is shown.
     pub(super) fn spacing(&self) -> u64 {
         self.sets.div_ceil(MAX_SETS).max(1)
     }
@@ -174,7 +154,7 @@ pub(super) struct Sets {
     command_end: String,
     /// Histogram of τ of each set: numbers of bins of a width of the mean / 60, each followed by its count.
     histograms: Vec<Vec<u64>>,
-    /// What was swept, that of most values first, and whether logarithmically.
+    /// Swept parameters, that with the most values first, and whether their axes are logarithmic.
     swept: Vec<(String, bool)>,
     /// Places of the sets by their ids.
     #[serde(skip)]
@@ -191,32 +171,29 @@ impl Sets {
         let mut sets = Self {
             columns: Columns::of::<SetRow>(|_| true),
             commands: Vec::new(),
-            command_end: String::new(),
+            command_end: sweep.command_end(),
             histograms: Vec::new(),
             swept: Vec::new(),
             places: HashMap::new(),
         };
-        let (mut number, mut shown) = (0_u64.., Vec::new());
+        let mut number = 0_u64;
+        let mut shown = Vec::new();
         for batch in sets_file(layout).rows::<SetRow>() {
-            let rows = batch?.into_iter().filter(|row| !row.is_control);
-            for (row, _) in rows
-                .zip(&mut number)
-                .filter(|(_, number)| number.is_multiple_of(spacing))
-            {
-                sets.push(sweep, &row);
-                shown.push(row);
+            for row in batch?.into_iter().filter(|row| !row.is_control) {
+                if number.is_multiple_of(spacing) {
+                    sets.push(sweep, &row);
+                    shown.push(row);
+                }
+                number += 1;
             }
         }
         sets.columns.label(|column| label(&column.name));
-        sets.swept = swept(&shown)
-            .iter()
-            .map(|swept| (swept.name().to_owned(), swept.is_logarithmic()))
-            .collect();
-        let bins = Dataset::new(
-            layout.storage,
-            vec![layout.reduced_file(HistogramBin::NAME)],
-        );
-        for batch in bins.rows::<HistogramBin>() {
+        for swept in &swept(&shown) {
+            let name = swept.name().to_owned();
+            sets.swept.push((name, swept.is_logarithmic()));
+        }
+        let file = layout.reduced_file(HistogramBin::NAME);
+        for batch in Dataset::new(layout.storage, vec![file]).rows::<HistogramBin>() {
             for bin in batch? {
                 if let Some(&place) = sets.places.get(&bin.set_id) {
                     let number = floored((bin.low / (bin.high - bin.low)).round()) as u64;
@@ -228,31 +205,12 @@ impl Sets {
     }
 
     fn push(&mut self, sweep: &Sweep, row: &SetRow) {
-        let [begin, end] = command(sweep, &row.parameters.parameters);
-        self.commands.push(begin);
-        self.command_end = end;
+        let parameters = &row.parameters.parameters;
+        self.commands.push(sweep.command_of_set(parameters));
         self.histograms.push(Vec::new());
         self.columns.push(row);
         self.places.insert(row.set_id.clone(), self.places.len());
     }
-}
-
-/// The `simulate` command of a job up to its seed and from there on. The end is the same for all jobs of a sweep.
-fn command(sweep: &Sweep, parameters: &Parameters) -> [String; 2] {
-    // The seed stands last among the parameters, and in the command if it is not the default.
-    let seeded = Parameters {
-        seed: 1,
-        ..parameters.clone()
-    };
-    let command = sweep.command(&Job {
-        point: 0,
-        parameters: seeded,
-        cost: 0.0,
-    });
-    let (begin, end) = command
-        .rsplit_once("--set seed=1")
-        .unwrap_or((&command, ""));
-    [begin.trim_end().to_owned(), end.trim_start().to_owned()]
 }
 
 pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
@@ -266,7 +224,6 @@ pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn a_number_keeps_five_digits_and_a_value_that_is_none_is_null() {
@@ -274,22 +231,6 @@ mod tests {
         assert_eq!(json(Value::Real(1e-300)), 1e-300);
         assert_eq!(json(Value::Real(f64::INFINITY)), Json::Null);
         assert_eq!(json(Value::Real(f64::NAN)), Json::Null);
-    }
-
-    #[test]
-    fn the_two_ends_of_a_command_and_a_seed_are_that_of_the_job() {
-        let text =
-            "name = \"a\"\n[axes]\nV0 = [1e-5, 2e-5]\nseed = { count = 3 }\n[record]\nslips = 7\n";
-        let sweep = Sweep::parse(text, Path::new("a.toml")).unwrap();
-        for job in sweep.jobs() {
-            let [begin, end] = command(&sweep, &job.parameters);
-            let put_together = format!("{begin} --set seed={} {end}", job.parameters.seed);
-            // The default seed need not be said.
-            assert_eq!(
-                put_together.replace(" --set seed=0", ""),
-                sweep.command(&job)
-            );
-        }
     }
 
     #[test]

@@ -1,13 +1,13 @@
-//! Events: what happens to a results directory, as it happens. Displays are fed with them, and the log keeps them.
+//! Events of a run, for displays and for the log.
 //!
-//! The log is lines of JSON in `run/log/`, one file for each run, so that runs on several hosts do not write into each
-//! other's. Tables never depend on it.
+//! The log is lines of JSON in `run/log/`, one file for each run, so that no two hosts write into one file. Tables never
+//! depend on it.
 
 use crate::results::commit::own_number;
 use crate::results::deaths::Marked;
 use crate::results::directory::Results;
 use crate::results::layout::is_hidden;
-use crate::results::rounds::RoundsSoFar;
+use crate::results::next_round::RoundsSoFar;
 use crate::results::workers::{host, plain};
 use crate::table::error::ResultsError;
 use crate::table::storage::{StorageError, StoredFile};
@@ -19,23 +19,19 @@ use std::time::{SystemTime, UNIX_EPOCH};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum RunEvent {
-    /// A run knows what is to be done.
     Started {
         host: String,
         process: u32,
         program: String,
         /// Shard, as `K/N`.
         shard: String,
-        /// Other workers that are there.
         others: usize,
         threads: usize,
         jobs: u64,
-        /// Jobs that are there already.
         jobs_there: u64,
-        /// Predicted cost of the jobs to run.
         predicted_cost: f64,
     },
-    /// The next round of a sweep that decides for itself has begun.
+    /// The next round of an adaptive sweep has begun.
     RoundBegun {
         jobs: u64,
         predicted_cost: f64,
@@ -53,7 +49,7 @@ pub enum RunEvent {
         predicted_cost: f64,
         wall: f64,
     },
-    /// Memory, and not threads, limits the jobs at once: in bytes, what all may take, and what the next is predicted to.
+    /// Memory, and not threads, limits the jobs at once: bytes that are free, and bytes that the next job is predicted to take.
     ShortOfMemory {
         allowed: f64,
         needed: f64,
@@ -74,17 +70,15 @@ pub enum RunEvent {
     },
     PartCommitted {
         part: String,
-        /// Jobs that were run for it.
         jobs: usize,
         failed: usize,
         predicted_cost: f64,
         measured_cost: f64,
-        /// Sum of their wall times.
         wall: f64,
     },
     /// The run was asked to stop, or its time is over; jobs in flight are interrupted.
     Stopping,
-    /// Not all parts would end in time; what is under way does.
+    /// Not all parts would end in time; those that have begun do.
     OutOfTime,
     /// The run ends by itself.
     Finished(RunReport),
@@ -100,14 +94,14 @@ pub struct RunReport {
     pub jobs_run: u64,
     /// Jobs that count as failed: all that are asked for if no other worker was there at the end, else those of this run.
     pub jobs_failed: u64,
-    /// Jobs that are still to be run, by other workers if this one was not stopped.
+    /// Jobs that are missing; other workers run them if this run was not stopped.
     pub jobs_left: u64,
-    /// Jobs finished of parts that are not done; they are kept.
+    /// Finished jobs of unfinished parts, which are kept.
     pub jobs_spilled: u64,
     pub parts_committed: u64,
-    /// Whether the run was stopped, or its time did not suffice, before all was done.
+    /// Whether a signal or the walltime stopped the run before all was done.
     pub stopped: bool,
-    /// Parts that are not done and at which workers died.
+    /// Unfinished parts at which workers died.
     #[serde(default)]
     pub marked: Vec<Marked>,
     /// Hosts of the workers that run the jobs which are left.
@@ -118,12 +112,11 @@ pub struct RunReport {
     pub measured_cost: f64,
     /// Wall time of the run, in s.
     pub wall: f64,
-    /// How far the rounds are, of a sweep that decides for itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rounds: Option<RoundsSoFar>,
 }
 
-/// Most bytes of a line: far more than any reason of a failure has.
+/// Most bytes of a line.
 const MAX_LINE: u64 = 1 << 24;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -148,7 +141,7 @@ impl Log {
         self.0.sync()
     }
 
-    /// Appends an event, unless it comes for each job, or each second: these would be millions of lines.
+    /// Appends an event. Events of each job or second are left out: they would be millions of lines.
     pub fn write(&mut self, event: &RunEvent) -> Result<(), StorageError> {
         if matches!(
             event,
@@ -156,12 +149,10 @@ impl Log {
         ) {
             return Ok(());
         }
-        // An event always has a form as JSON: it holds texts and numbers alone.
-        let line = serde_json::to_string(&Line {
-            time: now(),
-            event: event.clone(),
-        })
-        .unwrap_or_default();
+        let time = now();
+        let event = event.clone();
+        // Texts and numbers always have a form as JSON.
+        let line = serde_json::to_string(&Line { time, event }).unwrap_or_default();
         self.0.write(format!("{line}\n").as_bytes())
     }
 }
@@ -178,10 +169,10 @@ impl Results<'_> {
         Ok(Log(self.layout().storage.create(&path)?))
     }
 
-    /// Goes through all events that are logged, in order of the beginnings of their runs. What a killed run left
-    /// half-written is passed over, and so is what is no file.
+    /// Visits all logged events, run after run. Half-written lines and other than regular files are passed over.
     pub fn events(&self, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
-        let (folder, storage) = (self.layout().logs(), self.layout().storage);
+        let folder = self.layout().logs();
+        let storage = self.layout().storage;
         let names = storage.list(&folder)?.into_iter();
         for name in names.filter(|name| !is_hidden(name)) {
             let path = folder.join(name);
@@ -189,22 +180,17 @@ impl Results<'_> {
                 Err(error) if error.is_no_file() => continue,
                 log => BufReader::new(log?),
             };
-            let mut line = Vec::new();
-            while log
-                .by_ref()
-                .take(MAX_LINE)
-                .read_until(b'\n', &mut line)
-                .map_err(StorageError::at("read", &path))?
-                > 0
-            {
+            loop {
+                let mut line = Vec::new();
+                let read = log.by_ref().take(MAX_LINE).read_until(b'\n', &mut line);
+                let length = read.map_err(StorageError::at("read", &path))? as u64;
                 if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
                     visit(event);
                 }
-                // The rest of it is no log.
-                if line.len() as u64 == MAX_LINE {
+                // The end of the file, or a file that is no log.
+                if length == 0 || length == MAX_LINE {
                     break;
                 }
-                line.clear();
             }
         }
         Ok(())

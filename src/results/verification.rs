@@ -1,7 +1,7 @@
-//! Verification: every file whole and in its place, every job there once; what is damaged is named, with what to do.
+//! Verification: every file intact and in its place, every job there once; damage is listed, with what to do.
 //!
-//! Every table file can be made again with the same bytes, so a repair moves what is damaged to `run/quarantine/`, and the
-//! next run does the rest. Memory: one part, and the names of all.
+//! `run` makes every table file again with the same bytes, so a repair only moves damaged files to `run/quarantine/`.
+//! Memory: one part, and the names of all.
 
 use crate::results::commit::Commit;
 use crate::results::directory::{Results, STRANGER};
@@ -19,7 +19,6 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Staging folder of a repair.
 const WRITER: &str = "repair";
 
 #[derive(Clone, Debug, Default, Serialize)]
@@ -28,15 +27,15 @@ pub struct Verification {
     pub whole: bool,
     /// Damage, in the order in which it was found.
     pub problems: Vec<Problem>,
-    /// What lies among tables and reduced data, is not of them, and is read by no command: paths, as messages show them.
+    /// Other files among tables and reduced data, which no command reads: paths, as messages show them.
     pub passed_over: Vec<String>,
-    /// Table files that are whole.
+    /// Table files that are intact.
     pub files: u64,
     pub bytes: u64,
-    /// Parts that are done and whole.
+    /// Parts that are done and intact.
     pub parts: u64,
     pub jobs: u64,
-    /// Names of the parts that are asked for and not there, damaged ones aside.
+    /// Names of the missing parts, without damaged ones.
     pub missing: Vec<String>,
     /// Their jobs, without those that are spilled.
     pub jobs_missing: u64,
@@ -48,19 +47,15 @@ pub struct Problem {
     #[serde(serialize_with = "serialize_path")]
     pub path: PathBuf,
     pub problem: String,
-    /// The part that is run again for it.
+    /// The part that a repair moves away as a whole.
     pub part: Option<String>,
-    /// Ids of its jobs.
+    /// Ids of its jobs, with its first problem.
     pub jobs: Vec<String>,
-    /// Files that a repair moves away, in this order.
-    #[serde(skip)]
-    moved: Vec<PathBuf>,
 }
 
 impl Problem {
     fn new(path: PathBuf, problem: impl Into<String>) -> Self {
         Self {
-            moved: vec![path.clone()],
             path,
             problem: problem.into(),
             part: None,
@@ -75,24 +70,32 @@ impl<'a> Results<'a> {
         Ok(examine(layout)?.1)
     }
 
-    /// Moves away what is damaged, so that the next run makes it again; returns what was found.
+    /// Moves damaged files away, so that the next run makes them again; returns what was found.
     pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
         let (results, verification) = examine(layout)?;
-        let quarantine = layout.quarantine();
-        for path in verification
-            .problems
-            .iter()
-            .flat_map(|problem| &problem.moved)
-        {
-            let below = [layout.tables(), layout.run(), layout.root().to_owned()]
-                .iter()
-                .find_map(|folder| path.strip_prefix(folder).ok())
-                .unwrap_or(path);
-            layout.storage.move_away(path, &quarantine.join(below))?;
+        for problem in &verification.problems {
+            match problem.part.as_deref().and_then(PartName::parse) {
+                None => move_away(layout, &problem.path)?,
+                // Its first problem has moved the whole part.
+                Some(_) if problem.jobs.is_empty() => (),
+                // Jobs first: a part without them is not done.
+                Some(part) => results.tables().rev().try_for_each(|table| {
+                    move_away(layout, &layout.table(table).join(part.file()))
+                })?,
+            }
         }
         results.write_copies(|| Commit::begin(layout, &layout.staging(WRITER)))?;
         Ok(verification)
     }
+}
+
+fn move_away(layout: &Layout<'_>, path: &Path) -> Result<(), StorageError> {
+    let places = [layout.tables(), layout.run(), layout.root().to_owned()];
+    let below = places
+        .iter()
+        .find_map(|folder| path.strip_prefix(folder).ok());
+    let target = layout.quarantine().join(below.unwrap_or(path));
+    layout.storage.move_away(path, &target)
 }
 
 fn examine<'a>(layout: &Layout<'a>) -> Result<(Results<'a>, Verification), ResultsError> {
@@ -152,7 +155,7 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
             found.passed_over.push(shown(&path).to_string());
         }
     }
-    // In this order: a worker that has its jobs there has had the rest there before.
+    // In this order: a part that has its jobs had its other files before.
     let mut there: BTreeMap<&str, BTreeSet<PathBuf>> = BTreeMap::new();
     for table in results.tables().rev() {
         let files = table_files(layout, &layout.table(table), found)?;
@@ -166,51 +169,59 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
         planned.insert(name);
         let is_there = |table: &&str| there[table].contains(&results.part_file(table, &part));
         let tables: Vec<&'static str> = results.tables().filter(is_there).collect();
-        let mut damage = damage_of(results, &part, &tables)?;
-        if !damage.is_empty() {
-            // A retry of failed jobs may have been replacing its files.
-            damage = damage_of(results, &part, &tables)?;
-        }
-        for problem in &mut damage {
-            problem.part = Some(name.to_string());
-        }
-        if let Some(first) = damage.first_mut() {
-            // It stands for the part.
-            first.jobs = ids(results, &part).collect();
-            // Jobs first: a part without them is not done.
-            first.moved = results
-                .tables()
-                .rev()
-                .map(|table| results.part_file(table, &part))
-                .collect();
-            found.problems.extend(damage);
-            continue;
-        }
-        sound.push((*part).clone());
-        if tables.contains(&tables::JOBS) {
-            done.0.insert(name);
-            found.parts += 1;
-            found.jobs += part.jobs.len() as u64;
-            for table in tables {
-                found.bytes += layout.storage.length(&results.part_file(table, &part))?;
-                found.files += 1;
+        if verify_part(results, &part, &tables, found)? {
+            sound.push((*part).clone());
+            if tables.contains(&tables::JOBS) {
+                done.0.insert(name);
             }
-        } else {
-            found.missing.push(name.to_string());
         }
     }
     let pending = Pending::with(results, &sound, Retry::default(), done)?;
     let overview = pending.overview(false, |_, _, _| ())?;
     found.jobs_missing = overview.jobs_missing;
     found.jobs_spilled = overview.jobs_spilled;
-    let strangers = there
-        .into_values()
-        .flatten()
-        .filter(|path| !PartName::of_path(path).is_some_and(|part| planned.contains(&part)));
+    let is_planned = |path: &Path| PartName::of_path(path).is_some_and(|it| planned.contains(&it));
+    let strangers = there.into_values().flatten();
+    let strangers = strangers.filter(|path| !is_planned(path));
     found
         .problems
         .extend(strangers.map(|path| Problem::new(path, STRANGER)));
     Ok(())
+}
+
+/// Verifies a part that has files in these tables; returns whether it is sound.
+fn verify_part(
+    results: &Results<'_>,
+    part: &Part,
+    tables: &[&'static str],
+    found: &mut Verification,
+) -> Result<bool, ResultsError> {
+    let name = PartName::from(&**part).to_string();
+    let mut damage = damage_of(results, part, tables)?;
+    if !damage.is_empty() {
+        // A retry of failed jobs may have been replacing its files.
+        damage = damage_of(results, part, tables)?;
+    }
+    if let Some(first) = damage.first_mut() {
+        first.jobs = ids(results, part).collect();
+        for problem in &mut damage {
+            problem.part = Some(name.clone());
+        }
+        found.problems.extend(damage);
+        return Ok(false);
+    }
+    if !tables.contains(&tables::JOBS) {
+        found.missing.push(name);
+        return Ok(true);
+    }
+    found.parts += 1;
+    found.jobs += part.jobs.len() as u64;
+    found.files += tables.len() as u64;
+    for table in tables {
+        let file = results.part_file(table, part);
+        found.bytes += results.layout().storage.length(&file)?;
+    }
+    Ok(true)
 }
 
 /// The ids of the jobs of a part, in order.
@@ -230,7 +241,7 @@ fn damage_of(
     for table in results.tables() {
         let file = results.file_in(&layout.tables(), table, PartName::from(&**part));
         if tables.contains(&table) {
-            // What a killed run left is whole, too, and is read by those who read the folder.
+            // Files that a killed run left are intact, too, as other programs read them.
             damage.extend(damage_in(file.check(layout.storage))?);
         } else if has_jobs {
             let problem = "it is missing, though the jobs of its part are there";
@@ -245,53 +256,55 @@ fn damage_of(
 
 /// Compares the rows of all tables of a part with each other, and with the plan.
 fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
-    let dataset = |table| results.dataset_of(table, PartName::from(&**part));
     let path = results.part_file(tables::JOBS, part);
-    let jobs = dataset(tables::JOBS)
-        .rows::<RowsOfJob>()
-        .collect::<Result<Vec<_>, _>>()?;
-    let jobs: Vec<RowsOfJob> = jobs.into_iter().flatten().collect();
-    let mut planned = 0;
+    let damaged = |problem: String| Err(ResultsError::damaged(&path, problem));
+    let mut jobs: Vec<RowsOfJob> = Vec::new();
+    let dataset = results.dataset_of(tables::JOBS, PartName::from(&**part));
+    for batch in dataset.rows() {
+        jobs.extend(batch?);
+    }
     for (expected, job) in ids(results, part).zip(&jobs) {
         if job.job_id != expected {
-            return Err(ResultsError::damaged(
-                &path,
-                format!("it has job {} where the plan has {expected}", job.job_id),
-            ));
+            let found = &job.job_id;
+            return damaged(format!("it has job {found} where the plan has {expected}"));
         }
-        planned += 1;
     }
-    if jobs.len() != planned || part.jobs.len() != planned {
-        let problem = format!(
-            "it has {} jobs, and its part {}",
-            jobs.len(),
-            part.jobs.len()
-        );
-        return Err(ResultsError::damaged(&path, problem));
+    if jobs.len() != part.jobs.len() {
+        let found = jobs.len();
+        let planned = part.jobs.len();
+        return damaged(format!("it has {found} jobs, and its part {planned}"));
     }
-    for table in results.tables().filter(|table| *table != tables::JOBS) {
-        let path = results.part_file(table, part);
-        let (mut rows, mut at) = (vec![0; jobs.len()], 0);
-        for batch in dataset(table).rows::<RowOfJob>() {
-            for RowOfJob { job_id } in batch? {
-                // Rows stand in the order of the jobs.
-                at += jobs[at..]
-                    .iter()
-                    .take_while(|job| job.job_id != job_id)
-                    .count();
-                *rows.get_mut(at).ok_or_else(|| {
-                    let problem = format!(
-                        "it has rows of job {job_id} that are not its part's, or not there"
-                    );
-                    ResultsError::damaged(&path, problem)
-                })? += 1;
-            }
+    let mut others = results.tables().filter(|table| *table != tables::JOBS);
+    others.try_for_each(|table| check_counts(results, part, &jobs, table))
+}
+
+/// Compares the rows of a table of a part with what its jobs say.
+fn check_counts(
+    results: &Results<'_>,
+    part: &Part,
+    jobs: &[RowsOfJob],
+    table: &str,
+) -> Result<(), ResultsError> {
+    let path = results.part_file(table, part);
+    let mut counts = vec![0; jobs.len()];
+    let mut at = 0;
+    let dataset = results.dataset_of(table, PartName::from(&**part));
+    for batch in dataset.rows::<RowOfJob>() {
+        for RowOfJob { job_id } in batch? {
+            // Rows stand in the order of the jobs.
+            let passed = jobs[at..].iter().take_while(|job| job.job_id != job_id);
+            at += passed.count();
+            let Some(count) = counts.get_mut(at) else {
+                let problem = format!("it has rows of job {job_id}, which its part does not have");
+                return Err(ResultsError::damaged(&path, problem));
+            };
+            *count += 1;
         }
-        for (job, rows) in jobs.iter().zip(rows) {
-            let problem =
-                |problem| ResultsError::damaged(&path, format!("of job {} {problem}", job.job_id));
-            job.count(table).check(rows).map_err(problem)?;
-        }
+    }
+    for (job, rows) in jobs.iter().zip(counts) {
+        let problem =
+            |problem| ResultsError::damaged(&path, format!("of job {} {problem}", job.job_id));
+        job.count(table).check(rows).map_err(problem)?;
     }
     Ok(())
 }

@@ -1,6 +1,5 @@
 //! Rounds of a directory: each is an extension with the same sweep file, begun when all parts of the one before are done.
-//!
-//! All workers look; one of them, which holds a lock, decides what the next round runs, and writes it.
+//! One worker, which holds a lock, decides what the next round runs, and writes it.
 
 use crate::results::commit::exclusive_lock;
 use crate::results::directory::Results;
@@ -24,31 +23,21 @@ pub struct RoundsSoFar {
 }
 
 impl Results<'_> {
-    /// The rounds so far of the sweep that was asked for last, in order; itself alone if it decides nothing.
+    /// The rounds so far of the current sweep, in order; the sweep alone if it is not adaptive.
     pub fn rounds(&self) -> &[Extension] {
         let text = self.sweep().text();
-        let others = self
-            .extensions()
-            .iter()
-            .rev()
-            .skip_while(|extension| extension.sweep.text() == text)
-            .count();
-        &self.extensions()[others..]
+        let latest = self.extensions().iter().rev();
+        let rounds = latest.take_while(|extension| extension.sweep.text() == text);
+        &self.extensions()[self.extensions().len() - rounds.count()..]
     }
 
     /// All points that these have chosen.
     pub fn chosen(&self) -> Round {
-        let rounds = self
-            .rounds()
-            .iter()
-            .filter_map(|extension| extension.round.as_ref());
-        let points = merged(
-            rounds
-                .flat_map(|round| round.points.iter().cloned())
-                .collect(),
-        );
+        let rounds = self.rounds().iter();
+        let rounds = rounds.filter_map(|extension| extension.round.as_ref());
+        let points = rounds.flat_map(|round| round.points.iter().cloned());
         Round {
-            points,
+            points: merged(points.collect()),
             ..Round::default()
         }
     }
@@ -71,8 +60,8 @@ impl Results<'_> {
         })
     }
 
-    /// The directory as it goes on, once all its parts are done: in a round that another worker has begun meanwhile, or in
-    /// the one that `decide` has found. `None` if the rounds are over, or if there are none.
+    /// The directory with its next round, once all its parts are done: a round that another worker has begun meanwhile, or
+    /// the one that `decide` chooses. `None` if the rounds are over, or if there are none.
     pub fn next_round(
         &self,
         member: &Member<'_>,
@@ -91,7 +80,7 @@ impl Results<'_> {
             return Err(ResultsError::refused(layout.root(), problem));
         }
         let done = current.done_parts()?;
-        // Another worker was first; or a repair has taken a part away.
+        // Another worker was first, or a repair has moved a part away.
         if current.extensions().len() > self.extensions().len()
             || current.plan().outlines().any(|part| !done.has(&part))
         {

@@ -1,4 +1,4 @@
-//! One job with records on request: that of a sweep with one point.
+//! One job with records on request: the job of a sweep with one point.
 
 use crate::model::theory::typical_interval;
 use crate::model::{ContactEvent, Parameters};
@@ -7,7 +7,7 @@ use crate::observe::{
     Recording, SlipObserver, Trace, TraceRow,
 };
 use crate::solver::{self, Observer, SimulationError};
-use crate::sweep::{Change, Job, Mistake, Sweep};
+use crate::sweep::{Change, Job, Sweep};
 use crate::table::columns::tables;
 use std::sync::atomic::AtomicBool;
 
@@ -22,7 +22,7 @@ tables! {
 /// More samples than this, of 24 bytes each, are a mistake.
 const MAX_SAMPLES: f64 = 1e8;
 
-/// A simulation that is not one, or would record too much.
+/// A request for other than one job, or for too many records.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RequestError {
     #[error(
@@ -37,7 +37,7 @@ pub enum RequestError {
     TooManySamples { sample: f64, time: f64 },
 }
 
-/// The text of a sweep with one point. Without a number of slips it records 20, or with a time all until then.
+/// The text of a sweep with one point. Without a number of slips it records 20, or with a time all slips until then.
 pub fn sweep_text(changes: &[Change]) -> String {
     let is_given = |key: &str| changes.iter().any(|change| change.key == key);
     let slips = if is_given("slips") || is_given("time") {
@@ -55,20 +55,6 @@ pub fn sweep_text(changes: &[Change]) -> String {
     };
     let [model, record, solver] = ["model", "record", "solver"].map(of);
     format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
-}
-
-/// The mistakes in the text of a sweep, as those in what it was made from, which has no lines, nor `[model]`.
-pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
-    let problems = mistakes.iter().map(|Mistake { problem, .. }| {
-        let (start, end) = problem.split_once(" (line ").unwrap_or((problem, ""));
-        let end = end.split_once(')').map_or("", |(_, rest)| rest);
-        format!("{start}{end}").replace(" in [model]", "")
-    });
-    let between = if mistakes.len() > 1 { "\n  " } else { " " };
-    format!(
-        "in the {source}:{between}{}",
-        problems.collect::<Vec<_>>().join(between)
-    )
 }
 
 /// The job of a sweep that has one.
@@ -125,7 +111,7 @@ impl Request {
     }
 }
 
-/// What was recorded beside slips; empty where nothing asked for it.
+/// Records beside slips; empty unless requested.
 #[derive(Clone, Debug, Default)]
 pub struct Records {
     pub trace: Vec<TraceRow>,
@@ -136,7 +122,7 @@ pub struct Records {
     pub contacts: Vec<ContactEvent>,
 }
 
-/// Simulates a job, and records what is asked for. The slips are those of a run of the sweep, to the bit.
+/// Simulates a job, with records on request. The slips are those of a run of the sweep, to the bit.
 pub fn simulate(
     sweep: &Sweep,
     parameters: &Parameters,
@@ -163,7 +149,8 @@ pub fn simulate(
         lead: &mut slips,
         others,
     };
-    let (limits, solver) = (recording.limits(interrupt), sweep.solver());
+    let limits = recording.limits(interrupt);
+    let solver = sweep.solver();
     let summary = if recording.energies {
         solver::simulate_audited(parameters, solver, limits, observer)?.0
     } else {

@@ -1,4 +1,4 @@
-//! Memory that this process may take, in bytes. Infinite where Linux does not say.
+//! Memory that this process may take, in bytes; infinite if unknown.
 
 use crate::sweep::LARGE;
 use std::fs;
@@ -8,7 +8,7 @@ const KILOBYTE: f64 = 1024.0;
 /// Address space of a thread: its stack, and what the C library reserves for it.
 const OF_A_THREAD: f64 = 68e6;
 
-/// What hard limits leave for jobs: those of the control groups of this process, its address space and its data.
+/// Memory that hard limits leave for jobs: limits of control groups, of the address space and of data.
 pub fn allowed() -> f64 {
     let limits = text_of("/proc/self/limits");
     let status = text_of("/proc/self/status");
@@ -21,7 +21,7 @@ pub fn allowed() -> f64 {
         .min(left("Max data size", "VmData:"))
 }
 
-/// What this process has, and could get now without taking it from others.
+/// Memory that this process has or could get now without taking it from others.
 pub fn available() -> f64 {
     let free = number_after(&text_of("/proc/meminfo"), "MemAvailable:");
     let own = number_after(&text_of("/proc/self/status"), "VmRSS:");
@@ -29,7 +29,7 @@ pub fn available() -> f64 {
         .map_or(f64::INFINITY, |(free, own)| KILOBYTE * (free + own))
 }
 
-/// What a job takes beside the threads. A small one finds room in what is reserved for its thread.
+/// Memory of a job beside its threads. A small job fits into what is reserved for its thread.
 pub fn beside_threads(job: f64, threads: usize) -> f64 {
     if job < LARGE {
         job
@@ -47,8 +47,7 @@ fn number_after(text: &str, key: &str) -> Option<f64> {
     value.split_whitespace().next()?.parse().ok()
 }
 
-/// The least limit of the control groups, of both versions, and of all above them. A container may show its own group in
-/// place of the topmost.
+/// The least limit of the control groups and of all above them. A container may show its own group as the topmost.
 fn of_groups(groups: &str, mount: &Path) -> f64 {
     let mut least = f64::INFINITY;
     for group in groups.lines() {
@@ -101,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_and_fields_are_read_and_what_is_unlimited_is_none() {
+    fn limits_and_fields_are_read_and_unlimited_is_no_number() {
         let limits = "Limit                     Soft Limit           Hard Limit           Units     \n\
                       Max data size             unlimited            unlimited            bytes     \n\
                       Max address space         1536000000           unlimited            bytes     \n";

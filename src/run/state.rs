@@ -1,0 +1,283 @@
+//! How far a directory is, and how far a run is: jobs done and missing, failures by reason, time left.
+
+use crate::results::deaths::Marked;
+use crate::results::log::RunEvent;
+use crate::results::next_round::RoundsSoFar;
+use crate::results::pending::{Again, Overview, Pending, Retry};
+use crate::results::tables::{JOBS, JobOutcome};
+use crate::results::workers::Living;
+use crate::results::{Results, ResultsError};
+use crate::sweep::{Extension, Outline};
+use crate::table::columns::columns;
+use serde::Serialize;
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::time::SystemTime;
+
+/// Failed jobs that [`status`] lists one by one, at most.
+pub const MAX_FAILURES: u64 = 10;
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Status {
+    pub name: String,
+    #[serde(flatten)]
+    pub overview: Overview,
+    pub workers: Vec<Present>,
+    /// Measured over predicted CPU time so far, by the logs; null before the first part.
+    pub pace: Option<f64>,
+    /// Predicted wall time for the missing jobs, in s, at this pace on the present or last threads; null like the pace.
+    pub time_left: Option<f64>,
+    pub failures: Vec<Failure>,
+    pub failure_reasons: Reasons,
+    pub cut: Cut,
+    /// Unfinished parts at which workers died.
+    pub marked: Vec<Marked>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rounds: Option<RoundsSoFar>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Present {
+    pub host: String,
+    pub process: u32,
+    pub threads: usize,
+    pub jobs_per_second: f64,
+    /// Time since its last beat, in s, by the clocks of the file system and of this host.
+    pub last_beat: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Failure {
+    pub job_id: String,
+    pub reason: String,
+    /// The command that does the same, to look at it alone.
+    pub command: String,
+}
+
+columns! {
+    struct Ended {
+        outcome: JobOutcome;
+        slips: Option<u64>;
+    }
+}
+
+/// Jobs that `max_time` ended within an interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Cut {
+    pub jobs: u64,
+    pub slips: u64,
+}
+
+impl Cut {
+    fn read(results: &Results<'_>) -> Result<Self, ResultsError> {
+        let mut cut = Self::default();
+        let has_time = |extension: &Extension| extension.sweep.recording().max_time.is_some();
+        if !results.extensions().iter().any(has_time) {
+            return Ok(cut);
+        }
+        for batch in results.dataset(JOBS)?.rows::<Ended>() {
+            for job in batch? {
+                if job.outcome == JobOutcome::TimeLimit {
+                    cut.jobs += 1;
+                    cut.slips += job.slips.unwrap_or(0);
+                }
+            }
+        }
+        Ok(cut)
+    }
+}
+
+/// Jobs of finished parts that the current sweep does not have.
+fn jobs_kept(pending: &Pending<'_>) -> u64 {
+    let last = pending.results.extensions().len() - 1;
+    let is_earlier = |part: &&Outline| part.extension < last && pending.done.has(part);
+    let parts = pending.parts.iter().filter(is_earlier);
+    let jobs = parts.flat_map(|part| pending.part(part).jobs);
+    let kept = jobs.filter(|job| !pending.results.sweep().contains(&job.parameters));
+    kept.count() as u64
+}
+
+pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
+    status_with(results, MAX_FAILURES)
+}
+
+/// The same, with another number of failed jobs.
+pub fn status_with(results: &Results<'_>, max_failures: u64) -> Result<Status, ResultsError> {
+    let mut failures = Vec::new();
+    let mut failure_reasons = Reasons::default();
+    let parts: Vec<Outline> = results.plan().outlines().collect();
+    let pending = Pending::look_up(results, &parts, Retry::default())?;
+    pending.look_at_all_deaths()?;
+    let mut overview = pending.overview(true, |part, position, why| {
+        if let Again::Failed(reason) = why
+            && failure_reasons.add(reason) <= max_failures
+        {
+            failures.push(Failure {
+                job_id: results.job_id(part, position),
+                reason: reason.clone(),
+                command: results.sweep().command(&part.jobs[position]),
+            });
+        }
+    })?;
+    overview.jobs_kept = jobs_kept(&pending);
+    let mut last_threads = None;
+    let mut predicted = 0.0;
+    let mut measured = 0.0;
+    results.events(|event| match event {
+        RunEvent::Started { threads, .. } => last_threads = Some(threads),
+        RunEvent::PartCommitted {
+            predicted_cost,
+            wall,
+            ..
+        } => {
+            predicted += predicted_cost;
+            measured += wall;
+        }
+        _ => (),
+    })?;
+    let now = SystemTime::now();
+    let present = |Living { worker, beat, .. }| Present {
+        host: worker.host,
+        process: worker.process,
+        threads: worker.threads,
+        jobs_per_second: worker.jobs_per_second,
+        last_beat: now.duration_since(beat).unwrap_or_default().as_secs_f64(),
+    };
+    let living = results.layout().living(now)?;
+    let workers: Vec<Present> = living.into_values().map(present).collect();
+    let threads = workers.iter().map(|worker| worker.threads);
+    let threads = threads.reduce(usize::saturating_add).or(last_threads);
+    let pace = (predicted > 0.0).then(|| measured / predicted);
+    Ok(Status {
+        name: results.sweep().name().to_owned(),
+        overview,
+        workers,
+        pace,
+        time_left: pace
+            .zip(threads)
+            .map(|(pace, threads)| overview.predicted_cost_missing * pace / threads.max(1) as f64),
+        failures,
+        failure_reasons,
+        cut: Cut::read(results)?,
+        marked: pending.marked(),
+        rounds: results.rounds_so_far(),
+    })
+}
+
+/// Numbers of failed jobs by reason. The numbers in a reason, which differ from job to job, are left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Reasons(BTreeMap<String, u64>);
+
+impl Reasons {
+    /// Counts a job; returns how many there are now.
+    pub fn add(&mut self, reason: &str) -> u64 {
+        *self.0.entry(without_numbers(reason)).or_default() += 1;
+        self.0.values().sum()
+    }
+
+    /// The most frequent first.
+    pub fn sorted(&self) -> Vec<(&str, u64)> {
+        let all = self.0.iter().map(|(reason, jobs)| (reason.as_str(), *jobs));
+        let mut reasons: Vec<(&str, u64)> = all.collect();
+        reasons.sort_by_key(|(_, jobs)| Reverse(*jobs));
+        reasons
+    }
+}
+
+fn without_numbers(reason: &str) -> String {
+    let words = reason.split(' ').map(|word| {
+        let number = word.trim_matches([',', ';', ':', '.', '(', ')']);
+        if number.parse::<f64>().is_ok() {
+            word.replace(number, "…")
+        } else {
+            word.to_owned()
+        }
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// How far a run is, by its events: jobs of all workers since it began, and their predicted cost.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    /// Jobs that are to be run, those of later rounds as these begin.
+    pub jobs: u64,
+    pub jobs_done: u64,
+    /// Of those done, jobs of other workers.
+    pub jobs_of_others: u64,
+    predicted: f64,
+    predicted_own: f64,
+    predicted_others: f64,
+}
+
+impl Tally {
+    pub fn note(&mut self, event: &RunEvent) {
+        match event {
+            RunEvent::Started {
+                jobs,
+                predicted_cost,
+                ..
+            }
+            | RunEvent::RoundBegun {
+                jobs,
+                predicted_cost,
+                ..
+            } => {
+                self.jobs += jobs;
+                self.predicted += predicted_cost;
+            }
+            RunEvent::JobDone { predicted_cost, .. }
+            | RunEvent::JobFailed { predicted_cost, .. } => {
+                self.jobs_done += 1;
+                self.predicted_own += predicted_cost;
+            }
+            RunEvent::OthersDone {
+                jobs,
+                predicted_cost,
+            } => {
+                self.jobs_done = self.jobs_done + jobs - self.jobs_of_others;
+                self.jobs_of_others = *jobs;
+                self.predicted_others = *predicted_cost;
+            }
+            _ => {}
+        }
+    }
+
+    /// Share of the predicted cost that is done; exactly 1 at the end, in whatever order costs were summed.
+    pub fn share(&self) -> f64 {
+        let done = self.predicted_own + self.predicted_others;
+        if self.jobs_done < self.jobs && self.predicted > 0.0 {
+            (done / self.predicted).min(1.0)
+        } else {
+            1.0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jobs_are_counted_by_reason_without_its_numbers_and_the_most_frequent_comes_first() {
+        let mut reasons = Reasons::default();
+        assert_eq!(reasons.sorted(), []);
+        assert_eq!(reasons.add("index 99 out of bounds"), 1);
+        for events in 10..14 {
+            reasons.add(&format!(
+                "at t = {events}.5e-3 s: {events} events, the shortest of 1/omega_max (s.d. {events})"
+            ));
+        }
+        assert_eq!(reasons.add("index 7 out of bounds"), 6);
+        assert_eq!(
+            reasons.sorted(),
+            [
+                (
+                    "at t = … s: … events, the shortest of 1/omega_max (s.d. …)",
+                    4
+                ),
+                ("index … out of bounds", 2)
+            ]
+        );
+    }
+}
