@@ -289,14 +289,6 @@ impl Axis {
         }
     }
 
-    /// The value halfway between two others, as the axis places them.
-    pub(super) fn middle(&self, low: f64, high: f64) -> f64 {
-        match self.scale {
-            Scale::Linear => 0.5 * (low + high),
-            Scale::Logarithmic => (low * high).sqrt(),
-        }
-    }
-
     /// Whether a value lies on the axis.
     pub(super) fn contains(&self, value: f64) -> bool {
         value >= self.low && value <= self.high

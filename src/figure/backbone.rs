@@ -2,10 +2,11 @@
 
 use super::axis::{Axis, angle_bounds, bounds};
 use super::colour_bar::ColourBar;
-use super::frame::{Layout, OVERLAP};
+use super::frame::{Cell, Ends, Layout, OVERLAP, Place};
+use super::ink::{Dot, Stroke};
 use super::legend::{Mark, entry};
-use super::panel::{self, Cell, Ends, Layer, Panel, Place};
-use super::picture::{Dot, Picture, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
 use super::sets::Grid;
 use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};

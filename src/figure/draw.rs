@@ -1,8 +1,8 @@
-//! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
+//! All figures that fit the reduced data of a sweep, written together, and custom figures.
 
 use super::style::INKS;
-use super::{BadOption, Format, Look, OwnFigure, Picture};
-use super::{backbone, drag, edges, histograms, intervals, map, own, sets};
+use super::{BadOption, CustomFigure, Format, Look, Picture};
+use super::{backbone, custom, drag, edges, histograms, intervals, map, overview, sets};
 use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
@@ -36,7 +36,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
                 .is_some_and(|second| second.distinct.len() > INKS.len())
         };
         if sets.len() > 1 && !(map.is_some() && is_net()) {
-            pictures.extend(own::overview(&sets, look));
+            pictures.extend(overview::overview(&sets, look));
         }
         pictures.extend(map);
     }
@@ -47,23 +47,23 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
     }
     if pictures.is_empty() {
-        pictures.extend(own::overview(&sets, look));
+        pictures.extend(overview::overview(&sets, look));
     }
     write(layout, &pictures, look, formats)
 }
 
-/// Draws a figure of one's own from the sets of a results directory; writes nothing.
-pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture> {
+/// Draws a custom figure from the sets of a results directory; writes nothing.
+pub fn draw_custom(layout: &Layout<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
     let mut rows: Vec<SetRow> = read(layout)?;
     rows.retain(|row| !row.is_control);
     let look = &look.with_note(&sets::common(rows.iter().map(|row| &*row.parameters)));
-    let picture = own::own(&rows, figure, look)?;
+    let picture = custom::custom(&rows, figure, look)?;
     check_size(&picture, look)?;
     Ok(picture)
 }
 
 /// Puts a figure into `figures/`, in these formats.
-pub fn write_own(
+pub fn write_custom(
     layout: &Layout<'_>,
     picture: Picture,
     look: &Look,
@@ -110,7 +110,7 @@ fn write(
     let mut files = Vec::new();
     for picture in pictures {
         for &format in formats {
-            let file = folder.join(format!("{}.{}", picture.name(), format.extension()));
+            let file = folder.join(format!("{}.{}", picture.name(), format.word()));
             commit.stage_bytes(&file, &picture.encoded(format)?)?;
             files.push(file);
         }

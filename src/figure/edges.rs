@@ -2,10 +2,11 @@
 
 use super::axis::Axis;
 use super::frame::Layout;
+use super::ink::{Dot, Stroke};
 use super::legend::{Mark, entry};
-use super::own::MAX_TICKS;
 use super::panel::{self, Layer, Panel};
-use super::picture::{Dot, Picture, Stroke};
+use super::picture::Picture;
+use super::quantity::MAX_TICKS;
 use super::sets::axis_of;
 use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
 use crate::model::Symbol;
@@ -129,7 +130,7 @@ mod tests {
         assert!(
             [INKS[0], INKS[1]]
                 .iter()
-                .all(|ink| svg.matches(ink).count() > 2)
+                .all(|ink| svg.matches(&ink.to_string()).count() > 2)
         );
         assert!(
             edges(&rows[..2], &Look::default()).is_none(),

@@ -4,10 +4,15 @@
 use super::axis::Axis;
 use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
-use super::panel::Cell;
 use super::picture::{Anchor, Picture, snapped};
 use super::style::{AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT};
-use kuva::render::color::Color;
+
+/// A point of data.
+pub(super) type Place = (f64, f64);
+/// Lower and upper end.
+pub(super) type Ends = (f64, f64);
+/// A rectangle of data: its ends along x and along y.
+pub(super) type Cell = (Ends, Ends);
 
 const TICK_LENGTH: f64 = 7.0;
 const MINOR_TICK_LENGTH: f64 = 4.0;
@@ -120,13 +125,7 @@ impl Layout {
         draw_legend(&mut sheet, legend, MARGIN, right, LEGEND_ROW);
         for (row, line) in (1..).map(f64::from).zip(&notes) {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
-            sheet.coloured_text(
-                place,
-                line,
-                NOTE_TEXT,
-                Anchor::Start,
-                Some(Color::from(DARK_GREY)),
-            );
+            sheet.coloured_text(place, line, NOTE_TEXT, Anchor::Start, Some(DARK_GREY));
         }
         (
             Page {

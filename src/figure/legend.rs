@@ -1,7 +1,8 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
 use super::font;
-use super::picture::{Anchor, Dot, Fill, Ink, Picture, Stroke};
+use super::ink::{Dot, Fill, Ink, Stroke};
+use super::picture::{Anchor, Picture};
 use super::style::{LEGEND_TEXT, WHITE};
 
 /// Width of a line or a patch, and of a dot.

@@ -2,18 +2,11 @@
 
 use super::axis::Axis;
 use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::frame::{Frame, Layout};
+use super::frame::{Cell, Ends, Frame, Layout, Place};
+use super::ink::{Dot, Fill, Ink, Stroke};
 use super::legend::Entry;
-use super::picture::{Anchor, Dot, Fill, Picture, Stroke};
-use super::style::{HALF_DIGIT, LEGEND_TEXT, Look, ink_on};
-use kuva::render::color::Color;
-
-/// A point of data.
-pub(super) type Place = (f64, f64);
-/// Lower and upper end.
-pub(super) type Ends = (f64, f64);
-/// A rectangle of data: its ends along x and along y.
-pub(super) type Cell = (Ends, Ends);
+use super::picture::Picture;
+use super::style::Look;
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 
@@ -33,9 +26,7 @@ pub(super) enum Layer<'a> {
     /// An upright bar between two values at each x; what lies under a logarithmic axis runs out of the frame.
     Bars(Vec<(f64, Ends)>, Stroke),
     /// Cells, each in its own colour, and by how much they reach under their neighbours.
-    Cells(Vec<(Cell, Color)>, f64),
-    /// A short text in the middle of a cell of this shade.
-    Word(Cell, String, f64),
+    Cells(Vec<(Cell, Ink)>, f64),
     /// What depends on the size of the frame.
     Drawn(Drawing<'a>),
 }
@@ -97,17 +88,6 @@ impl Layer<'_> {
                     let [left, top, width, height] = frame.box_of(cell);
                     ([left, top, width + overlap, height + overlap], colour)
                 }));
-            }
-            Self::Word((x, y), text, share) => {
-                let (x, y) = frame.place((frame.x.middle(x.0, x.1), frame.y.middle(y.0, y.1)));
-                let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
-                sheet.coloured_text(
-                    place,
-                    &text,
-                    LEGEND_TEXT,
-                    Anchor::Middle,
-                    Some(ink_on(share)),
-                );
             }
             Self::Drawn(draw) => draw(sheet, frame),
         }

@@ -3,10 +3,11 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::colour_bar::ColourBar;
-use super::frame::{Layout, OVERLAP};
+use super::frame::{Cell, Layout, OVERLAP, Place};
+use super::ink::{Ink, Stroke};
 use super::legend::{Mark, entry};
-use super::panel::{self, Cell, Layer, Panel, Place};
-use super::picture::{Picture, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
 use super::sets::common;
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
@@ -14,7 +15,6 @@ use crate::observe::MapRow;
 use crate::sweep::label;
 use crate::table::value::floored;
 use anyhow::{Result, anyhow};
-use kuva::render::color::Color;
 use std::f64::consts::TAU;
 
 const NAME: &str = "simulation";
@@ -185,7 +185,7 @@ fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
 
 /// Cells of the map on axes of this time and length: averages over the instants of a column one unit wide, equal
 /// neighbours joined.
-fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> Vec<(Cell, Color)> {
+fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> Vec<(Cell, Ink)> {
     let (instants, time) = (map.len() / blocks, |instant: usize| {
         map[instant * blocks].time
     });

@@ -2,10 +2,11 @@
 //! method has an ink, a drive a pattern of the line and a mark. Errors that are chance are not joined by lines.
 
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::Layout;
+use super::frame::{Ends, Layout};
+use super::ink::{Dot, Ink, Stroke};
 use super::legend::{Mark, entry};
-use super::panel::{self, Ends, Layer, Panel};
-use super::picture::{Dot, Ink, Picture, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
 use super::style::{INKS, Look, RADIUS, STRIPE, WHITE};
 use anyhow::{Result, anyhow};
 
@@ -244,9 +245,9 @@ mod tests {
             assert_eq!(svg.matches(&format!(">{text}<")).count(), times, "{text}");
         }
         // Of each solid line in a panel the line itself, two bars and two dots, and the mark in the legend.
-        assert_eq!(svg.matches(INKS[0]).count(), 5 + 1);
+        assert_eq!(svg.matches(&INKS[0].to_string()).count(), 5 + 1);
         // Where errors are chance there is no line: of the two methods in either panel two, one, two bars, and two dots.
-        assert_eq!(svg.matches(INKS[1]).count(), 5 + 2 * 4 + 2);
+        assert_eq!(svg.matches(&INKS[1].to_string()).count(), 5 + 2 * 4 + 2);
         assert!(work_precision("cost", &[], &Look::default()).is_err());
     }
 }
