@@ -3,9 +3,9 @@
 
 use super::chain::{Chain, State};
 use super::kernels::Kernels;
-use super::series::Series;
+use super::leap::{BlockMotion, Split};
 use super::slider::Slider;
-use super::split::{BlockMotion, Split};
+use super::taylor::Series;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;
 

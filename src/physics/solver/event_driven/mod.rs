@@ -6,32 +6,27 @@
 //! position rigorously ([`taylor`], [`crossing`]). Contract: errors of displacement of the order of `tolerance` · f_s/k,
 //! and events in the right order within that.
 //!
-//! Displacements and times are kept in a moving [`frame`], so that neither loses digits in long runs.
+//! Displacements and times are kept in a [`moving_frame`], so that neither loses digits in long runs.
 
 mod audit;
 mod chain;
 mod crossing;
-mod elimination;
-mod frame;
 mod grid;
 mod kernels;
-mod layout;
+mod lane_layout;
 mod leap;
-mod series;
+mod moving_frame;
 mod slider;
-mod split;
-mod step;
 mod taylor;
 mod tolerances;
 
-use self::frame::Frame;
 use self::grid::Grid;
 use self::kernels::Kernels;
-use self::layout::Layout;
-use self::leap::{Bounds, Plan};
+use self::lane_layout::Layout;
+use self::leap::{Bounds, Plan, Split};
+use self::moving_frame::Frame;
 use self::slider::Slider;
-use self::split::Split;
-use self::step::{Step, StepControl};
+use self::taylor::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
 use super::ledger::Audit;
@@ -110,7 +105,7 @@ impl<'a> Integration<'a> {
         let span = if takes_grid {
             grid::FRAME_SPAN
         } else {
-            frame::SPAN
+            moving_frame::SPAN
         };
         Self {
             limits,

@@ -1,7 +1,7 @@
 //! The slider as it moves: its contacts, the chain that they make of the blocks, and the motion of the blocks.
 
 use super::chain::{Chain, State};
-use super::layout::Layout;
+use super::lane_layout::Layout;
 use crate::model::{ContactEvent, Interface, Parameters};
 use pulp::Scalar512b;
 

@@ -2,14 +2,15 @@
 //!
 //! Within a step, s from 0 to 1, a block moves as X(s) = x + s q + ((r³ - r) a0 + (s³ - s) a1)/6 with r = 1 - s, where
 //! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes the force on its block and so its motion by
-//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see [`super::super::step`], where
+//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see [`taylor`](crate::solver::event_driven::taylor), where
 //! the same terms are derived. Added at s = 1 they correct the displacement, and at s = 0, backwards, the increment.
 
-use super::super::slider::Slider;
 use super::Grid;
-use super::step::{GridDrive, GridStep, Place};
+use super::step::{Correction, GridStep, Place};
 use crate::model::simd::Simd;
 use crate::model::{Change, ContactEvent, Interface, Row};
+use crate::solver::event_driven::moving_frame::GridDrive;
+use crate::solver::event_driven::slider::Slider;
 use crate::solver::polynomial::safeguarded_halley;
 
 const SIXTH: f64 = 1.0 / 6.0;
@@ -32,13 +33,6 @@ struct Path {
     eventless: Correction,
     /// What events add to the blocks beside.
     beside: Correction,
-}
-
-/// Displacement at the end of a step and increment from its start, or what events add to them, in m.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Correction {
-    pub displacement: f64,
-    pub increment: f64,
 }
 
 impl Path {

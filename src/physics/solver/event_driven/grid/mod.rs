@@ -1,19 +1,19 @@
 //! Resolved motion on a constant grid of time: steps of two stencils ([`step`]), corrected for contact events where
-//! they happen ([`events`]). Errors are of fourth order in the step, so that one tolerance steers it.
+//! they happen ([`contacts`]). Errors are of fourth order in the step, so that one tolerance steers it.
 //!
 //! Cheaper than Taylor steps by a factor at tolerances of 1e-7 and above: nothing is redone when an event comes.
 
-mod events;
+mod contacts;
 mod history;
 mod step;
 
-pub(super) use self::step::{GridDrive, GridStep, velocity};
+pub(super) use self::step::{GridStep, velocity};
 
-use self::events::{StepEvents, change_contacts};
+use self::contacts::{StepEvents, change_contacts};
 use self::history::ForceHistory;
 use self::step::{MAX_RUN, march};
 use super::chain::{Chain, State};
-use super::frame::{Frame, MIN_RESOLUTION};
+use super::moving_frame::{Frame, GridDrive, MIN_RESOLUTION};
 use super::slider::Slider;
 use super::taylor::StepInput;
 use super::{Integration, WORTHWHILE_GRID_LEAP};

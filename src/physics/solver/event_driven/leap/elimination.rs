@@ -19,17 +19,17 @@
 //!
 //! All pivots are positive if the matrix is positive definite, and only then. None grows with the length of the chain.
 
-use super::chain::Chain;
-use super::layout::FIRST_BLOCK;
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
+use crate::solver::event_driven::chain::Chain;
+use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
 
 /// Part of its diagonal entry that a pivot must exceed: less is rounding, and the matrix not surely positive definite.
 const MIN_PIVOT: f64 = 1e-12;
 
 /// A real (C = 1) or complex (C = 2) number in every lane.
 #[derive(Clone, Copy)]
-pub(super) struct Number<S: Simd, const C: usize>(pub S, pub [S::Vector; C]);
+pub struct Number<S: Simd, const C: usize>(pub S, pub [S::Vector; C]);
 
 /// Loops, since closures may be compiled without the features of the token.
 impl<S: Simd, const C: usize> Number<S, C> {
@@ -125,7 +125,7 @@ impl<S: Simd, const C: usize> Number<S, C> {
 
 /// What elimination leaves of a row: 1/p, k, H, y H and b.
 #[derive(Clone, Debug)]
-pub(super) struct Eliminated<const C: usize> {
+pub struct Eliminated<const C: usize> {
     pub inverse: [Row; C],
     pub ratio: [Row; C],
     pub own: [Row; C],
@@ -135,7 +135,7 @@ pub(super) struct Eliminated<const C: usize> {
 
 /// The chain with a diagonal of real or complex numbers, eliminated.
 #[derive(Clone, Debug)]
-pub(super) struct Elimination<const C: usize> {
+pub struct Elimination<const C: usize> {
     pub rows: Vec<Eliminated<C>>,
     /// y in the last row, and F.
     carried: [Row; C],
@@ -272,7 +272,7 @@ impl<const C: usize> Elimination<C> {
 
 /// Coupling of the first row to the block before, which lies in the last row of the lane before.
 #[inline(always)]
-pub(super) fn outer<S: Simd>(simd: S, chain: &Chain) -> S::Vector {
+pub fn outer<S: Simd>(simd: S, chain: &Chain) -> S::Vector {
     simd.load(&chain.coupling[0])
         .to_lane_before()
         .to_next_lane()

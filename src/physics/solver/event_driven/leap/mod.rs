@@ -1,15 +1,20 @@
 //! Leaps over quiet time along the driven solution.
 //!
-//! Between events the motion is a driven solution and a free motion about it, which decays and is bounded for each block ([`super::split`]). A leap may therefore start while the free motion is still
+//! Between events the motion is a driven solution and a free motion about it, which decays and is bounded for each block ([`split`]). A leap may therefore start while the free motion is still
 //! large, if the bound shows that meanwhile no block reaches a break position, and that the shear force has been or
 //! will be larger than it can be meanwhile. What is left of the free motion when the next event comes
 //! has fallen under the tolerance, and is dropped.
 //! Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at its end, no event on the way,
 //! and no largest shear force.
 
+mod elimination;
+mod split;
+
+pub(super) use self::split::{BlockMotion, Split};
+
+use self::split::SplitRow;
 use super::chain::{Chain, State};
 use super::slider::Slider;
-use super::split::{Split, SplitRow};
 use crate::model::Interface;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::harmonic::Harmonic;
@@ -360,7 +365,7 @@ fn turned<S: Simd>(simd: S, row: &SplitRow, (sine, cosine): (f64, f64)) -> S::Ve
 
 #[cfg(test)]
 mod tests {
-    use super::super::split::BlockMotion;
+    use super::split::BlockMotion;
     use super::*;
     use crate::model::Parameters;
     use pulp::Scalar512b as Baseline;

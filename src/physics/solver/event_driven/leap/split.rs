@@ -12,11 +12,11 @@
 //! hold if S' is positive definite: a bound for each block, and its decay. With a = γ/2 it is sharp unless a mode is
 //! overdamped; then a is halved until S' is positive definite.
 
-use super::chain::{Chain, State};
 use super::elimination::{Elimination, Number, outer};
-use super::layout::FIRST_BLOCK;
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Row};
+use crate::solver::event_driven::chain::{Chain, State};
+use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::segment::ForcePath;
 
@@ -27,7 +27,7 @@ const FIXED: f64 = 1e150;
 
 /// The driven solution of one block: p0 in m, p1 in m/s, q in m, and |q|.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct BlockMotion {
+pub struct BlockMotion {
     pub start: f64,
     pub rate: f64,
     pub wave: [f64; 2],
@@ -36,7 +36,7 @@ pub(super) struct BlockMotion {
 
 /// The motion at the start of a leap, split: driven solution and free motion of a row of blocks.
 #[derive(Clone, Debug)]
-pub(super) struct SplitRow {
+pub struct SplitRow {
     /// p0 in m, p1 in m/s, q in m, and |q|.
     pub start: Row,
     pub rate: [Row; 1],
@@ -49,7 +49,7 @@ pub(super) struct SplitRow {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Split {
+pub struct Split {
     pub rows: Vec<SplitRow>,
     /// The rate a at which the bound on the free motion decays, in 1/s.
     pub decay_rate: f64,
@@ -363,9 +363,9 @@ impl BlockMotion {
 
 #[cfg(test)]
 mod tests {
-    use super::super::slider::Slider;
     use super::*;
     use crate::model::Parameters;
+    use crate::solver::event_driven::slider::Slider;
     use pulp::Scalar512b as Baseline;
 
     /// Pseudo-random numbers in [0, 1).

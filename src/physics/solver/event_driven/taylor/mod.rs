@@ -13,13 +13,17 @@
 //! step, the event is merged into it: the change is added to the series, which stays accurate after the event. The step
 //! ends where it would no longer be. Contract: events in the right order, also of blocks whose series has changed.
 
+mod recurrence;
+mod series;
+
+pub(super) use self::recurrence::{StepInput, expand};
+pub(super) use self::series::{DriveDerivatives, Series, evaluate, reachable};
+
 use super::Integration;
 use super::chain::Chain;
 use super::crossing::first_exit;
-use super::layout::Layout;
-use super::series::Series;
+use super::lane_layout::Layout;
 use super::slider::Slider;
-use super::taylor::StepInput;
 use crate::model::Change;
 use crate::solver::polynomial;
 use crate::solver::segment::{ForceAt, ForcePath, Segment};

@@ -1,15 +1,15 @@
 //! The Taylor series of a step: x(t + s h) = Σ Y_p s^p/p! for s in [0, 1], with Y_p = h^p x^(p); its values, and
-//! which blocks may break. [`super::taylor`] computes it.
+//! which blocks may break. [`super::recurrence`] computes it.
 
-use super::chain::{Chain, State};
-use super::layout::Layout;
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
+use crate::solver::event_driven::chain::{Chain, State};
+use crate::solver::event_driven::lane_layout::Layout;
 use crate::solver::polynomial::{INVERSE, MAX_COEFFICIENTS};
 use pulp::Scalar512b;
 
 /// 1/p!.
-pub(super) const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
+pub const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
     let mut inverse = [1.0; MAX_COEFFICIENTS];
     let mut p = 1;
     while p < MAX_COEFFICIENTS {
@@ -21,7 +21,7 @@ pub(super) const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
 
 /// The drive's displacement U over a step: h^p U^(p), order after order, in m.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct DriveDerivatives {
+pub struct DriveDerivatives {
     /// Ramp at the start, and its rise over the step.
     pub ramp: [f64; 2],
     /// Δ cos θ and -Δ sin θ at the phase θ of the start.
@@ -43,7 +43,7 @@ impl DriveDerivatives {
 
 /// The series of one step.
 #[derive(Clone, Debug)]
-pub(super) struct Series {
+pub struct Series {
     pub rows: usize,
     /// Rows of Y_0, then of Y_1, and so on, in m.
     pub terms: Vec<Row>,
@@ -135,7 +135,7 @@ const ROWS: usize = 3;
 
 /// State at s in [0, 1] of a step of `length` s.
 #[inline(always)]
-pub(super) fn evaluate<S: Simd, const R: usize>(
+pub fn evaluate<S: Simd, const R: usize>(
     simd: S,
     series: &Series,
     s: f64,
@@ -202,7 +202,7 @@ fn evaluate_rows<S: Simd, const G: usize>(
 
 /// Row and lane of every block that may reach a break position within the step.
 #[inline(always)]
-pub(super) fn reachable<S: Simd, const R: usize>(
+pub fn reachable<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     series: &mut Series,
