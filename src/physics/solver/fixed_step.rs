@@ -11,7 +11,7 @@ use super::ledger::Audit;
 use super::polynomial;
 use super::segment::{ForceAt, ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
-use crate::model::{ContactEvent, Drive, Interface, Parameters};
+use crate::model::{ContactChange, ContactEvent, Drive, Interface, Parameters};
 use pulp::Arch;
 use std::sync::atomic::Ordering;
 
@@ -82,11 +82,9 @@ impl Motion {
     )]
     fn reaches_a_break(&self, interface: &Interface) -> bool {
         let blocks = self.displacement.len();
-        let (x, upper, lower) = (
-            &self.displacement[..blocks],
-            &interface.block_upper[..blocks],
-            &interface.block_lower[..blocks],
-        );
+        let x = &self.displacement[..blocks];
+        let upper = &interface.block_upper[..blocks];
+        let lower = &interface.block_lower[..blocks];
         (0..blocks).fold(false, |any, j| {
             any | (x[j] >= upper[j]) | (x[j] <= lower[j])
         })
@@ -118,7 +116,8 @@ fn integrate(
     audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
     let blocks = parameters.blocks;
-    let (mass, coupling) = (parameters.block_mass(), parameters.coupling_stiffness());
+    let mass = parameters.block_mass();
+    let coupling = parameters.coupling_stiffness();
     let mut drive = Drive::new(parameters);
     let mut interface = Interface::new(parameters);
     let mut motion = Motion {
@@ -201,7 +200,8 @@ fn integrate(
             duration: time_step,
             path,
         });
-        (force, force_rate) = (next_force, next_rate);
+        force = next_force;
+        force_rate = next_rate;
         summary.end_time = time;
 
         if interface.next_reattachment() <= time || motion.reaches_a_break(&interface) {
@@ -255,20 +255,26 @@ fn change_contacts(
     observer: &mut dyn Observer,
 ) {
     let mean_displacement = displacement.iter().sum::<f64>() / displacement.len() as f64;
-    while interface.next_reattachment() <= time
-        && let Some(block) = interface.next_reattachment_block()
-    {
-        let event = interface.reattach_next(displacement[block]);
+    while let Some((_, block)) = interface.next_reattachment_by(time) {
+        let change = interface.reattach_next(displacement[block]);
+        let (attached, attached_time) = interface.count(&change);
         summary.reattachments += 1;
-        observer.contact(&ContactEvent { time, ..event });
+        observer.contact(&ContactEvent {
+            what: ContactChange { time, ..change },
+            attached,
+            attached_time,
+            mean_displacement: 0.0,
+        });
     }
     for (block, &x) in displacement.iter().enumerate() {
         if x >= interface.block_upper[block] || x <= interface.block_lower[block] {
-            interface.break_reached(block, time, x, |event| {
+            interface.break_reached(block, time, x, |what, (attached, attached_time)| {
                 summary.breaks += 1;
                 observer.contact(&ContactEvent {
+                    what,
+                    attached,
+                    attached_time,
                     mean_displacement,
-                    ..event
                 });
             });
         }

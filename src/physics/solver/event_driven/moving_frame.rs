@@ -2,7 +2,7 @@
 //! nor displacement loses digits in long runs.
 
 use super::taylor::DriveDerivatives;
-use crate::model::{ContactEvent, Drive};
+use crate::model::{ContactChange, Drive};
 use crate::solver::harmonic::Harmonic;
 
 /// Time in the frame at which it moves where Taylor steps locate events to rounding, in s.
@@ -133,14 +133,13 @@ impl Frame {
         self.origin_displacement + displacement
     }
 
-    /// An event of the frame with time and displacement counted from the start of the run.
+    /// A change in the frame with time and displacement counted from the start of the run.
     #[inline]
-    pub fn absolute(&self, event: ContactEvent) -> ContactEvent {
-        let time = self.absolute_time(event.time);
-        ContactEvent {
-            time,
-            displacement: self.absolute_displacement(event.displacement),
-            ..event
+    pub fn absolute(&self, change: ContactChange) -> ContactChange {
+        ContactChange {
+            time: self.absolute_time(change.time),
+            displacement: self.absolute_displacement(change.displacement),
+            ..change
         }
     }
 
@@ -205,18 +204,12 @@ impl Frame {
 
     /// The drive's displacement from now on, within the cycle, in m.
     pub fn drive_motion(&self) -> Harmonic {
-        let Drive {
-            velocity,
-            amplitude,
-            angular_frequency,
-            ..
-        } = self.drive;
         Harmonic {
             start: self.ramp(),
-            rate: velocity,
-            amplitude,
+            rate: self.drive.velocity,
+            amplitude: self.drive.amplitude,
             phase: self.phase(),
-            angular_frequency,
+            angular_frequency: self.drive.angular_frequency,
         }
     }
 

@@ -8,10 +8,10 @@
 use super::Grid;
 use super::step::{Correction, GridStep, Place};
 use crate::model::simd::Simd;
-use crate::model::{Change, ContactEvent, Interface, Row};
+use crate::model::{ContactChange, Interface, Row};
 use crate::solver::event_driven::moving_frame::GridDrive;
 use crate::solver::event_driven::slider::Slider;
-use crate::solver::polynomial::safeguarded_halley;
+use crate::solver::polynomial::{CUBIC, halley_step, rising_root};
 
 const SIXTH: f64 = 1.0 / 6.0;
 /// A step of third order below this leaves an error of its cube: a billionth of a step of the grid.
@@ -183,7 +183,7 @@ impl Path {
         let sign = if self.end() >= level { 1.0 } else { -1.0 };
         let mut beyond = self.coefficients.map(|coefficient| sign * coefficient);
         beyond[0] -= sign * level;
-        safeguarded_halley(&beyond, self.from, 1.0, guess)
+        rising_root(self.from, 1.0, guess, CUBIC, |s| halley_step(&beyond, s))
     }
 }
 
@@ -191,9 +191,9 @@ impl Path {
 #[derive(Clone, Debug, Default)]
 pub(super) struct StepEvents {
     /// Whether attachments are collected, too.
-    pub tells_attachments: bool,
+    pub wants_attachments: bool,
     /// What has happened, in the order of time, in the frame; and how often in this run of steps.
-    pub events: Vec<ContactEvent>,
+    pub changes: Vec<ContactChange>,
     pub breaks: u64,
     pub reattachments: u64,
     /// Means over the blocks after breaks: displacement and increment, in m.
@@ -201,7 +201,7 @@ pub(super) struct StepEvents {
     /// Blocks that reach a break position, and where in the step.
     paths: Vec<(Path, f64)>,
     /// Times of attachments that are not collected, in the frame, in s, in order.
-    attachments: Vec<f64>,
+    pub attachments: Vec<f64>,
     /// Contacts that a block reaches, and where they break, in m.
     contacts: Vec<(f64, usize)>,
 }
@@ -271,30 +271,9 @@ pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut 
         );
         settle(simd, slider, step, &path);
     }
-    count_in_order(&mut slider.interface, events);
-}
-
-/// Puts the events of a step, in which block came after block, in the order of time and counts them.
-#[inline(always)]
-fn count_in_order(
-    interface: &mut Interface,
-    StepEvents {
-        events,
-        attachments,
-        ..
-    }: &mut StepEvents,
-) {
-    if !events.is_sorted_by(|a, b| a.time <= b.time) {
-        events.sort_by(|a, b| a.time.total_cmp(&b.time));
+    if !events.changes.is_sorted_by(|a, b| a.time <= b.time) {
+        events.changes.sort_by(|a, b| a.time.total_cmp(&b.time));
     }
-    let mut attachments = attachments.drain(..).peekable();
-    for event in events {
-        while let Some(due) = attachments.next_if(|due| *due <= event.time) {
-            interface.attached.change(Change::Attach, due);
-        }
-        *event = interface.counted(*event);
-    }
-    attachments.for_each(|due| interface.attached.change(Change::Attach, due));
 }
 
 /// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach. `first` is
@@ -328,10 +307,10 @@ fn break_along<S: Simd>(
             if time > until {
                 break;
             }
-            let (event, due) = interface.break_contact(simd, block, contact, time, level);
+            let (change, due) = interface.break_contact(simd, block, contact, time, level);
             let [_, slope, half_curvature] = path.at(s);
-            let stiffened = -step.by_mass * event.stiffness;
-            let second = 0.5 * step.by_mass * event.force;
+            let stiffened = -step.by_mass * change.stiffness;
+            let second = 0.5 * step.by_mass * change.force;
             let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
             let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second)
                 - 0.25 * step.damping * third;
@@ -341,7 +320,7 @@ fn break_along<S: Simd>(
             let beside = 0.5 * SIXTH * step.coupling * second;
             path.beside.displacement += beside * ahead;
             path.beside.increment += beside * (ahead - back);
-            events.events.push(event);
+            events.changes.push(change);
             until = until.min(due);
             broken += 1;
         }
@@ -366,14 +345,14 @@ fn attach<S: Simd>(
 ) {
     let s = s.clamp(0.0, 1.0);
     let [x, slope, half_curvature] = path.at(s);
-    let event = interface.reattach_running(simd, x);
-    if events.tells_attachments {
-        events.events.push(event);
+    let change = interface.reattach_running(simd, x);
+    if events.wants_attachments {
+        events.changes.push(change);
     } else {
-        events.attachments.push(event.time);
+        events.attachments.push(change.time);
     }
     events.reattachments += 1;
-    let stiffened = step.by_mass * event.stiffness;
+    let stiffened = step.by_mass * change.stiffness;
     let third = -SIXTH * stiffened * slope;
     let fourth = -0.5 * SIXTH * stiffened * half_curvature - 0.25 * step.damping * third;
     path.change_by(s, [0.0, third, fourth]);

@@ -74,7 +74,7 @@ fn passing_horizon(
     let loose = libm::log(largest / (LOOSE * error)) / split.decay_rate;
     let (allowed, per_mass) = (PASSED_SHARE * error, 1.0 / chain.mass);
     let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, most);
-    interface.look_ahead_to_lives(|due, block, [stiffness, reach]| {
+    interface.look_ahead(|due, block, life| {
         let seconds = due - start;
         let by_then = displaced + rate * (seconds - last);
         if seconds >= limit || by_then > allowed {
@@ -86,9 +86,9 @@ fn passing_horizon(
         }
         (displaced, last) = (by_then, seconds);
         let [speed, compliance] = split.speed_and_compliance(chain, drive, block);
-        rate += per_mass * stiffness * speed * compliance;
+        rate += per_mass * life.stiffness * speed * compliance;
         // Nor may it break.
-        limit = limit.min(seconds + (reach - ASTRAY * error).max(0.0) / speed);
+        limit = limit.min(seconds + (life.reach - ASTRAY * error).max(0.0) / speed);
         true
     });
     let horizon = if rate > 0.0 {
@@ -213,9 +213,9 @@ fn hides_no_peak<S: Simd>(
     let mut ahead = (moving + further).min(until_cycle_end);
     if ahead > horizon {
         // Nor does a contact break that attaches on the way.
-        interface.look_ahead_to_lives(|due, block, [_, reach]| {
-            ahead =
-                ahead.min(due - start + reach / split.speed_and_compliance(chain, drive, block)[0]);
+        interface.look_ahead(|due, block, life| {
+            let [speed, _] = split.speed_and_compliance(chain, drive, block);
+            ahead = ahead.min(due - start + life.reach / speed);
             due - start < ahead
         });
     }

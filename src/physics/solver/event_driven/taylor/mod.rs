@@ -211,8 +211,8 @@ impl Integration<'_> {
                 _ if due <= end => self
                     .slider
                     .interface
-                    .next_reattachment_block()
-                    .map(|block| (Change::Attach, block, due)),
+                    .next_reattachment_by(f64::INFINITY)
+                    .map(|(_, block)| (Change::Attach, block, due)),
                 _ => None,
             };
             let s = event.map_or(end, |(_, _, s)| s);
@@ -295,10 +295,8 @@ impl Integration<'_> {
         observer: &mut dyn Observer,
     ) -> f64 {
         let [x, slope, half_curvature] = self.step.expanded(&self.slider.chain, block, s);
-        let (stiffness, pull) = (
-            self.slider.interface.block_stiffness[block],
-            self.slider.interface.block_pull[block],
-        );
+        let stiffness = self.slider.interface.block_stiffness[block];
+        let pull = self.slider.interface.block_pull[block];
         match change {
             Change::Break => {
                 let mean = self.step.series.mean(&self.slider.chain, s);

@@ -74,6 +74,12 @@ impl Series {
         if R == 0 { self.rows } else { R }
     }
 
+    /// The rows of one order, of which there are `rows`.
+    #[inline(always)]
+    fn order_terms(&self, order: usize, rows: usize) -> &[Row] {
+        &self.terms[order * rows..][..rows]
+    }
+
     /// Writes the coefficients Y_p/p! of one block, in m.
     pub fn block(&self, row: usize, lane: usize, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
@@ -130,10 +136,8 @@ impl Series {
     }
 }
 
-/// Rows that are taken through all orders together, since their sums need not wait for each other.
-const ROWS: usize = 3;
-
-/// State at s in [0, 1] of a step of `length` s.
+/// State at s in [0, 1] of a step of `length` s: Horner's scheme, nested, Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same
+/// from Y_1 for the slope.
 #[inline(always)]
 pub fn evaluate<S: Simd, const R: usize>(
     simd: S,
@@ -143,60 +147,37 @@ pub fn evaluate<S: Simd, const R: usize>(
     state: &mut State,
 ) {
     let rows = series.rows_in::<R>();
-    let mut r = 0;
-    while r + ROWS <= rows {
-        evaluate_rows::<S, ROWS>(simd, series, rows, r, s, length, state);
-        r += ROWS;
-    }
-    while r < rows {
-        evaluate_rows::<S, 1>(simd, series, rows, r, s, length, state);
-        r += 1;
-    }
-}
-
-/// Horner's scheme, nested: Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same from Y_1 for the slope.
-#[inline(always)]
-fn evaluate_rows<S: Simd, const G: usize>(
-    simd: S,
-    series: &Series,
-    rows: usize,
-    first: usize,
-    s: f64,
-    length: f64,
-    state: &mut State,
-) {
     let order = series.order;
-    let inverse_length = simd.splat(1.0 / length);
-    let mut at = order * rows + first;
-    let mut value = [simd.splat(0.0); G];
-    for (value, term) in value.iter_mut().zip(&series.terms[at..at + G]) {
-        *value = simd.load(term);
+    let values = &mut state.displacement[..rows];
+    let slopes = &mut state.velocity[..rows];
+    let last = series.order_terms(order, rows);
+    for r in 0..rows {
+        let term = simd.load(&last[r]);
+        term.store(&mut values[r]);
+        term.store(&mut slopes[r]);
     }
-    let mut slope = value;
-    let mut for_value = simd.splat(s * INVERSE[order]);
-    for inverse in INVERSE[1..order].iter().rev() {
-        at -= rows;
-        let for_slope = simd.splat(s * inverse);
-        for ((value, slope), term) in value
-            .iter_mut()
-            .zip(&mut slope)
-            .zip(&series.terms[at..at + G])
-        {
-            let term = simd.load(term);
-            *value = value.mul_add(for_value, term);
-            *slope = slope.mul_add(for_slope, term);
+    for p in (1..order).rev() {
+        let for_value = simd.splat(s * INVERSE[p + 1]);
+        let for_slope = simd.splat(s * INVERSE[p]);
+        let terms = series.order_terms(p, rows);
+        for r in 0..rows {
+            let term = simd.load(&terms[r]);
+            let value = simd.load(&values[r]).mul_add(for_value, term);
+            let slope = simd.load(&slopes[r]).mul_add(for_slope, term);
+            value.store(&mut values[r]);
+            slope.store(&mut slopes[r]);
         }
-        for_value = for_slope;
     }
-    for ((value, term), x) in value
-        .iter()
-        .zip(&series.terms[first..first + G])
-        .zip(&mut state.displacement[first..first + G])
-    {
-        value.mul_add(for_value, simd.load(term)).store(x);
-    }
-    for (slope, v) in slope.iter().zip(&mut state.velocity[first..first + G]) {
-        slope.times(inverse_length).store(v);
+    let for_value = simd.splat(s * INVERSE[1]);
+    let inverse_length = simd.splat(1.0 / length);
+    let first = series.order_terms(0, rows);
+    for r in 0..rows {
+        let value = simd
+            .load(&values[r])
+            .mul_add(for_value, simd.load(&first[r]));
+        let slope = simd.load(&slopes[r]).times(inverse_length);
+        value.store(&mut values[r]);
+        slope.store(&mut slopes[r]);
     }
 }
 
@@ -209,54 +190,29 @@ pub fn reachable<S: Simd, const R: usize>(
     blocks: &mut Vec<(usize, usize)>,
 ) {
     let rows = series.rows_in::<R>();
-    blocks.clear();
-    let mut r = 0;
-    while r + ROWS <= rows {
-        reachable_rows::<S, ROWS>(simd, chain, series, rows, r, blocks);
-        r += ROWS;
-    }
-    while r < rows {
-        reachable_rows::<S, 1>(simd, chain, series, rows, r, blocks);
-        r += 1;
-    }
-}
-
-#[inline(always)]
-fn reachable_rows<S: Simd, const G: usize>(
-    simd: S,
-    chain: &Chain,
-    series: &mut Series,
-    rows: usize,
-    first: usize,
-    blocks: &mut Vec<(usize, usize)>,
-) {
-    let order = series.order;
-    let mut excursion = [simd.splat(0.0); G];
-    let mut at = first;
-    for inverse in &INVERSE_FACTORIAL[1..=order] {
-        at += rows;
+    let (starts, later) = series.terms.split_at(rows);
+    let excursion = &mut series.excursion[..rows];
+    excursion.fill(Row::filled(0.0));
+    for (terms, inverse) in later
+        .chunks_exact(rows)
+        .zip(&INVERSE_FACTORIAL[1..=series.order])
+    {
         let weight = simd.splat(*inverse);
-        for (excursion, term) in excursion.iter_mut().zip(&series.terms[at..at + G]) {
-            *excursion = simd.load(term).abs().mul_add(weight, *excursion);
+        for r in 0..rows {
+            let sum = simd.load(&excursion[r]);
+            let term = simd.load(&terms[r]).abs();
+            term.mul_add(weight, sum).store(&mut excursion[r]);
         }
     }
-    let own = first..first + G;
-    let (bounds, starts) = (
-        &mut series.excursion[own.clone()],
-        &series.terms[own.clone()],
-    );
-    let (upper, lower) = (&chain.upper[own.clone()], &chain.lower[own]);
-    let mut reached = [0; G];
-    for g in 0..G {
-        excursion[g].store(&mut bounds[g]);
-        let x = simd.load(&starts[g]);
-        let above = x.plus(excursion[g]).reaches(simd.load(&upper[g]));
-        let below = simd.load(&lower[g]).reaches(x.minus(excursion[g]));
-        reached[g] = above | below;
-    }
-    for (g, mut reached) in reached.into_iter().enumerate() {
+    blocks.clear();
+    for r in 0..rows {
+        let x = simd.load(&starts[r]);
+        let excursion = simd.load(&excursion[r]);
+        let above = x.plus(excursion).reaches(simd.load(&chain.upper[r]));
+        let below = simd.load(&chain.lower[r]).reaches(x.minus(excursion));
+        let mut reached = above | below;
         while reached != 0 {
-            blocks.push((first + g, reached.trailing_zeros() as usize));
+            blocks.push((r, reached.trailing_zeros() as usize));
             reached &= reached - 1;
         }
     }
