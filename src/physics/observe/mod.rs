@@ -10,6 +10,7 @@ mod records;
 mod regime;
 mod rupture;
 mod slip;
+mod slip_observer;
 
 pub use drops::Drops;
 pub use measure::{Measurements, measure};
@@ -20,4 +21,5 @@ pub use records::{
 };
 pub use regime::{Averages, Regime};
 pub use rupture::{Rupture, advance_speed};
-pub use slip::{Energies, Modulation, Precursor, Slip, SlipObserver};
+pub use slip::{Energies, Modulation, Precursor, Slip};
+pub use slip_observer::SlipObserver;

@@ -7,7 +7,7 @@
 //! compiled for the features of the processor, chosen at run time, as those of the other solver are; nothing is fused
 //! or reassociated, so all give the same bits.
 
-use super::ledger::Audit;
+use super::ledger::{Audit, FinalState};
 use super::polynomial;
 use super::segment::{ForceAt, ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
@@ -47,31 +47,6 @@ impl Motion {
             a[last] = (chain + pull[last] - stiffness[last] * x[last]) * inverse_mass;
         }
         a[0] *= inverse_mass;
-    }
-
-    /// Enters the energies at the end into an audit.
-    fn record_final_energy(
-        &self,
-        audit: &Audit,
-        interface: &Interface,
-        drive: &Drive,
-        time: f64,
-        coupling: f64,
-        mass: f64,
-    ) {
-        let x = &self.displacement[..];
-        let stretched: f64 = x
-            .windows(2)
-            .map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]))
-            .sum();
-        let pulled = drive.motion(time).0 - x[0];
-        audit
-            .kinetic
-            .set(0.5 * mass * self.velocity.iter().map(|v| v * v).sum::<f64>());
-        audit.elastic.set(
-            0.5 * (coupling * stretched + drive.stiffness * pulled * pulled)
-                + interface.elastic_energy(x),
-        );
     }
 
     /// Whether any block is at or past a break position.
@@ -239,7 +214,12 @@ fn integrate(
         });
     }
     if let Some(audit) = audit {
-        motion.record_final_energy(audit, &interface, &drive, summary.end_time, coupling, mass);
+        let end = FinalState {
+            displacement: &motion.displacement,
+            velocity: &motion.velocity,
+            driven: drive.motion(summary.end_time).0,
+        };
+        audit.record_final_energy(end, &interface, mass, coupling, drive.stiffness);
     }
     observer.end(summary.end_time, &motion.displacement);
     Ok(summary)

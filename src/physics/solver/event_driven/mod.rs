@@ -29,7 +29,7 @@ use self::slider::Slider;
 use self::taylor::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
-use super::ledger::Audit;
+use super::ledger::{Audit, FinalState};
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, Resolve, SimulationError, Summary};
 use crate::model::{ContactChange, ContactEvent, Drive, Parameters};
@@ -213,9 +213,28 @@ impl<'a> Integration<'a> {
         observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
         if let Some(audit) = self.audit {
-            audit.record_final_energy(&self.slider, self.frame.drive_motion().value(0.0));
+            self.record_final_energy(audit);
         }
         Ok(self.summary)
+    }
+
+    fn record_final_energy(&self, audit: &Audit) {
+        let slider = &self.slider;
+        let chain = &slider.chain;
+        let displacement: Vec<f64> = slider.displacements().collect();
+        let velocity =
+            (0..chain.layout.blocks).map(|block| chain.at(&slider.state.velocity, block));
+        audit.record_final_energy(
+            FinalState {
+                displacement: &displacement,
+                velocity: &velocity.collect::<Vec<_>>(),
+                driven: self.frame.drive_motion().value(0.0),
+            },
+            &slider.interface,
+            chain.mass,
+            chain.mass * chain.coupling[0][0],
+            chain.drive_stiffness,
+        );
     }
 
     /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next change of the drive or the end.

@@ -10,7 +10,7 @@
 mod elimination;
 mod split;
 
-pub(super) use self::split::{BlockMotion, Split};
+pub(super) use self::split::Split;
 
 use self::split::SplitRow;
 use super::chain::{Chain, State};
