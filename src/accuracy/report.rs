@@ -95,7 +95,8 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
                         samples; bars: 95 %. Errors of break times: median, bars up to the largest.";
     const EXTRAPOLATED: &str = " * Cost extrapolated from that of a step.";
     let breaks = points(&findings.methods, set, |row| {
-        let (error, largest) = (row.break_times.median?, row.break_times.largest?);
+        let error = row.break_times.median?;
+        let largest = row.break_times.largest?;
         Some((error, (error, largest)))
     });
     let label = "Error of break times (s)".to_owned();
@@ -208,10 +209,8 @@ mod tests {
     static NEVER: AtomicBool = AtomicBool::new(false);
 
     fn findings() -> Findings {
-        let (parameters, solver) = (
-            Parameters::default(),
-            Method::from(Solver::FixedStep { time_step: 1e-6 }),
-        );
+        let parameters = Parameters::default();
+        let solver = Method::from(Solver::FixedStep { time_step: 1e-6 });
         let break_times = BreakErrors {
             breaks: Some(100),
             missing: Some(0),
@@ -307,13 +306,11 @@ mod tests {
     #[test]
     fn every_field_of_the_json_is_documented() {
         let page = include_str!("../../docs/commands.md");
-        let (study, findings) = (
-            Study {
-                sets: vec![Parameters::default()],
-                ..Study::quick()
-            },
-            findings(),
-        );
+        let study = Study {
+            sets: vec![Parameters::default()],
+            ..Study::quick()
+        };
+        let findings = findings();
         let row = page
             .lines()
             .find(|line| line.starts_with("| `accuracy` |"))

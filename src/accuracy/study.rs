@@ -101,11 +101,9 @@ impl Study {
 
     /// The same at other sets, with tolerances of the event-driven solver and this one instead.
     pub fn at(self, sets: Vec<Parameters>, solver: Solver) -> Self {
-        let (mut time_steps, mut on_the_grid, mut in_taylor_steps) = (
-            Vec::new(),
-            vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
-            vec![1e-3, 1e-4, 1e-6, 1e-8],
-        );
+        let mut time_steps = Vec::new();
+        let mut on_the_grid = vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+        let mut in_taylor_steps = vec![1e-3, 1e-4, 1e-6, 1e-8];
         let (settings, setting, own) = match solver {
             Solver::FixedStep { time_step } => (&mut time_steps, time_step, solver),
             Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => (
@@ -328,7 +326,8 @@ impl Study {
             let pairs: Vec<(Solver, &Ensemble)> =
                 self.solvers.iter().copied().zip(&ensembles).collect();
             for (&(solver, ensemble), break_times) in pairs.iter().zip(errors) {
-                let (case, parameters) = (set_in_words(parameters), parameters.clone());
+                let case = set_in_words(parameters);
+                let parameters = parameters.clone();
                 findings.methods.push(MethodRow {
                     parameters: Selected::new(parameters),
                     case,

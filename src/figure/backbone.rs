@@ -167,7 +167,8 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
             .into_iter()
             .zip(values);
         let clipped = |((low, high), eta): ((f64, f64), f64)| {
-            let (low, high) = (low.max(eta / WIDEST), high.min(eta * WIDEST));
+            let low = low.max(eta / WIDEST);
+            let high = high.min(eta * WIDEST);
             // None reaches over η = 1, where the load begins to fall in each period.
             (
                 if eta > SAME { low.max(1.0) } else { low },
@@ -182,10 +183,8 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     }
     let place = |eta: f64| libm::log10(eta) * COLUMNS_PER_DECADE;
     #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
-    let (first, last) = (
-        place(values[0]).floor() as i32,
-        place(values[values.len() - 1]).floor() as i32,
-    );
+    let first = place(values[0]).floor() as i32;
+    let last = place(values[values.len() - 1]).floor() as i32;
     let edge = |column: i32| libm::exp10(f64::from(column) / COLUMNS_PER_DECADE);
     (first..=last)
         .map(|column| (edge(column), edge(column + 1)))

@@ -42,13 +42,13 @@ impl ColourBar {
 
     /// Draws the bar right of a frame, and the label above it.
     pub(super) fn draw(&self, sheet: &mut Picture, frame: &Frame) {
-        let (left, top, bottom) = (frame.right() + GAP, frame.top, frame.bottom());
+        let left = frame.right() + GAP;
+        let top = frame.top;
+        let bottom = frame.bottom();
         let height = frame.height / self.colours.len() as f64;
         let boxes = self.colours.iter().enumerate().map(|(step, colour)| {
-            let (top, overlap) = (
-                bottom - (step + 1) as f64 * height,
-                if step == 0 { 0.0 } else { OVERLAP },
-            );
+            let top = bottom - (step + 1) as f64 * height;
+            let overlap = if step == 0 { 0.0 } else { OVERLAP };
             ([left, top, WIDTH, height + overlap], colour.clone())
         });
         sheet.clipped([left, top, WIDTH, frame.height], |sheet| {

@@ -64,7 +64,8 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let (factor, unit) =
         label("tau_mean").scale(bounds(ramped().filter_map(|point| point.interval))?.1);
     let slip = |point: &Point| {
-        let (period, interval) = (point.period?, point.interval?);
+        let period = point.period?;
+        let interval = point.interval?;
         Some((
             stage(point)?,
             x_factor * modulation(point)?,

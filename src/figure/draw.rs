@@ -189,7 +189,8 @@ mod tests {
             files
         );
         assert!(bytes() == before);
-        let (svg, png) = (String::from_utf8(before[0].clone()).unwrap(), &before[1]);
+        let svg = String::from_utf8(before[0].clone()).unwrap();
+        let png = &before[1];
         assert!(svg.contains("φ (rad)") && svg.ends_with("</svg>"));
         assert!(png.starts_with(b"\x89PNG"));
     }

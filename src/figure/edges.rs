@@ -65,7 +65,8 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
             statistics.push(statistic);
         }
     }
-    let (mut legend, mut layers) = (Vec::new(), Vec::new());
+    let mut legend = Vec::new();
+    let mut layers = Vec::new();
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
         legend.push(entry(

@@ -206,10 +206,8 @@ fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
 fn draw_multiples(sheet: &mut Picture, frame: &Frame, multiples: Vec<f64>, period: f64) {
     let mut free = f64::NEG_INFINITY;
     for multiple in multiples {
-        let (x, n) = (
-            frame.x_of(multiple),
-            format!("{}", (multiple / period).round()),
-        );
+        let x = frame.x_of(multiple);
+        let n = format!("{}", (multiple / period).round());
         let half = 0.5 * font::width(&n, LEGEND_TEXT);
         // Before the first number, where there is room.
         let is_led = free == f64::NEG_INFINITY
@@ -234,7 +232,8 @@ fn outline(bars: &[&HistogramBin]) -> Vec<Vec<Place>> {
     };
     bars.chunk_by(are_neighbours)
         .map(|run| {
-            let (first, last) = (run[0], run[run.len() - 1]);
+            let first = run[0];
+            let last = run[run.len() - 1];
             let tops = run
                 .iter()
                 .flat_map(|bar| [(bar.low, bar.density), (bar.high, bar.density)]);

@@ -25,7 +25,8 @@ const LINES: u32 = 12;
 /// τ = nT; `None` without any interval under modulation. Slips of sets with a phase have the colour of their V0.
 pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
-        let (period, interval) = (point.period?, point.interval?);
+        let period = point.period?;
+        let interval = point.interval?;
         Some((period, interval / period))
     };
     let mut slips: Vec<(&Point, Place)> = points

@@ -89,7 +89,8 @@ pub(super) fn draw_legend(
 }
 
 fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
-    let (end, centre) = (start + MARK, (start + 0.5 * mark_width(mark), middle));
+    let end = start + MARK;
+    let centre = (start + 0.5 * mark_width(mark), middle);
     match mark {
         Mark::Dot(dot) => {
             // A single faint dot could not be seen.

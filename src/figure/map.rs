@@ -52,10 +52,8 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let of = |column: &str| Quantity::of(sets, "map", column).ok();
     let [x, y] = [of(columns[0])?, of(columns[1])?];
     let map = Map::of(&x, &y, if is_locking { 8 } else { 4 })?;
-    let (x_axis, y_axis) = (
-        map.columns.axis(&x.axis_label()),
-        map.rows.axis(&y.axis_label()),
-    );
+    let x_axis = map.columns.axis(&x.axis_label());
+    let y_axis = map.rows.axis(&y.axis_label());
     let modulated = sets
         .iter()
         .find(|set| set.parameters.modulation_period.is_some());

@@ -55,10 +55,8 @@ impl Layer<'_> {
                 Self::Curve(vec![(x, frame.y.low), (x, frame.y.high)], stroke).draw(sheet, frame);
             }
             Self::Stripe((low, high), fill) => {
-                let (left, right) = (
-                    frame.x_of(low.max(frame.x.low)),
-                    frame.x_of(high.min(frame.x.high)),
-                );
+                let left = frame.x_of(low.max(frame.x.low));
+                let right = frame.x_of(high.min(frame.x.high));
                 if right > left {
                     sheet.rectangle([left, frame.top, right - left, frame.height], fill);
                 }
@@ -74,7 +72,8 @@ impl Layer<'_> {
             }
             Self::Bars(bars, stroke) => {
                 for (x, (low, high)) in bars {
-                    let (x, is_finite) = (frame.x_of(x), frame.y.place(low).is_finite());
+                    let x = frame.x_of(x);
+                    let is_finite = frame.y.place(low).is_finite();
                     let bottom = if is_finite {
                         frame.y_of(low).min(2.0 * frame.bottom())
                     } else {

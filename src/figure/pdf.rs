@@ -36,7 +36,8 @@ pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
         opacities: Vec::new(),
     };
     // From the upper left corner, downwards.
-    let (scale, height) = (single(points), single(points * scene.height));
+    let scale = single(points);
+    let height = single(points * scene.height);
     page.content
         .transform([scale, 0.0, 0.0, -scale, 0.0, height]);
     page.content.set_line_join(LineJoinStyle::RoundJoin);
@@ -141,7 +142,8 @@ impl Page<'_> {
             .set_stroke_rgb(red, green, blue)
             .set_line_width(single(width));
         for (index, &(x, y)) in points.iter().enumerate() {
-            let (x, y) = (single(x), single(y));
+            let x = single(x);
+            let y = single(y);
             let _ = if index == 0 {
                 self.content.move_to(x, y)
             } else {
@@ -169,7 +171,8 @@ impl Page<'_> {
             .set_line_cap(LineCapStyle::RoundCap);
         self.content.set_line_width(single(2.0 * radius));
         for (&x, &y) in xs.iter().zip(ys) {
-            let (x, y) = (single(x), single(y));
+            let x = single(x);
+            let y = single(y);
             self.content.move_to(x, y).line_to(x, y).stroke();
         }
         self.content.restore_state();
@@ -200,7 +203,8 @@ impl Page<'_> {
         fill: [f32; 3],
     ) {
         let em = f32::from(self.face.units_per_em());
-        let (mut codes, mut width) = (Vec::new(), 0.0);
+        let mut codes = Vec::new();
+        let mut width = 0.0;
         for letter in text.chars() {
             let glyph = self.face.glyph_index(letter).unwrap_or(GlyphId(0));
             let advance = EM * f32::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) / em;
@@ -226,7 +230,11 @@ impl Page<'_> {
     fn write(self, font: &[u8], width: f32, height: f32) -> Result<Vec<u8>, String> {
         let mut next = (1..).map(Ref::new);
         let mut id = || next.next().ok_or("there are too many objects");
-        let (catalog, pages, page, content, font_id) = (id()?, id()?, id()?, id()?, id()?);
+        let catalog = id()?;
+        let pages = id()?;
+        let page = id()?;
+        let content = id()?;
+        let font_id = id()?;
         let states: Vec<Ref> = self
             .opacities
             .iter()
@@ -257,7 +265,10 @@ impl Page<'_> {
         let drawn = compressed(&self.content.finish());
         pdf.stream(content, &drawn).filter(Filter::FlateDecode);
 
-        let (descendant, descriptor, file, to_unicode) = (id()?, id()?, id()?, id()?);
+        let descendant = id()?;
+        let descriptor = id()?;
+        let file = id()?;
+        let to_unicode = id()?;
         let mut whole = pdf.type0_font(font_id);
         whole
             .base_font(FONT_NAME)

@@ -336,7 +336,9 @@ fn subscript(text: &str) -> Option<(&str, (&str, &str))> {
 /// Cuts a line into dashes.
 fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
     let mut dashes = Vec::new();
-    let (mut current, mut draws, mut left) = (Vec::new(), true, dash);
+    let mut current = Vec::new();
+    let mut draws = true;
+    let mut left = dash;
     for pair in points.windows(2) {
         let [(x, y), (end_x, end_y)] = [pair[0], pair[1]];
         let length = libm::hypot(end_x - x, end_y - y);

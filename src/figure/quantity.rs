@@ -213,7 +213,8 @@ impl Quantity<'_> {
     /// Its values as colours.
     pub(super) fn hues(&self) -> Result<Hues, BadOption> {
         let values = &self.column.values;
-        let (words, inks) = (values.words.len(), INKS.len());
+        let words = values.words.len();
+        let inks = INKS.len();
         if words > inks {
             return Err(self.refuse(&format!(
                 "has {words} words, and there are {inks} colours; take another column"

@@ -113,10 +113,8 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
         .map(|point| point.work);
     let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
     let all = || panels.iter().flat_map(|panel| &panel.points);
-    let (methods, drives) = (
-        distinct(all().map(|point| &*point.method)),
-        distinct(all().map(|point| &*point.drive)),
-    );
+    let methods = distinct(all().map(|point| &*point.method));
+    let drives = distinct(all().map(|point| &*point.drive));
     let inks = methods.iter().zip(INKS.into_iter().cycle());
     let looks = inks.flat_map(|(method, ink)| {
         drives

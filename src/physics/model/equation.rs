@@ -77,7 +77,8 @@ impl StiffnessMatrix {
         if !widest.is_finite() {
             return f64::INFINITY;
         }
-        let (mut low, mut high) = (-f64::EPSILON * widest, widest * (1.0 + f64::EPSILON));
+        let mut low = -f64::EPSILON * widest;
+        let mut high = widest * (1.0 + f64::EPSILON);
         loop {
             let middle = 0.5 * (low + high);
             if middle <= low || middle >= high {

@@ -213,7 +213,8 @@ mod tests {
             ..Parameters::default()
         };
         let drive = Drive::new(&parameters);
-        let (stiffness, amplitude) = (drive.stiffness, drive.amplitude);
+        let stiffness = drive.stiffness;
+        let amplitude = drive.amplitude;
         let swing = |start: f64, duration: f64, slid: f64| Segment {
             start,
             duration,

@@ -67,7 +67,8 @@ pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
     let square = centre * centre;
     let (pairs, rest) = coefficients.as_chunks::<2>();
     let mut sums = [rest.first().copied().unwrap_or(0.0), 0.0];
-    let (mut slopes, mut half_curvatures) = ([0.0; 2], [0.0; 2]);
+    let mut slopes = [0.0; 2];
+    let mut half_curvatures = [0.0; 2];
     for pair in pairs.iter().rev() {
         for i in 0..2 {
             half_curvatures[i] = half_curvatures[i] * square + slopes[i];
@@ -86,7 +87,8 @@ pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
 /// `Σ_{p>=2} |c_p|` and `Σ_{p>=2} p |c_p|`: bounds on [0, 1] for what the terms beyond the linear one add to the value
 /// and to the slope.
 pub(crate) fn beyond_linear(coefficients: &[f64]) -> (f64, f64) {
-    let (mut value_spread, mut slope_spread) = (0.0, 0.0);
+    let mut value_spread = 0.0;
+    let mut slope_spread = 0.0;
     for c in coefficients.iter().skip(2).rev() {
         value_spread += c.abs();
         slope_spread += value_spread;

@@ -22,7 +22,8 @@ pub(super) fn first_exit(
     from: f64,
     end: f64,
 ) -> Option<f64> {
-    let (start, slope) = (coefficients[0], coefficients[1]);
+    let start = coefficients[0];
+    let slope = coefficients[1];
     let (value_spread, slope_spread) = beyond_linear(coefficients);
     let mut first = None;
     if start + slope.max(0.0) + value_spread >= upper {
@@ -68,7 +69,8 @@ fn first_reach(coefficients: &[f64], slope_spread: f64, from: f64, end: f64) -> 
 }
 
 fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64> {
-    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let middle = 0.5 * (low + high);
+    let half = 0.5 * (high - low);
     let about = &rescaled(coefficients, low, high)[..coefficients.len()];
     let (value_spread, slope_spread) = beyond_linear(about);
     let slope = about[1];
@@ -220,7 +222,8 @@ mod tests {
             levels in (0.001_f64..1.0, 0.001_f64..1.0),
         ) {
             let start = value(&coefficients, from);
-            let (lower, upper) = (start - levels.0, start + levels.1);
+            let lower = start - levels.0;
+            let upper = start + levels.1;
             let found = first_exit(&mut coefficients.clone(), [lower, upper], from, from + length);
             let until = found.unwrap_or(from + length);
             for i in 0..400 {

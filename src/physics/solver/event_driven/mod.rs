@@ -618,7 +618,8 @@ mod tests {
             .unwrap();
             log.events
         };
-        let (loose, tight) = (log(1e-4), log(1e-10));
+        let loose = log(1e-4);
+        let tight = log(1e-10);
         assert!(tight.len() > 200, "too few events to compare");
         assert_eq!(loose.len(), tight.len());
         for (event, exact) in loose.iter().zip(&tight) {

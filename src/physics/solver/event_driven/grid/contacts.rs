@@ -39,18 +39,21 @@ impl Path {
     /// The path of a block over the last step, under the present law.
     #[inline(always)]
     fn new(slider: &Slider, step: &GridStep, drive: &GridDrive, block: usize) -> Self {
-        let (x, q) = (&slider.state.displacement, &step.increment);
+        let x = &slider.state.displacement;
+        let q = &step.increment;
         let Place {
             slot: (row, lane),
             before,
             after,
             shares,
         } = step.places[block];
-        let (end, rise) = (x[row][lane], q[row][lane]);
+        let end = x[row][lane];
+        let rise = q[row][lane];
         let beside = |rows: &[Row]| {
             shares[0].mul_add(rows[before.0][before.1], shares[1] * rows[after.0][after.1])
         };
-        let (beside_end, beside_rise) = (beside(x), beside(q));
+        let beside_end = beside(x);
+        let beside_rise = beside(q);
         let pulls = if block == 0 { step.pulling } else { 0.0 };
         let last_force = pulls.mul_add(
             drive.displacement(),
@@ -63,15 +66,11 @@ impl Path {
         );
         // x'' = φ - γh x' at both ends, with the slopes of this very path.
         let damping = step.damping;
-        let (from, to) = (
-            damping.mul_add(-rise, first_force),
-            damping.mul_add(-rise, last_force),
-        );
+        let from = damping.mul_add(-rise, first_force);
+        let to = damping.mul_add(-rise, last_force);
         let [across, along_first, along_last] = step.damped;
-        let (first, last) = (
-            across.mul_add(to, along_first * from),
-            across.mul_add(-from, along_last * to),
-        );
+        let first = across.mul_add(to, along_first * from);
+        let last = across.mul_add(-from, along_last * to);
         let slope = SIXTH.mul_add(-2.0f64.mul_add(first, last), rise);
         let coefficients = [end - rise, slope, 0.5 * first, (last - first) * SIXTH, 0.0];
         Self {

@@ -131,7 +131,8 @@ impl Grid {
         [force, bend]: [f64; 2],
         start_bend: f64,
     ) {
-        let (step, drive) = (&self.step, &self.drive);
+        let step = &self.step;
+        let drive = &self.drive;
         let x = |block: usize| {
             if block < chain.layout.blocks {
                 chain.at(&state.displacement, block)
@@ -139,7 +140,8 @@ impl Grid {
                 0.0
             }
         };
-        let (here, rise) = (x(0), step.increment[0][0]);
+        let here = x(0);
+        let rise = step.increment[0][0];
         let own = step.force_on(0, 0, x(1), here) + step.pulling * drive.displacement();
         // h² x'' at the start of the step and, from the law of motion, at its end.
         let first = start_bend - bend * step.inverse_stiffness;
@@ -213,7 +215,8 @@ impl Integration<'_> {
             min_order: 0,
             drive,
         };
-        let (chain, state) = (&self.slider.chain, &self.slider.state);
+        let chain = &self.slider.chain;
+        let state = &self.slider.state;
         if !self
             .kernels
             .expand(chain, state, &input, &mut self.step.series)

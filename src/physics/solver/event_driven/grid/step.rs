@@ -38,7 +38,8 @@ impl Place {
                 .filter(|other| *other < layout.blocks)
                 .map(|other| layout.slot(other))
         };
-        let (before, after) = (beside(block.checked_sub(1)), beside(Some(block + 1)));
+        let before = beside(block.checked_sub(1));
+        let after = beside(Some(block + 1));
         let share = |beside: Option<(usize, usize)>| if beside.is_some() { 1.0 } else { 0.0 };
         let shares = [share(before), share(after)];
         Self {
@@ -286,12 +287,18 @@ fn march_in_registers<S: Simd, const R: usize>(
 ) -> usize {
     let displacement = &mut displacement[..R];
     let increment = &mut step.increment[..R];
-    let (pull, diagonal, own) = (&step.pull[..R], &step.diagonal[..R], &step.own[..R]);
-    let (couplings, second_couplings) = (&step.couplings[..R], &step.second_couplings[..R]);
-    let (upper, lower) = (&step.upper[..R], &step.lower[..R]);
+    let pull = &step.pull[..R];
+    let diagonal = &step.diagonal[..R];
+    let own = &step.own[..R];
+    let couplings = &step.couplings[..R];
+    let second_couplings = &step.second_couplings[..R];
+    let upper = &step.upper[..R];
+    let lower = &step.lower[..R];
     let first_lane = simd.load(&FIRST_BLOCK);
     let decay = simd.splat(step.decay);
-    let (mut x, mut q, mut f) = ([first_lane; R], [first_lane; R], [first_lane; R]);
+    let mut x = [first_lane; R];
+    let mut q = [first_lane; R];
+    let mut f = [first_lane; R];
     for r in 0..R {
         x[r] = simd.load(&displacement[r]);
         q[r] = simd.load(&increment[r]);
@@ -379,14 +386,15 @@ fn march_in_memory<S: Simd, const R: usize>(
     let rows = if R == 0 { chain.layout.rows } else { R };
     let x = &mut displacement[..rows];
     let last = rows - 1;
-    let (q, force) = (&mut step.increment[..rows], &mut step.force[..rows]);
-    let (pull, diagonal, own) = (
-        &step.pull[..rows],
-        &step.diagonal[..rows],
-        &step.own[..rows],
-    );
-    let (couplings, second_couplings) = (&step.couplings[..rows], &step.second_couplings[..rows]);
-    let (upper, lower) = (&step.upper[..rows], &step.lower[..rows]);
+    let q = &mut step.increment[..rows];
+    let force = &mut step.force[..rows];
+    let pull = &step.pull[..rows];
+    let diagonal = &step.diagonal[..rows];
+    let own = &step.own[..rows];
+    let couplings = &step.couplings[..rows];
+    let second_couplings = &step.second_couplings[..rows];
+    let upper = &step.upper[..rows];
+    let lower = &step.lower[..rows];
     let first_lane = simd.load(&FIRST_BLOCK);
     let decay = simd.splat(step.decay);
     for done in 1..=steps {
@@ -594,7 +602,8 @@ mod tests {
             damping_rate: 1e4,
             ..parameters()
         };
-        let (length, velocity) = (2e-6, bare.drive_velocity);
+        let length = 2e-6;
+        let velocity = bare.drive_velocity;
         // The tension between blocks falls by mγV0 from one to the next.
         let drag = bare.block_mass() * bare.damping_rate * velocity;
         let mut start = vec![-drag * bare.blocks as f64 / bare.drive_stiffness; bare.blocks];

@@ -78,7 +78,8 @@ impl<S: Simd, const C: usize> Number<S, C> {
     fn plus_product(self, left: Self, right: Self) -> Self {
         let mut sum = self.plus_scaled(left, right.1[0]);
         if C > 1 {
-            let (across, minus) = (right.1[C - 1], self.0.splat(0.0).minus(left.1[C - 1]));
+            let across = right.1[C - 1];
+            let minus = self.0.splat(0.0).minus(left.1[C - 1]);
             sum.1[0] = minus.mul_add(across, sum.1[0]);
             sum.1[C - 1] = left.1[0].mul_add(across, sum.1[C - 1]);
         }
@@ -174,12 +175,17 @@ impl<const C: usize> Elimination<C> {
         shift: [f64; C],
     ) -> bool {
         let rows = chain.layout.rows;
-        let (entries, couplings) = (&mut self.rows[..rows], &chain.coupling[..rows]);
-        let (zero, shift) = (Number::splat(simd, [0.0; C]), Number::splat(simd, shift));
+        let entries = &mut self.rows[..rows];
+        let couplings = &chain.coupling[..rows];
+        let zero = Number::splat(simd, [0.0; C]);
+        let shift = Number::splat(simd, shift);
         let mut one = zero;
         one.1[0] = simd.splat(1.0);
-        let (mut ratio, mut along, mut pivot) = (zero, one, zero);
-        let (mut least, mut positive) = (simd.splat(0.0), u8::MAX);
+        let mut ratio = zero;
+        let mut along = one;
+        let mut pivot = zero;
+        let mut least = simd.splat(0.0);
+        let mut positive = u8::MAX;
         for r in 0..rows {
             let mut entry = shift;
             entry.1[0] = entry.1[0]
@@ -200,7 +206,8 @@ impl<const C: usize> Elimination<C> {
             }
         }
         along.store(&mut self.carried);
-        let (mut own, mut before) = (zero, one);
+        let mut own = zero;
+        let mut before = one;
         for (r, entry) in entries.iter_mut().enumerate().rev() {
             if r + 1 < rows {
                 let ratio = Number::load(simd, &entry.ratio);

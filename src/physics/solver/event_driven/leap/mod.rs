@@ -72,8 +72,12 @@ fn passing_horizon(
     largest: f64,
 ) -> Result<f64, f64> {
     let loose = libm::log(largest / (LOOSE * error)) / split.decay_rate;
-    let (allowed, per_mass) = (PASSED_SHARE * error, 1.0 / chain.mass);
-    let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, most);
+    let allowed = PASSED_SHARE * error;
+    let per_mass = 1.0 / chain.mass;
+    let mut displaced = 0.0;
+    let mut rate = 0.0;
+    let mut last = 0.0;
+    let mut limit = most;
     interface.look_ahead(|due, block, life| {
         let seconds = due - start;
         let by_then = displaced + rate * (seconds - last);
@@ -258,14 +262,13 @@ pub(super) fn leap<S: Simd>(
 /// bound remains.
 #[inline(always)]
 fn stays_clear<S: Simd>(simd: S, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool {
-    let (seconds, left) = (simd.splat(seconds), simd.splat(left));
+    let seconds = simd.splat(seconds);
+    let left = simd.splat(left);
     let mut clear = u8::MAX;
     for ((row, upper), lower) in split.rows.iter().zip(&chain.upper).zip(&chain.lower) {
-        let (start, bound, swing) = (
-            simd.load(&row.start),
-            simd.load(&row.bound),
-            simd.load(&row.swing),
-        );
+        let start = simd.load(&row.start);
+        let bound = simd.load(&row.bound);
+        let swing = simd.load(&row.swing);
         // Ramp and decaying bound together are convex in time: largest at the ends.
         let late = start
             .plus(simd.load(&row.rate[0]).times(seconds))
@@ -286,8 +289,10 @@ fn first_reached<S: Simd>(
     drive: &Harmonic,
     [decay, horizon]: [f64; 2],
 ) -> (f64, Option<usize>) {
-    let (mut first, mut until) = ((horizon, None), f64::NAN);
-    let (mut ends, mut bend) = ([(0.0, 0.0); 2], 0.0);
+    let mut first = (horizon, None);
+    let mut until = f64::NAN;
+    let mut ends = [(0.0, 0.0); 2];
+    let mut bend = 0.0;
     for (r, row) in split.rows.iter().enumerate() {
         if until != first.0 {
             // The cosine exceeds its ends by no more than it bends in between; over long times it is anything up to |q|.
@@ -301,7 +306,8 @@ fn first_reached<S: Simd>(
             };
             bend = if is_short { 0.5 * half * half } else { 1.0 };
         }
-        let (start, rate) = (simd.load(&row.start), simd.load(&row.rate[0]));
+        let start = simd.load(&row.start);
+        let rate = simd.load(&row.rate[0]);
         let from = start
             .plus(rate.times(simd.splat(decay)))
             .plus(turned(simd, row, ends[0]));
@@ -309,7 +315,8 @@ fn first_reached<S: Simd>(
             .plus(rate.times(simd.splat(until)))
             .plus(turned(simd, row, ends[1]));
         let beyond = simd.load(&row.swing).times(simd.splat(bend));
-        let (highest, lowest) = (from.larger(to).plus(beyond), from.smaller(to).minus(beyond));
+        let highest = from.larger(to).plus(beyond);
+        let lowest = from.smaller(to).minus(beyond);
         let mut lanes = highest.reaches(simd.load(&chain.upper[r]))
             | simd.load(&chain.lower[r]).reaches(lowest);
         while lanes != 0 {
@@ -336,14 +343,16 @@ fn follow<S: Simd>(simd: S, split: &Split, drive: &Harmonic, elapsed: f64, state
     } else {
         (0.0, 1.0)
     };
-    let (elapsed, frequency) = (simd.splat(elapsed), simd.splat(drive.angular_frequency));
+    let elapsed = simd.splat(elapsed);
+    let frequency = simd.splat(drive.angular_frequency);
     for ((row, x), v) in split
         .rows
         .iter()
         .zip(&mut state.displacement)
         .zip(&mut state.velocity)
     {
-        let (start, rate) = (simd.load(&row.start), simd.load(&row.rate[0]));
+        let start = simd.load(&row.start);
+        let rate = simd.load(&row.rate[0]);
         start
             .plus(rate.times(elapsed))
             .plus(turned(simd, row, (sine, cosine)))

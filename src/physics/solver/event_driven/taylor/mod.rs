@@ -177,7 +177,8 @@ impl Integration<'_> {
         let until_attach = self.slider.interface.next_reattachment() - self.frame.time
             + self.control.attach_window;
         self.expand(horizon.min(until_attach))?;
-        let (start, length) = (self.step.start, self.step.length);
+        let start = self.step.start;
+        let length = self.step.length;
         if !self.frame.resolves(length) {
             return Err(SimulationError::StepTooShort {
                 time: self.frame.now(),
@@ -185,7 +186,9 @@ impl Integration<'_> {
             });
         }
         self.summary.steps += 1;
-        let (mut done, mut end, mut merged) = (0.0, (horizon / length).min(1.0), 0);
+        let mut done = 0.0;
+        let mut end = (horizon / length).min(1.0);
+        let mut merged = 0;
         let mut force = ForceAt {
             force: self.step.force[0],
             integral: 0.0,
@@ -265,7 +268,8 @@ impl Integration<'_> {
         force: ForceAt,
         observer: &mut dyn Observer,
     ) -> ForceAt {
-        let (start, length) = (self.step.start, self.step.length);
+        let start = self.step.start;
+        let length = self.step.length;
         let end_force = ForceAt::new(&self.step.force, last);
         observer.advance(&Segment {
             start: self.frame.absolute_time(start + first * length),
@@ -307,8 +311,9 @@ impl Integration<'_> {
         if self.step.series.order < MERGED_ORDER {
             return 0.0;
         }
-        let (chain, interface, length) =
-            (&self.slider.chain, &self.slider.interface, self.step.length);
+        let chain = &self.slider.chain;
+        let interface = &self.slider.interface;
+        let length = self.step.length;
         let square = length * length;
         let stiffened = (interface.block_stiffness[block] - stiffness) * square / chain.mass;
         let pulled = (interface.block_pull[block] - pull) * square / chain.mass;
@@ -342,7 +347,8 @@ impl Integration<'_> {
     pub(super) fn expand(&mut self, horizon: f64) -> Result<(), SimulationError> {
         let max_step = self.tolerances.max_step;
         let wanted = self.control.typical_advance.min(horizon).min(max_step);
-        let (mut halvings, mut length) = (0, max_step);
+        let mut halvings = 0;
+        let mut length = max_step;
         while halvings < MAX_HALVINGS && 0.5 * length >= wanted {
             halvings += 1;
             length *= 0.5;

@@ -47,7 +47,8 @@ pub fn expand<S: Simd, const R: usize>(
         diagonal,
         ..
     } = series;
-    let (coupling, diagonal) = (&mut coupling[..rows], &mut diagonal[..rows]);
+    let coupling = &mut coupling[..rows];
+    let diagonal = &mut diagonal[..rows];
     let square = simd.splat(input.length * input.length);
     let minus_square = simd.splat(-(input.length * input.length));
     for (scaled, coupling) in coupling.iter_mut().zip(&chain.coupling[..rows]) {
@@ -211,7 +212,8 @@ fn sweep<S: Simd>(
 /// allowed.
 #[inline(always)]
 fn are_small<S: Simd>(simd: S, terms: &[Row], rows: usize, order: usize, error: f64) -> bool {
-    let (mut in_lower, mut in_higher) = (simd.splat(0.0), simd.splat(0.0));
+    let mut in_lower = simd.splat(0.0);
+    let mut in_higher = simd.splat(0.0);
     for (lower, higher) in terms[..rows].iter().zip(&terms[rows..]) {
         in_lower = simd.load(lower).abs().larger(in_lower);
         in_higher = simd.load(higher).abs().larger(in_higher);

@@ -104,7 +104,9 @@ impl Series {
 
     /// Adds to the first coefficients Y_p/p! of one block, in m. The order is at least that of the last.
     pub fn add(&mut self, row: usize, lane: usize, coefficients: &[f64]) {
-        let (mut at, mut factorial, mut order) = (row, 1.0, 0.0);
+        let mut at = row;
+        let mut factorial = 1.0;
+        let mut order = 0.0;
         for coefficient in coefficients {
             self.terms[at][lane] += factorial * coefficient;
             self.excursion[row][lane] += coefficient.abs();
@@ -116,7 +118,8 @@ impl Series {
 
     /// Lower and upper bound on the displacement of one block within the step, in m.
     pub fn range(&self, row: usize, lane: usize) -> [f64; 2] {
-        let (start, excursion) = (self.terms[row][lane], self.excursion[row][lane]);
+        let start = self.terms[row][lane];
+        let excursion = self.excursion[row][lane];
         [start - excursion, start + excursion]
     }
 
