@@ -8,8 +8,7 @@
 
 use super::bias::{Bias, Sample};
 use super::breaks::{BreakErrors, Comparison, Reference};
-use super::cost::Cost;
-use super::{Method, set_in_words};
+use super::{Cost, Method, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Recording, Slip, measure};
@@ -71,10 +70,7 @@ impl Study {
                 &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
                 &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10],
             ),
-            own: Solver::EventDriven {
-                tolerance: 1e-3,
-                resolve: Resolve::Grid,
-            },
+            own: grid(1e-3),
             slips_of_sets: Vec::new(),
             first_seed: 0,
             seeds: 8,
@@ -106,14 +102,9 @@ impl Study {
         let mut in_taylor_steps = vec![1e-3, 1e-4, 1e-6, 1e-8];
         let (settings, setting, own) = match solver {
             Solver::FixedStep { time_step } => (&mut time_steps, time_step, solver),
-            Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => (
-                &mut on_the_grid,
-                tolerance,
-                Solver::EventDriven {
-                    tolerance,
-                    resolve: Resolve::Grid,
-                },
-            ),
+            Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => {
+                (&mut on_the_grid, tolerance, grid(tolerance))
+            }
             Solver::EventDriven { tolerance, .. } => {
                 (&mut in_taylor_steps, tolerance, taylor(tolerance))
             }
@@ -150,14 +141,16 @@ fn solvers(time_steps: &[f64], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> 
     let fixed = time_steps
         .iter()
         .map(|&time_step| Solver::FixedStep { time_step });
-    let grid = on_the_grid.iter().map(|&tolerance| Solver::EventDriven {
+    let grid = on_the_grid.iter().map(|&tolerance| grid(tolerance));
+    let taylor = in_taylor_steps.iter().map(|&tolerance| taylor(tolerance));
+    fixed.chain(grid).chain(taylor).collect()
+}
+
+const fn grid(tolerance: f64) -> Solver {
+    Solver::EventDriven {
         tolerance,
         resolve: Resolve::Grid,
-    });
-    fixed
-        .chain(grid)
-        .chain(in_taylor_steps.iter().map(|&tolerance| taylor(tolerance)))
-        .collect()
+    }
 }
 
 const fn taylor(tolerance: f64) -> Solver {

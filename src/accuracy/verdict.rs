@@ -173,9 +173,9 @@ fn tighter(findings: &Findings, rows: &[&MethodRow]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Cost;
     use super::super::bias::Bias;
     use super::super::breaks::BreakErrors;
-    use super::super::cost::Cost;
     use super::*;
     use crate::model::Parameters;
     use crate::model::selected::Selected;

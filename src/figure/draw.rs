@@ -2,7 +2,7 @@
 
 use super::style::INKS;
 use super::{BadOption, CustomFigure, Format, Look, Picture};
-use super::{backbone, custom, drag, edges, histograms, intervals, map, overview, sets};
+use super::{custom, drag, edge_values, histograms, intervals, map, overview, phase_eta, sets};
 use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
@@ -23,7 +23,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     let sets = read_sets(layout, MAX_SETS).map_err(advise(ADVICE))?;
     let look = &look.with_note(&sets::common(sets.iter().map(|set| &*set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(backbone::backbone(&points, &read(layout)?, &sets, look));
+    pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, &sets, look));
     pictures.extend(intervals::intervals(&points, look));
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
@@ -41,7 +41,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
         pictures.extend(map);
     }
     if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
-        pictures.extend(edges::edges(&read(layout)?, look));
+        pictures.extend(edge_values::edges(&read(layout)?, look));
     }
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));

@@ -14,14 +14,13 @@
 //! ```
 
 mod axis;
-mod backbone;
 mod chart;
 mod chart_legend;
 mod colour_bar;
 mod custom;
 mod drag;
 mod draw;
-mod edges;
+mod edge_values;
 mod font;
 mod frame;
 mod histograms;
@@ -33,6 +32,7 @@ mod map;
 mod overview;
 mod panel;
 mod pdf;
+mod phase_eta;
 mod picture;
 mod quantity;
 mod sets;

@@ -35,7 +35,7 @@ const FAINTEST: f64 = 0.25 / (2.0 * PI);
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
-pub(super) fn backbone(
+pub(super) fn phase_eta(
     points: &[Point],
     bins: &[BackboneBin],
     sets: &[SetRow],
