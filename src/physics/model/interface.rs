@@ -97,7 +97,7 @@ impl Attached {
     }
 }
 
-/// What a block feels of eight contacts, and where they break. Contact i of a block lies in row i div 8 of the block, lane
+/// The force of eight contacts on their block, and where they break. Contact i of a block lies in row i div 8 of the block, lane
 /// i mod 8. Lanes beyond the last contact stay detached for ever.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
@@ -236,16 +236,23 @@ impl Interface {
     /// Time in s of the next reattachment at a block, if it is due by a time in s; else infinite.
     #[inline(always)]
     pub fn next_reattachment_at(&mut self, block: usize, by: f64) -> f64 {
-        let mut next = f64::INFINITY;
         if self.next_reattachment() <= by {
-            self.reattachments.look_ahead(|due| {
-                let is_in_time = due.time() <= by;
-                if is_in_time && due.block() == block {
-                    next = due.time();
-                }
-                is_in_time && due.block() != block
-            });
+            self.find_reattachment_at(block, by)
+        } else {
+            f64::INFINITY
         }
+    }
+
+    /// The same where something is due. Not inlined in the loops over contacts, where that is rare.
+    #[inline(never)]
+    fn find_reattachment_at(&mut self, block: usize, by: f64) -> f64 {
+        let mut next = f64::INFINITY;
+        self.look_ahead(|due, other, _| {
+            if due <= by && other == block {
+                next = due;
+            }
+            due <= by && other != block
+        });
         next
     }
 

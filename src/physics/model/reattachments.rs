@@ -114,7 +114,7 @@ impl Reattachments {
         Some(next)
     }
 
-    /// Visits them in order until told to stop.
+    /// Visits them in order, as long as `visit` is true.
     pub fn look_ahead(&mut self, mut visit: impl FnMut(Due) -> bool) {
         let mut sorted = std::mem::take(&mut self.work_space);
         let mut goes_on = self

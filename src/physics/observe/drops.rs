@@ -67,11 +67,11 @@ impl DropDetector {
 
     pub(super) fn advance(&mut self, segment: &Segment<'_>) {
         let (low, high) = segment.bounds();
-        let tells_nothing = match self.bottom {
+        let changes_nothing = match self.bottom {
             None => high <= self.top.force && low > self.top.force - self.least,
             Some(bottom) => low >= bottom.force && high < bottom.force + self.least,
         };
-        if tells_nothing {
+        if changes_nothing {
             return;
         }
         segment.for_each_turn(|time, force| self.follow(time, force));

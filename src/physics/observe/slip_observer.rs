@@ -218,7 +218,7 @@ impl SlipObserver {
 
     /// Averages over time, from the end of start-up to that of the last slip. What follows belongs to it if no slip has come
     /// for half the time to give up: the slider then slides, and without a slip past start-up only that second half counts.
-    /// `None` if nothing is left.
+    /// `None` for an empty span.
     pub fn averages(&self) -> Option<Averages> {
         let (start, end) = match self.span.settled {
             Some(settled) => {

@@ -3,8 +3,8 @@
 //! Source: the textbook scheme (Verlet 1967; Swope et al. 1982), the damping taken half before and half after the
 //! force, implicitly after, so that its limit of stability dt < 2/ω_max holds for any damping rate. Contract:
 //! first-order errors in the times of events, second-order between them; O(N) work per step through the block sums. It
-//! is kept plain: the baseline of speed, and a witness for the other solver. So that it is a fair one, its loops are
-//! compiled for the features of the processor, chosen at run time, as those of the other solver are; nothing is fused
+//! is kept plain: the baseline of speed, and a check of the other solver. For a fair comparison its loops are compiled
+//! for the features of the processor, chosen at run time, as those of the other solver are; nothing is fused
 //! or reassociated, so all give the same bits.
 
 use super::ledger::{Audit, FinalState};
@@ -279,15 +279,15 @@ mod tests {
     #[cfg(target_arch = "x86_64")]
     use pulp::x86::{V3, V4};
 
-    /// All that an observer is told.
+    /// All that is reported to an observer.
     #[derive(Debug, Default, PartialEq)]
-    struct Told {
+    struct Reported {
         forces: Vec<[f64; 2]>,
         events: Vec<ContactEvent>,
         displacement: Vec<f64>,
     }
 
-    impl Observer for Told {
+    impl Observer for Reported {
         fn advance(&mut self, segment: &Segment<'_>) {
             self.forces.push([segment.end_force(), segment.impulse()]);
         }
@@ -329,11 +329,11 @@ mod tests {
                     events: u64::MAX,
                     interrupt: None,
                 };
-                let mut told = Told::default();
-                let audited = ledger::audited(&parameters, &mut told, |observer, audit| {
+                let mut reported = Reported::default();
+                let audited = ledger::audited(&parameters, &mut reported, |observer, audit| {
                     run(features, &parameters, 2e-6, limits, observer, Some(audit))
                 });
-                (format!("{features:?}"), (told, audited.unwrap()))
+                (format!("{features:?}"), (reported, audited.unwrap()))
             });
             let runs: Vec<_> = runs.collect();
             assert!(

@@ -166,8 +166,7 @@ impl GridStep {
         self.lower.copy_from_slice(&chain.lower);
     }
 
-    /// Takes over what a block feels of its contacts: the diagonal of S in N/m, the pull in N, the nearest break positions
-    /// in m.
+    /// Takes over the force of a block's contacts: the diagonal of S in N/m, the pull in N, the nearest break positions in m.
     #[inline(always)]
     pub(super) fn update<S: Simd>(
         &mut self,

@@ -1,11 +1,11 @@
 //! Leaps over quiet time along the driven solution.
 //!
-//! Between events the motion is a driven solution and a free motion about it, which decays and is bounded for each block ([`split`]). A leap may therefore start while the free motion is still
-//! large, if the bound shows that meanwhile no block reaches a break position, and that the shear force has been or
-//! will be larger than it can be meanwhile. What is left of the free motion when the next event comes
-//! has fallen under the tolerance, and is dropped.
-//! Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at its end, no event on the way,
-//! and no largest shear force.
+//! Setting: `tolerance`. Method: between events the motion is a driven solution and a free motion about it, which decays and
+//! is bounded for each block ([`split`], where the bound is derived). So a leap may start while the free motion is still
+//! large, if the bound shows that no block reaches a break position meanwhile, and that the shear force has been or will be
+//! larger than it can be meanwhile. When the next event comes, the rest of the free motion is below the tolerance and is
+//! dropped. Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at its end, no event on the
+//! way, and no largest shear force.
 
 mod elimination;
 mod split;
@@ -107,7 +107,7 @@ fn passing_horizon(
     }
 }
 
-/// Looks for a leap under a drive that moves as given. The free motion of a block is at most `largest` m. If there is none,
+/// Looks for a leap under a drive that moves as given, with free motion of a block of at most `largest` m. Without one, returns
 /// after how many seconds to look again.
 #[inline(always)]
 fn plan<S: Simd>(
