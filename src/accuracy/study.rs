@@ -4,7 +4,7 @@
 //! against the tightest tolerance there is; and an ensemble of slips that is timed and whose distributions are compared
 //! with a reference ensemble of other seeds. At the first set more realisations, not timed, make the ensembles large
 //! enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its slips: it is
-//! timed over a short stretch, and its cost per slip follows from the steps in one.
+//! timed over a short stretch, and its cost per slip follows from the steps of an interval.
 
 use super::bias::{Bias, Sample};
 use super::breaks::{BreakErrors, Comparison, Reference};
