@@ -1,5 +1,5 @@
-//! Charts: sets against a column, a dot each, with error bars where there are intervals. The overview of a sweep and custom
-//! figures are charts.
+//! Charts: a dot for each set against a column, with error bars where there are intervals. The overview of a sweep and
+//! custom figures are charts.
 
 use super::BadOption;
 use super::axis::Axis;
@@ -369,7 +369,7 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
         .map(of)
         .collect();
     groups.retain(|(_, sets)| !sets.is_empty());
-    // Sets without a value, such as a frequency at Δ = 0, have a panel of their own.
+    // Sets without a value, such as a frequency at Δ = 0, have a separate panel.
     let without: Vec<usize> = sets
         .iter()
         .copied()

@@ -1,4 +1,4 @@
-//! Hues: a quantity as colours. Few values have inks of their own and stand in the legend, many a scale beside the frame.
+//! Hues: a quantity as colours. Few values have an ink each and stand in the legend; many are a scale beside the frame.
 
 use super::axis::Axis;
 use super::colour_bar::ColourBar;

@@ -16,7 +16,7 @@ use crate::reduce::{SetRow, differing};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Numbers of periods that have a colour of their own; larger ones share one.
+/// Numbers of periods that have a colour each; larger numbers share one.
 const MAX_PERIODS: f64 = 12.0;
 /// Share of the scale at the least number of periods, which is not to be taken for the ground.
 const FIRST_SHADE: f64 = 0.22;

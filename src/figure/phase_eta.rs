@@ -1,4 +1,4 @@
-//! φ against η (Fig. 3e): the density of slips, the back-bone of Eq. 2, and averages over sets that have a phase.
+//! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and averages over sets that have a phase.
 
 use super::axis::{Axis, angle_bounds, bounds};
 use super::colour_bar::ColourBar;

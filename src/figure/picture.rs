@@ -17,7 +17,7 @@ use kuva::render::render::{Primitive, Scene};
 /// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
 
-/// Symbols whose subscripts are no letters of their own; size of these, in tenths, and how far below the line they stand.
+/// Symbols whose subscripts are not letters of the font; their size, in tenths, and how far below the line they stand.
 const SUBSCRIPTED: [&str; 2] = ["K_d", "F_N"];
 const SMALL: u32 = 7;
 const LOWER: f64 = 0.2;

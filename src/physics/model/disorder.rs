@@ -83,10 +83,8 @@ impl Disorder {
         if self.buffered_from[contact] != generation - ahead {
             self.refill(contact, generation - ahead);
         }
-        let Draw {
-            mut threshold,
-            delay,
-        } = self.buffered[contact][ahead as usize];
+        let draw = self.buffered[contact][ahead as usize];
+        let mut threshold = draw.threshold;
         if threshold.is_nan() || threshold <= 0.0 {
             threshold = self.final_threshold(contact, generation);
         }
@@ -94,7 +92,7 @@ impl Disorder {
             threshold,
             stiffness: self.mean_stiffness * (threshold / self.mean_threshold).sqrt(),
             reach: (threshold * self.mean_threshold).sqrt() / self.mean_stiffness,
-            delay,
+            delay: draw.delay,
         }
     }
 

@@ -43,11 +43,8 @@ struct Ramp {
 
 impl Ramp {
     fn new(parameters: &Parameters) -> Option<Self> {
-        let Parameters {
-            modulation_amplitude: amplitude,
-            ramp_time: time,
-            ..
-        } = *parameters;
+        let amplitude = parameters.modulation_amplitude;
+        let time = parameters.ramp_time;
         let period = parameters.modulation_period.filter(|_| time > 0.0)?;
         Some(Self {
             time,

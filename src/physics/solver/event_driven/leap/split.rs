@@ -90,18 +90,12 @@ impl Split {
     /// The driven solution of a block.
     pub fn driven(&self, chain: &Chain, block: usize) -> BlockMotion {
         let (row, lane) = chain.layout.slot(block);
-        let SplitRow {
-            start,
-            rate: [rate],
-            wave: [real, imaginary],
-            swing,
-            ..
-        } = &self.rows[row];
+        let row = &self.rows[row];
         BlockMotion {
-            start: start[lane],
-            rate: rate[lane],
-            wave: [real[lane], imaginary[lane]],
-            swing: swing[lane],
+            start: row.start[lane],
+            rate: row.rate[0][lane],
+            wave: [row.wave[0][lane], row.wave[1][lane]],
+            swing: row.swing[lane],
         }
     }
 
@@ -110,16 +104,9 @@ impl Split {
     #[inline(always)]
     pub fn speed_and_compliance(&self, chain: &Chain, drive: &Harmonic, block: usize) -> [f64; 2] {
         let (row, lane) = chain.layout.slot(block);
-        let SplitRow {
-            rate: [rate],
-            swing,
-            compliance,
-            ..
-        } = &self.rows[row];
-        [
-            rate[lane] + drive.angular_frequency * swing[lane],
-            compliance[lane],
-        ]
+        let row = &self.rows[row];
+        let speed = row.rate[0][lane] + drive.angular_frequency * row.swing[lane];
+        [speed, row.compliance[lane]]
     }
 
     /// Splits a state, and bounds the free motion. Returns the largest bound on a displacement, in m; `None` if the free
@@ -316,16 +303,10 @@ impl BlockMotion {
             return f64::INFINITY;
         }
         let phase = libm::atan2(self.wave[1], self.wave[0]);
-        let Self {
-            start,
-            rate,
-            swing: amplitude,
-            ..
-        } = *self;
         let motion = Harmonic {
-            start,
-            rate,
-            amplitude,
+            start: self.start,
+            rate: self.rate,
+            amplitude: self.swing,
             phase,
             angular_frequency: drive.angular_frequency,
         };
