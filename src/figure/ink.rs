@@ -1,5 +1,6 @@
-//! Inks, and what is drawn with them: strokes, dots, fills.
+//! Inks, and what is drawn with them: strokes, dots, fills. Alone in knowing the colours of kuva.
 
+use kuva::render::color::Color;
 use std::fmt;
 
 /// An opaque colour: red, green and blue.
@@ -19,6 +20,19 @@ impl fmt::Display for Ink {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [red, green, blue] = self.0;
         write!(f, "#{red:02x}{green:02x}{blue:02x}")
+    }
+}
+
+pub(super) fn color(ink: Ink) -> Color {
+    let Ink([red, green, blue]) = ink;
+    Color::Rgb(red, green, blue)
+}
+
+/// Red, green and blue from 0 to 1.
+pub(super) fn parts(color: &Color) -> [f32; 3] {
+    match color {
+        Color::Rgb(red, green, blue) => [*red, *green, *blue].map(|part| f32::from(part) / 255.0),
+        _ => [0.0; 3],
     }
 }
 

@@ -2,7 +2,7 @@
 //! looks the same everywhere. The same scene gives the same bytes on every machine.
 
 use super::font;
-use super::picture::parts;
+use super::ink::parts;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 use pdf_writer::types::{
     CidFontType, FontFlags, LineCapStyle, LineJoinStyle, SystemInfo, UnicodeCmap,

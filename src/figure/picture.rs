@@ -2,7 +2,7 @@
 
 use super::BadOption;
 use super::font;
-use super::ink::{Dot, Fill, Ink, Stroke};
+use super::ink::{Dot, Fill, Ink, Stroke, color};
 use super::pdf::pdf;
 use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
 use crate::table::shown::shown_text;
@@ -10,7 +10,6 @@ use crate::table::value::words;
 use anyhow::{Result, anyhow};
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
-use kuva::render::color::Color;
 pub(super) use kuva::render::render::TextAnchor as Anchor;
 use kuva::render::render::{Primitive, Scene};
 
@@ -307,19 +306,6 @@ impl Picture {
         });
         draw(self);
         self.scene.add(Primitive::ClipEnd);
-    }
-}
-
-fn color(ink: Ink) -> Color {
-    let Ink([red, green, blue]) = ink;
-    Color::Rgb(red, green, blue)
-}
-
-/// Red, green and blue from 0 to 1.
-pub(super) fn parts(color: &Color) -> [f32; 3] {
-    match color {
-        Color::Rgb(red, green, blue) => [*red, *green, *blue].map(|part| f32::from(part) / 255.0),
-        _ => [0.0; 3],
     }
 }
 
