@@ -118,9 +118,10 @@ impl Observer for Comparison<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::ContactChange;
 
     fn break_at(time: f64, contact: usize) -> ContactEvent {
-        ContactEvent {
+        let what = ContactChange {
             time,
             block: 0,
             contact,
@@ -130,6 +131,9 @@ mod tests {
             force: 1.0,
             threshold: 1.0,
             stiffness: 1.0,
+        };
+        ContactEvent {
+            what,
             attached: 0,
             attached_time: 0.0,
             mean_displacement: 0.0,

@@ -4,20 +4,17 @@
 //! breaks.rs     before chaos: break times, contact by contact
 //! bias.rs       after chaos: biases of mean and standard deviation, with intervals
 //! study.rs      every solver at every set of parameters, timed on one thread
-//! cost.rs       what a computation costs
 //! verdict.rs    what that says of a sweep's solver
-//! report.rs     tables as Parquet and JSON, figures
+//! files.rs      everything as JSON, figures
 //! ```
 
 pub mod bias;
 pub mod breaks;
-pub mod cost;
-mod report;
+mod files;
 mod study;
 mod verdict;
 
-pub use cost::Cost;
-pub use report::{check, to_json, write};
+pub use files::{check, processor, to_json, write};
 pub use study::{BiasRow, Findings, MethodRow, Study};
 pub use verdict::{shows_bias, verdict};
 
@@ -73,6 +70,27 @@ impl fmt::Display for Method {
             ("tolerance", "")
         };
         write!(f, "{}, {setting} {:e}{unit}", self.name(), self.setting)
+    }
+}
+
+columns! {
+    /// What a solver costs, on one thread.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Cost {
+        per_simulated_second as "cpu_per_simulated_second": f64 = "",
+            "CPU seconds per simulated second, one thread";
+        per_slip as "cpu_per_slip": f64 = "s", "CPU time per slip";
+        per_step as "cpu_per_step": f64 = "s", "CPU time per step";
+        steps_per_slip: f64 = "", "steps per slip";
+        timed_slips: u64 = "",
+            "slips that were timed; 0 if the cost per slip is extrapolated from that of a step";
+    }
+}
+
+impl Cost {
+    /// Whether the cost per slip follows from that of a step.
+    pub const fn is_extrapolated(&self) -> bool {
+        self.timed_slips == 0
     }
 }
 

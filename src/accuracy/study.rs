@@ -4,12 +4,11 @@
 //! against the tightest tolerance there is; and an ensemble of slips that is timed and whose distributions are compared
 //! with a reference ensemble of other seeds. At the first set more realisations, not timed, make the ensembles large
 //! enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its slips: it is
-//! timed over a short stretch, and its cost per slip follows from the steps in one.
+//! timed over a short stretch, and its cost per slip follows from the steps of an interval.
 
 use super::bias::{Bias, Sample};
 use super::breaks::{BreakErrors, Comparison, Reference};
-use super::cost::Cost;
-use super::{Method, set_in_words};
+use super::{Cost, Method, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Recording, Slip, measure};
@@ -71,10 +70,7 @@ impl Study {
                 &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
                 &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10],
             ),
-            own: Solver::EventDriven {
-                tolerance: 1e-3,
-                resolve: Resolve::Grid,
-            },
+            own: grid(1e-3),
             slips_of_sets: Vec::new(),
             first_seed: 0,
             seeds: 8,
@@ -101,21 +97,14 @@ impl Study {
 
     /// The same at other sets, with tolerances of the event-driven solver and this one instead.
     pub fn at(self, sets: Vec<Parameters>, solver: Solver) -> Self {
-        let (mut time_steps, mut on_the_grid, mut in_taylor_steps) = (
-            Vec::new(),
-            vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
-            vec![1e-3, 1e-4, 1e-6, 1e-8],
-        );
+        let mut time_steps = Vec::new();
+        let mut on_the_grid = vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+        let mut in_taylor_steps = vec![1e-3, 1e-4, 1e-6, 1e-8];
         let (settings, setting, own) = match solver {
             Solver::FixedStep { time_step } => (&mut time_steps, time_step, solver),
-            Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => (
-                &mut on_the_grid,
-                tolerance,
-                Solver::EventDriven {
-                    tolerance,
-                    resolve: Resolve::Grid,
-                },
-            ),
+            Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => {
+                (&mut on_the_grid, tolerance, grid(tolerance))
+            }
             Solver::EventDriven { tolerance, .. } => {
                 (&mut in_taylor_steps, tolerance, taylor(tolerance))
             }
@@ -152,14 +141,16 @@ fn solvers(time_steps: &[f64], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> 
     let fixed = time_steps
         .iter()
         .map(|&time_step| Solver::FixedStep { time_step });
-    let grid = on_the_grid.iter().map(|&tolerance| Solver::EventDriven {
+    let grid = on_the_grid.iter().map(|&tolerance| grid(tolerance));
+    let taylor = in_taylor_steps.iter().map(|&tolerance| taylor(tolerance));
+    fixed.chain(grid).chain(taylor).collect()
+}
+
+const fn grid(tolerance: f64) -> Solver {
+    Solver::EventDriven {
         tolerance,
         resolve: Resolve::Grid,
-    });
-    fixed
-        .chain(grid)
-        .chain(in_taylor_steps.iter().map(|&tolerance| taylor(tolerance)))
-        .collect()
+    }
 }
 
 const fn taylor(tolerance: f64) -> Solver {
@@ -328,7 +319,8 @@ impl Study {
             let pairs: Vec<(Solver, &Ensemble)> =
                 self.solvers.iter().copied().zip(&ensembles).collect();
             for (&(solver, ensemble), break_times) in pairs.iter().zip(errors) {
-                let (case, parameters) = (set_in_words(parameters), parameters.clone());
+                let case = set_in_words(parameters);
+                let parameters = parameters.clone();
                 findings.methods.push(MethodRow {
                     parameters: Selected::new(parameters),
                     case,

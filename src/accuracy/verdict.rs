@@ -1,8 +1,8 @@
 //! What a study says of one solver, in a few lines: whether its slips are biased, by how much its breaks are off, and whether
-//! the slips that a sweep records could tell.
+//! the statistical error of a sweep is larger.
 //!
 //! A bias counts if it survives the number of comparisons (Bonferroni): among all of a solver that has none, one counts by
-//! chance in one study of twenty. With few slips, or one realisation, nothing counts.
+//! chance in one study of twenty. With few slips, or one realisation, no bias counts.
 
 use super::study::{BiasRow, Findings, MethodRow, Study};
 use super::{Method, set_in_words};
@@ -67,7 +67,7 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         .fold(0.0, f64::max);
     let finding = match most {
         _ if !compared.iter().all(|row| can_tell(row)) => {
-            format!("too few slips to tell: {slips} a side; take more --seeds or --slips")
+            format!("too few slips: {slips} per solver; take more --seeds or --slips")
         }
         Some(row) => format!(
             "biased: {} by {:+.2} ± {:.2} % at {}, more than chance among {} comparisons",
@@ -79,7 +79,7 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         ),
         None => {
             format!(
-                "no bias found; {slips} slips a side could have shown one of {shown:.1} % of the mean interval"
+                "no bias found; with {slips} slips per solver a bias below {shown:.1} % of the mean interval would go unseen"
             )
         }
     };
@@ -143,7 +143,7 @@ fn statistical_error(study: &Study, intervals: &[&BiasRow], is_biased: bool) -> 
         format!("{least:.1} to ")
     };
     Some(format!(
-        "Statistical error of the mean interval in your sets (95 %), as far as these slips tell: {range}{largest:.1} \
+        "Statistical error of the mean interval in your sets (95 %), estimated from these slips: {range}{largest:.1} \
          %{conclusion}."
     ))
 }
@@ -173,9 +173,9 @@ fn tighter(findings: &Findings, rows: &[&MethodRow]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Cost;
     use super::super::bias::Bias;
     use super::super::breaks::BreakErrors;
-    use super::super::cost::Cost;
     use super::*;
     use crate::model::Parameters;
     use crate::model::selected::Selected;
@@ -261,7 +261,7 @@ mod tests {
         // 1.2 half-widths, or 2.35 standard errors, count for one comparison and not for five, of which 2.58 are needed.
         assert!(
             with(1000, 1.2e-3)
-                .contains("no bias found; 1000 slips a side could have shown one of 1.3 %")
+                .contains("no bias found; with 1000 slips per solver a bias below 1.3 %")
         );
         assert!(
             lines(1000, vec![row("interval", 1000, 1.2e-3)])[0]
@@ -269,7 +269,7 @@ mod tests {
         );
         assert!(with(1000, -1.4e-3).contains("biased: interval by -1.40"));
         for bias in [5e-3, 0.0] {
-            assert!(with(24, bias).contains("too few slips to tell: 24 a side"));
+            assert!(with(24, bias).contains("too few slips: 24 per solver"));
         }
         // Of three degrees of freedom, 2.4 half-widths are needed for five.
         let of_few = |bias| {
@@ -288,22 +288,22 @@ mod tests {
     }
 
     #[test]
-    fn the_solver_is_held_against_the_statistical_error_of_the_sweep_and_what_is_tighter_has_its_price()
+    fn the_solver_is_compared_with_the_statistical_error_of_the_sweep_and_what_is_tighter_has_its_price()
      {
         // 1 % is the error of 1000 slips against 2000, which is that of 667 alone.
         let said = |slips| lines(slips, vec![row("interval", 1000, 0.0)]);
         let few = said(167);
         assert_eq!(
             few[0],
-            "Your sweep (grid, tolerance 1e-3): no bias found; 1000 slips a side could have shown one of 1.0 % \
-                            of the mean interval."
+            "Your sweep (grid, tolerance 1e-3): no bias found; with 1000 slips per solver a bias below 1.0 % \
+                            of the mean interval would go unseen."
         );
         assert_eq!(
             few[1],
             "Before trajectories part, breaks are off by 2e-7 s in the median, and by 2e-6 s at most."
         );
         assert!(
-            few[2].ends_with("tell: 2.0 %, so the solver is not what limits you."),
+            few[2].ends_with("slips: 2.0 %, so the solver is not what limits you."),
             "{}",
             few[2]
         );

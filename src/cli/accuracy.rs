@@ -161,7 +161,7 @@ fn study_text(study: &Study, findings: &Findings) -> String {
          ms/slip: CPU time in the cheapest of {} realisations, * extrapolated from that of a step\n\
          break times: median (largest) error of the first {}; interval: bias of the mean, or what it is below,\n\
          with 95 % for all lines together, all against the same reference; accuracy.json has more quantities",
-        accuracy::cost::processor(),
+        accuracy::processor(),
         study.seeds,
         study.breaks
     ));

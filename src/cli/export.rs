@@ -9,7 +9,8 @@ use crate::table::formats::Format;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
-use clap::Args;
+use clap::builder::PossibleValue;
+use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
@@ -36,6 +37,23 @@ pub struct Arguments {
     /// Print JSON
     #[arg(long)]
     json: bool,
+}
+
+impl ValueEnum for Format {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let value = PossibleValue::new(self.extension());
+        Some(match self {
+            Self::Parquet => value,
+            Self::Csv => value.help(
+                "Plain text with a line of names; real numbers with as many digits as they have",
+            ),
+            Self::Arrow => value.help("The file format of Arrow"),
+        })
+    }
 }
 
 const JSON_FORMAT: u32 = 2;

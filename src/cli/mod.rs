@@ -4,6 +4,7 @@ mod accuracy;
 mod batch;
 mod exit;
 mod export;
+mod figure_flags;
 mod generate;
 mod init;
 mod output;

@@ -1,8 +1,9 @@
-//! `stickslip plot`: reduced data to figures, the standing ones or one's own.
+//! `stickslip plot`: reduced data to figures, the standing ones or a custom one.
 
 use super::exit::{Exit, UsageError};
+use super::figure_flags::{CUSTOM_FIGURE, CustomFlags, size};
 use super::output::{self, TextTable};
-use crate::figure::{Format, Look, OwnFigure, Size, Style, draw_all, draw_own, write_own};
+use crate::figure::{Format, Look, Size, Style, draw_all, draw_custom, write_custom};
 use crate::reduce::{renew, set_columns};
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
@@ -27,21 +28,21 @@ pub struct Arguments {
     #[arg(long, value_enum, value_delimiter = ',')]
     format: Vec<Format>,
     /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: what the data need; in print one or two columns wide]
-    #[arg(long, value_name = "WIDTHxHEIGHT")]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     size: Option<Size>,
     /// Style
     #[arg(long, value_enum, default_value_t = Style::Screen)]
     style: Style,
     #[command(flatten)]
-    own: OwnFigure,
-    /// File of a custom figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
+    custom: CustomFlags,
+    /// File of the custom figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
     #[arg(
         short,
         long,
         value_name = "FILE",
         requires = "x",
         conflicts_with = "format",
-        help_heading = "A figure of your own"
+        help_heading = CUSTOM_FIGURE
     )]
     out: Option<PathBuf>,
 }
@@ -85,20 +86,20 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let results = renew(&Results::read(&Layout::new(&Disk, directory))?)?;
     let layout = results.layout();
     let look = arguments.look(&results);
-    let files = if arguments.own.x.is_none() {
-        draw_all(layout, &look, arguments.formats())?
-    } else {
-        let picture = draw_own(layout, &arguments.own, &look)?;
+    let files = if let Some(figure) = arguments.custom.figure() {
+        let picture = draw_custom(layout, &figure, &look)?;
         if look.style == Style::Print {
             output::report(&format!("for the caption: {}", picture.note()));
         }
         match &out {
-            None => write_own(layout, picture, &look, arguments.formats())?,
+            None => write_custom(layout, picture, &look, arguments.formats())?,
             Some((out, format)) => {
                 output::write(out, &picture.encoded(*format)?)?;
                 arguments.out.iter().cloned().collect()
             }
         }
+    } else {
+        draw_all(layout, &look, arguments.formats())?
     };
     if files.is_empty() {
         output::report("there is nothing to draw: no set has a result");
@@ -112,7 +113,7 @@ pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
     let extension = file.extension().and_then(|extension| extension.to_str());
     let format = Format::ALL
         .into_iter()
-        .find(|format| extension == Some(format.extension()));
+        .find(|format| extension == Some(format.word()));
     match format.zip(Kind::of_name(file)) {
         Some((format, kind)) => Ok((Destination::new(file, kind)?, format)),
         None => Err(UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into()),

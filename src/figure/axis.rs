@@ -210,7 +210,8 @@ impl Axis {
         } else {
             power_of_ten
         };
-        let (mut ticks, mut minor) = (Vec::new(), Vec::new());
+        let mut ticks = Vec::new();
+        let mut minor = Vec::new();
         for power in exponent(low)..=exponent(high) {
             let decade = libm::exp10(f64::from(power));
             let between = mantissas
@@ -289,14 +290,6 @@ impl Axis {
         }
     }
 
-    /// The value halfway between two others, as the axis places them.
-    pub(super) fn middle(&self, low: f64, high: f64) -> f64 {
-        match self.scale {
-            Scale::Linear => 0.5 * (low + high),
-            Scale::Logarithmic => (low * high).sqrt(),
-        }
-    }
-
     /// Whether a value lies on the axis.
     pub(super) fn contains(&self, value: f64) -> bool {
         value >= self.low && value <= self.high
@@ -316,7 +309,9 @@ impl Axis {
 
     /// `count` >= 2 values from end to end, evenly placed.
     pub(super) fn evenly_placed(&self, count: usize) -> impl Iterator<Item = f64> + use<> {
-        let (low, high, scale) = (self.low, self.high, self.scale);
+        let low = self.low;
+        let high = self.high;
+        let scale = self.scale;
         (0..count).map(move |step| {
             let place = step as f64 / (count - 1) as f64;
             match scale {
@@ -403,10 +398,8 @@ fn nice_step(step: f64) -> f64 {
 fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = f64> {
     let slack = 1e-6;
     #[expect(clippy::cast_possible_truncation, reason = "a few dozen multiples")]
-    let (first, last) = (
-        (low / step - slack).ceil() as i64,
-        (high / step + slack).floor() as i64,
-    );
+    let first = (low / step - slack).ceil() as i64;
+    let last = (high / step + slack).floor() as i64;
     (first..=last)
         .take(MAX_MULTIPLES)
         .map(move |multiple| multiple as f64 * step)

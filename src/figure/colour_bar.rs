@@ -2,9 +2,9 @@
 
 use super::axis::Axis;
 use super::frame::{Frame, OVERLAP, fitting};
+use super::ink::Ink;
 use super::picture::{Anchor, Picture};
 use super::style::{AXIS, LEGEND_TEXT, NOTE_TEXT, TICK_TEXT};
-use kuva::render::color::Color;
 
 /// Space right of a frame for the bar and its numbers.
 pub(super) const COLOUR_BAR: f64 = 96.0;
@@ -16,14 +16,14 @@ const INSET: f64 = 14.0;
 pub(super) struct ColourBar {
     pub(super) label: String,
     /// Colours of equal height, from below.
-    pub(super) colours: Vec<Color>,
+    pub(super) colours: Vec<Ink>,
     /// Places, 0 at the lower end and 1 at the upper, and their numbers.
     pub(super) ticks: Vec<(f64, String)>,
 }
 
 impl ColourBar {
     /// A bar of all colours of a scale, with the numbers of an axis.
-    pub(super) fn of_axis(axis: &Axis, colour: fn(f64) -> Color) -> Self {
+    pub(super) fn of_axis(axis: &Axis, colour: fn(f64) -> Ink) -> Self {
         const STEPS: u32 = 64;
         let colours = (0..STEPS)
             .map(|step| colour(f64::from(step) / f64::from(STEPS - 1)))
@@ -42,13 +42,13 @@ impl ColourBar {
 
     /// Draws the bar right of a frame, and the label above it.
     pub(super) fn draw(&self, sheet: &mut Picture, frame: &Frame) {
-        let (left, top, bottom) = (frame.right() + GAP, frame.top, frame.bottom());
+        let left = frame.right() + GAP;
+        let top = frame.top;
+        let bottom = frame.bottom();
         let height = frame.height / self.colours.len() as f64;
         let boxes = self.colours.iter().enumerate().map(|(step, colour)| {
-            let (top, overlap) = (
-                bottom - (step + 1) as f64 * height,
-                if step == 0 { 0.0 } else { OVERLAP },
-            );
+            let top = bottom - (step + 1) as f64 * height;
+            let overlap = if step == 0 { 0.0 } else { OVERLAP };
             ([left, top, WIDTH, height + overlap], colour.clone())
         });
         sheet.clipped([left, top, WIDTH, frame.height], |sheet| {

@@ -1,10 +1,11 @@
 //! Drag: τ on a ramp of the modulation, on the way there and on the way back, with the lines τ = nT, and τ/T in bins.
 
 use super::axis::{Axis, bounds, widened};
-use super::frame::Layout;
+use super::frame::{Ends, Layout};
+use super::ink::{Dot, Ink, Stroke};
 use super::legend::{Entry, Mark, entry};
-use super::panel::{self, Ends, Layer, Panel};
-use super::picture::{Anchor, Dot, Ink, Picture, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::{Anchor, Picture};
 use super::sets::axis_of;
 use super::style::{GRID, INKS, LEGEND_TEXT, Look};
 use crate::reduce::{Point, RampStage, quantile};
@@ -63,7 +64,8 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let (factor, unit) =
         label("tau_mean").scale(bounds(ramped().filter_map(|point| point.interval))?.1);
     let slip = |point: &Point| {
-        let (period, interval) = (point.period?, point.interval?);
+        let period = point.period?;
+        let interval = point.interval?;
         Some((
             stage(point)?,
             x_factor * modulation(point)?,

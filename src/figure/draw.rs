@@ -1,8 +1,8 @@
-//! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
+//! All figures that fit the reduced data of a sweep, written together, and custom figures.
 
 use super::style::INKS;
-use super::{BadOption, Format, Look, OwnFigure, Picture};
-use super::{backbone, drag, edges, histograms, intervals, map, own, sets};
+use super::{BadOption, CustomFigure, Format, Look, Picture};
+use super::{custom, drag, edge_values, histograms, intervals, map, overview, phase_eta, sets};
 use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
@@ -23,7 +23,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     let sets = read_sets(layout, MAX_SETS).map_err(advise(ADVICE))?;
     let look = &look.with_note(&sets::common(sets.iter().map(|set| &*set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(backbone::backbone(&points, &read(layout)?, &sets, look));
+    pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, &sets, look));
     pictures.extend(intervals::intervals(&points, look));
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
@@ -36,34 +36,34 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
                 .is_some_and(|second| second.distinct.len() > INKS.len())
         };
         if sets.len() > 1 && !(map.is_some() && is_net()) {
-            pictures.extend(own::overview(&sets, look));
+            pictures.extend(overview::overview(&sets, look));
         }
         pictures.extend(map);
     }
     if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
-        pictures.extend(edges::edges(&read(layout)?, look));
+        pictures.extend(edge_values::edges(&read(layout)?, look));
     }
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
     }
     if pictures.is_empty() {
-        pictures.extend(own::overview(&sets, look));
+        pictures.extend(overview::overview(&sets, look));
     }
     write(layout, &pictures, look, formats)
 }
 
-/// Draws a figure of one's own from the sets of a results directory; writes nothing.
-pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture> {
+/// Draws a custom figure from the sets of a results directory; writes nothing.
+pub fn draw_custom(layout: &Layout<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
     let mut rows: Vec<SetRow> = read(layout)?;
     rows.retain(|row| !row.is_control);
     let look = &look.with_note(&sets::common(rows.iter().map(|row| &*row.parameters)));
-    let picture = own::own(&rows, figure, look)?;
+    let picture = custom::custom(&rows, figure, look)?;
     check_size(&picture, look)?;
     Ok(picture)
 }
 
 /// Puts a figure into `figures/`, in these formats.
-pub fn write_own(
+pub fn write_custom(
     layout: &Layout<'_>,
     picture: Picture,
     look: &Look,
@@ -110,7 +110,7 @@ fn write(
     let mut files = Vec::new();
     for picture in pictures {
         for &format in formats {
-            let file = folder.join(format!("{}.{}", picture.name(), format.extension()));
+            let file = folder.join(format!("{}.{}", picture.name(), format.word()));
             commit.stage_bytes(&file, &picture.encoded(format)?)?;
             files.push(file);
         }
@@ -189,7 +189,8 @@ mod tests {
             files
         );
         assert!(bytes() == before);
-        let (svg, png) = (String::from_utf8(before[0].clone()).unwrap(), &before[1]);
+        let svg = String::from_utf8(before[0].clone()).unwrap();
+        let png = &before[1];
         assert!(svg.contains("φ (rad)") && svg.ends_with("</svg>"));
         assert!(png.starts_with(b"\x89PNG"));
     }

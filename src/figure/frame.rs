@@ -4,10 +4,15 @@
 use super::axis::Axis;
 use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
-use super::panel::Cell;
 use super::picture::{Anchor, Picture, snapped};
 use super::style::{AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT};
-use kuva::render::color::Color;
+
+/// A point of data.
+pub(super) type Place = (f64, f64);
+/// Lower and upper end.
+pub(super) type Ends = (f64, f64);
+/// A rectangle of data: its ends along x and along y.
+pub(super) type Cell = (Ends, Ends);
 
 const TICK_LENGTH: f64 = 7.0;
 const MINOR_TICK_LENGTH: f64 = 4.0;
@@ -120,13 +125,7 @@ impl Layout {
         draw_legend(&mut sheet, legend, MARGIN, right, LEGEND_ROW);
         for (row, line) in (1..).map(f64::from).zip(&notes) {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
-            sheet.coloured_text(
-                place,
-                line,
-                NOTE_TEXT,
-                Anchor::Start,
-                Some(Color::from(DARK_GREY)),
-            );
+            sheet.coloured_text(place, line, NOTE_TEXT, Anchor::Start, Some(DARK_GREY));
         }
         (
             Page {
@@ -258,7 +257,8 @@ impl Frame {
 
     /// Border, ticks, their numbers, and the labels of both axes, over the data.
     pub(super) fn axes(&self, sheet: &mut Picture) {
-        let (right, bottom) = (self.right(), self.bottom());
+        let right = self.right();
+        let bottom = self.bottom();
         let [x_axis, y_axis] =
             [(&self.x, self.width), (&self.y, self.height)].map(|(axis, length)| {
                 match sheet.style {
@@ -301,7 +301,8 @@ impl Frame {
         }
         let mut free = EDGE;
         for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
-            let (x, half) = (self.x_of(*value), 0.5 * font::width(number, TICK_TEXT));
+            let x = self.x_of(*value);
+            let half = 0.5 * font::width(number, TICK_TEXT);
             if x - half >= free && x + half <= sheet.scene.width - EDGE {
                 sheet.text(
                     (x, bottom + 1.3 * height),
@@ -501,15 +502,14 @@ mod tests {
 
     #[test]
     fn print_has_no_small_print_and_enough_numbers() {
-        let (x, y) = (
-            Axis::logarithmic("x", 40.0, 125.0),
-            Axis::sparse("y", 0.0, 78.0),
-        );
+        let x = Axis::logarithmic("x", 40.0, 125.0);
+        let y = Axis::sparse("y", 0.0, 78.0);
         let of = |style| texts(style, (120.0, 80.0), &x, &y).1;
         let has = |texts: &[(f64, f64, String)], wanted: &str| {
             texts.iter().any(|(_, _, text)| text == wanted)
         };
-        let (screen, print) = (of(Style::Screen), of(Style::Print));
+        let screen = of(Style::Screen);
+        let print = of(Style::Print);
         assert!(has(&screen, "Sweep test") && !has(&print, "Sweep test"));
         assert!(
             !has(&screen, "80") && has(&print, "80") && has(&print, "20"),

@@ -2,15 +2,15 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::font;
-use super::frame::{Frame, Layout, OVERLAP};
+use super::frame::{Frame, Layout, OVERLAP, Place};
+use super::ink::{Fill, Ink, Stroke};
 use super::legend::{Entry, Mark, entry};
-use super::panel::{self, Layer, Place};
-use super::picture::{Anchor, Fill, Picture, Stroke};
+use super::panel::{self, Layer};
+use super::picture::{Anchor, Picture};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{FREQUENCY, HistogramBin, SetRow, Values, differing};
 use crate::sets::label;
-use kuva::render::color::Color;
 
 /// Panels that fit a page.
 const MAX_PANELS: usize = 4;
@@ -23,7 +23,7 @@ const MAX_MULTIPLES: f64 = 40.0;
 /// Space in a panel for the numbers of the multiples.
 const NUMBERS: f64 = 24.0;
 const BAR: Fill = Fill {
-    ink: "#9db4d6",
+    ink: Ink::new(0x9db4d6),
     opacity: 1.0,
 };
 const OUTLINE: Stroke = Stroke::solid(BLACK, 1.3);
@@ -96,12 +96,10 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
         // The numbers cover no bar.
         let head = if multiples.is_empty() { 1.1 } else { 1.25 };
         let y = Axis::sparse(if index == 0 { &density } else { "" }, 0.0, head * highest);
-        let bars = panel.bars.iter().map(|bar| {
-            (
-                ((bar.low, bar.high), (0.0, bar.density)),
-                Color::from(BAR.ink),
-            )
-        });
+        let bars = panel
+            .bars
+            .iter()
+            .map(|bar| (((bar.low, bar.high), (0.0, bar.density)), BAR.ink));
         let outlines = outline(&panel.bars)
             .into_iter()
             .map(|line| Layer::Curve(line, OUTLINE));
@@ -208,10 +206,8 @@ fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
 fn draw_multiples(sheet: &mut Picture, frame: &Frame, multiples: Vec<f64>, period: f64) {
     let mut free = f64::NEG_INFINITY;
     for multiple in multiples {
-        let (x, n) = (
-            frame.x_of(multiple),
-            format!("{}", (multiple / period).round()),
-        );
+        let x = frame.x_of(multiple);
+        let n = format!("{}", (multiple / period).round());
         let half = 0.5 * font::width(&n, LEGEND_TEXT);
         // Before the first number, where there is room.
         let is_led = free == f64::NEG_INFINITY
@@ -236,7 +232,8 @@ fn outline(bars: &[&HistogramBin]) -> Vec<Vec<Place>> {
     };
     bars.chunk_by(are_neighbours)
         .map(|run| {
-            let (first, last) = (run[0], run[run.len() - 1]);
+            let first = run[0];
+            let last = run[run.len() - 1];
             let tops = run
                 .iter()
                 .flat_map(|bar| [(bar.low, bar.density), (bar.high, bar.density)]);

@@ -1,13 +1,12 @@
-//! Hues: a quantity as colours. Few values have inks of their own and stand in the legend, many a scale beside the frame.
+//! Hues: a quantity as colours. Few values have an ink each and stand in the legend; many are a scale beside the frame.
 
 use super::axis::Axis;
 use super::colour_bar::ColourBar;
+use super::ink::{Dot, Ink};
 use super::legend::{Entry, Mark, entry};
-use super::picture::{Dot, Ink};
 use super::style::{BLACK, INKS, SCALE, shade};
 use crate::reduce::{ascending, is_same};
 use crate::table::value::floored;
-use kuva::render::color::Color;
 
 /// How the values of a quantity become colours.
 pub(super) enum Hues {
@@ -75,7 +74,7 @@ impl Hues {
     pub(super) fn bar(&self) -> Option<ColourBar> {
         let Self::Scale(axis) = self else { return None };
         Some(ColourBar {
-            colours: SCALE.map(Color::from).to_vec(),
+            colours: SCALE.to_vec(),
             ..ColourBar::of_axis(axis, shade)
         })
     }

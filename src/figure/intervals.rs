@@ -1,11 +1,12 @@
 //! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which they fall.
 
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::Layout;
+use super::frame::{Layout, Place};
 use super::hues::Hues;
+use super::ink::Dot;
 use super::legend::{Entry, Mark, entry};
-use super::panel::{self, Layer, Panel, Place};
-use super::picture::{Dot, Picture};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
 use super::sets::axis_of;
 use super::style::{GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::{Point, ascending};
@@ -24,7 +25,8 @@ const LINES: u32 = 12;
 /// τ = nT; `None` without any interval under modulation. Slips of sets with a phase have the colour of their V0.
 pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
-        let (period, interval) = (point.period?, point.interval?);
+        let period = point.period?;
+        let interval = point.interval?;
         Some((period, interval / period))
     };
     let mut slips: Vec<(&Point, Place)> = points

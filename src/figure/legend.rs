@@ -1,7 +1,8 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
 use super::font;
-use super::picture::{Anchor, Dot, Fill, Ink, Picture, Stroke};
+use super::ink::{Dot, Fill, Ink, Stroke};
+use super::picture::{Anchor, Picture};
 use super::style::{LEGEND_TEXT, WHITE};
 
 /// Width of a line or a patch, and of a dot.
@@ -88,7 +89,8 @@ pub(super) fn draw_legend(
 }
 
 fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
-    let (end, centre) = (start + MARK, (start + 0.5 * mark_width(mark), middle));
+    let end = start + MARK;
+    let centre = (start + 0.5 * mark_width(mark), middle);
     match mark {
         Mark::Dot(dot) => {
             // A single faint dot could not be seen.

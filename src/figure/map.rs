@@ -1,36 +1,33 @@
-//! Maps: sets on a grid of two quantities, each a cell with the colour of what was found, and words in the middle of regions
-//! of equal cells. The locking map lies over period and amplitude of the modulation, a regime map over two other parameters.
+//! Maps: sets on a grid of two quantities, each a cell with the colour of what was found. The locking map lies over period and amplitude of the modulation, a regime map over two other parameters.
 
 use super::axis::{Axis, bounds, is_wide};
 use super::colour_bar::ColourBar;
-use super::frame::{Layout, OVERLAP};
+use super::frame::{Cell, Layout, OVERLAP, Place};
+use super::ink::{Fill, Ink, Stroke};
 use super::legend::{Entry, Mark, entry};
-use super::own::Asked;
-use super::panel::{self, Cell, Layer, Panel, Place};
-use super::picture::{Fill, Ink, Picture, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
+use super::quantity::Quantity;
 use super::sets::{Grid, period_column};
 use super::style::{BLACK, Look, WHITE, diverging, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetRow, differing};
-use kuva::render::color::Color;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Numbers of periods that have a colour of their own; larger ones share one.
+/// Numbers of periods that have a colour each; larger numbers share one.
 const MAX_PERIODS: f64 = 12.0;
 /// Share of the scale at the least number of periods, which is not to be taken for the ground.
 const FIRST_SHADE: f64 = 0.22;
 /// Least end of the scale of the excess, so that chance is pale.
 const MIN_EXCESS: f64 = 0.2;
-/// Cells across a region that has its word in it.
-const MIN_ACROSS: usize = 3;
 const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 /// Under the line, so that it is seen on dark cells.
 const CASING: Stroke = Stroke::solid(WHITE, 4.4);
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
 /// Sets without a phase.
-const FREE: Ink = "#f2f2f0";
+const FREE: Ink = Ink::new(0xf2f2f0);
 
 /// A column and a row of a map.
 type Position = (usize, usize);
@@ -52,13 +49,11 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     } else {
         [horizontal.key(), vertical.key()]
     };
-    let of = |column: &str| Asked::of(sets, "map", column).ok();
+    let of = |column: &str| Quantity::of(sets, "map", column).ok();
     let [x, y] = [of(columns[0])?, of(columns[1])?];
     let map = Map::of(&x, &y, if is_locking { 8 } else { 4 })?;
-    let (x_axis, y_axis) = (
-        map.columns.axis(&x.axis_label()),
-        map.rows.axis(&y.axis_label()),
-    );
+    let x_axis = map.columns.axis(&x.axis_label());
+    let y_axis = map.rows.axis(&y.axis_label());
     let modulated = sets
         .iter()
         .find(|set| set.parameters.modulation_period.is_some());
@@ -101,30 +96,17 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         if is_of_periods {
             mark_periods(&mut bar, &scale, ends().unwrap_or_default());
         }
-        let none = is_of_periods.then(|| Color::from(FREE));
+        let none = is_of_periods.then(|| FREE);
         let cells = map.coloured(|set| {
             number(set)
                 .map(|n| colour(scale.place(n)))
                 .or_else(|| none.clone())
         });
-        let word = |set: usize| match column {
-            "periods" => number(set).map(|n| (n.to_string(), scale.place(n))),
-            "slip_share" => sets[set].regime.map(|regime| {
-                (
-                    regime.word().to_owned(),
-                    f64::from(u8::from(regime != Regime::StickSlip)),
-                )
-            }),
-            _ => None,
-        };
-        let layers = std::iter::once(Layer::Inside(
-            std::iter::once(cells).chain(lines()).collect(),
-        ));
-        let layers = layers.chain(map.words(word)).collect();
+        let layers = std::iter::once(cells).chain(lines());
         let height = if is_locking { 280.0 } else { 220.0 };
         Some(Panel {
             bar: Some(bar),
-            ..Panel::new(height, x_axis.clone(), y_axis.clone(), layers)
+            ..Panel::inside(height, x_axis.clone(), y_axis.clone(), layers)
         })
     };
     let columns = if is_locking {
@@ -204,7 +186,10 @@ fn legend(is_locking: bool) -> Vec<Entry> {
             entry(Mark::Patch(free), "no phase"),
         ]
     } else {
-        let text = "borders of stick-slip, mixed, sliding; no slips where white";
+        let [mixed, sliding] = Regime::MIN_SHARES;
+        let text = format!(
+            "borders of the regimes: mixed from a share of {mixed}, sliding from {sliding}; no slips where white"
+        );
         vec![entry(Mark::Line(BORDER), text)]
     }
 }
@@ -218,7 +203,7 @@ struct Map {
 
 impl Map {
     /// `None` for fewer values of either quantity than `min_values`, or if less than half of their grid is filled.
-    fn of(x: &Asked<'_>, y: &Asked<'_>, min_values: usize) -> Option<Self> {
+    fn of(x: &Quantity<'_>, y: &Quantity<'_>, min_values: usize) -> Option<Self> {
         let [columns, rows] = [x, y].map(|asked| Grid::of(asked.distinct().collect()));
         let position = |set| {
             Some((
@@ -244,7 +229,7 @@ impl Map {
     }
 
     /// The sets that have a colour.
-    fn coloured<'l>(&self, colour: impl Fn(usize) -> Option<Color>) -> Layer<'l> {
+    fn coloured<'l>(&self, colour: impl Fn(usize) -> Option<Ink>) -> Layer<'l> {
         let cells = self
             .sets
             .iter()
@@ -282,66 +267,6 @@ impl Map {
             .map(|line| Layer::Curve(line, stroke))
             .collect()
     }
-
-    /// The words of regions with equal ones, each with its shade.
-    fn words<'l>(
-        &self,
-        word: impl Fn(usize) -> Option<(String, f64)>,
-    ) -> impl Iterator<Item = Layer<'l>> {
-        let words = self
-            .sets
-            .iter()
-            .filter_map(|&(set, position)| Some((position, word(set)?)))
-            .collect();
-        middles(&words)
-            .into_iter()
-            .map(|(position, (text, share))| Layer::Word(self.cell(position), text, share))
-    }
-}
-
-/// The innermost cell of each region that has room for its word. A region is what hangs together of equal words.
-fn middles<K: PartialEq + Clone>(words: &BTreeMap<Position, K>) -> Vec<(Position, K)> {
-    let around = |(column, row): Position| {
-        [
-            (column + 1, row),
-            (column.wrapping_sub(1), row),
-            (column, row + 1),
-            (column, row.wrapping_sub(1)),
-        ]
-    };
-    let mut left: BTreeSet<Position> = words.keys().copied().collect();
-    let mut found = Vec::new();
-    while let Some(start) = left.pop_first() {
-        let (word, mut region, mut edge) = (&words[&start], BTreeSet::from([start]), vec![start]);
-        while let Some(cell) = edge.pop() {
-            for next in around(cell) {
-                if words.get(&next) == Some(word) && left.remove(&next) {
-                    region.insert(next);
-                    edge.push(next);
-                }
-            }
-        }
-        // Layer by layer, as long as something is left.
-        let mut across = 1;
-        loop {
-            let inner: BTreeSet<Position> = region
-                .iter()
-                .copied()
-                .filter(|&cell| around(cell).iter().all(|next| region.contains(next)))
-                .collect();
-            if inner.is_empty() {
-                break;
-            }
-            (region, across) = (inner, across + 2);
-        }
-        let middle = region.iter().nth(region.len() / 2).copied();
-        found.extend(
-            middle
-                .filter(|_| across >= MIN_ACROSS)
-                .map(|cell| (cell, word.clone())),
-        );
-    }
-    found
 }
 
 #[cfg(test)]
@@ -419,7 +344,7 @@ mod tests {
         assert!(svg.contains("Resultant length beyond"));
         for share in [0.0, 0.5, 1.0] {
             assert!(
-                svg.matches(&diverging(share).to_svg_string()).count() > 20,
+                svg.matches(&diverging(share).to_string()).count() > 20,
                 "{share}"
             );
         }
@@ -432,7 +357,7 @@ mod tests {
             map(sets, &Look::default())
                 .unwrap()
                 .svg()
-                .matches(FREE)
+                .matches(&FREE.to_string())
                 .count()
         };
         let none = free(&sets);
@@ -492,17 +417,5 @@ mod tests {
             map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(),
             "two rows"
         );
-    }
-
-    #[test]
-    fn the_innermost_cells_of_regions_are_found_and_thin_ones_left_out() {
-        let block = |columns: std::ops::Range<usize>, n| {
-            columns.flat_map(move |column| (0..5).map(move |row| ((column, row), n)))
-        };
-        let mut numbers: BTreeMap<Position, u32> = block(0..5, 2).chain(block(5..12, 3)).collect();
-        numbers.insert((20, 20), 7);
-        numbers.insert((21, 20), 7);
-        assert_eq!(middles(&numbers), [((2, 2), 2), ((8, 2), 3)]);
-        assert!(middles(&BTreeMap::<Position, u32>::new()).is_empty());
     }
 }

@@ -2,18 +2,11 @@
 
 use super::axis::Axis;
 use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::frame::{Frame, Layout};
+use super::frame::{Cell, Ends, Frame, Layout, Place};
+use super::ink::{Dot, Fill, Ink, Stroke};
 use super::legend::Entry;
-use super::picture::{Anchor, Dot, Fill, Picture, Stroke};
-use super::style::{HALF_DIGIT, LEGEND_TEXT, Look, ink_on};
-use kuva::render::color::Color;
-
-/// A point of data.
-pub(super) type Place = (f64, f64);
-/// Lower and upper end.
-pub(super) type Ends = (f64, f64);
-/// A rectangle of data: its ends along x and along y.
-pub(super) type Cell = (Ends, Ends);
+use super::picture::Picture;
+use super::style::Look;
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 
@@ -33,9 +26,7 @@ pub(super) enum Layer<'a> {
     /// An upright bar between two values at each x; what lies under a logarithmic axis runs out of the frame.
     Bars(Vec<(f64, Ends)>, Stroke),
     /// Cells, each in its own colour, and by how much they reach under their neighbours.
-    Cells(Vec<(Cell, Color)>, f64),
-    /// A short text in the middle of a cell of this shade.
-    Word(Cell, String, f64),
+    Cells(Vec<(Cell, Ink)>, f64),
     /// What depends on the size of the frame.
     Drawn(Drawing<'a>),
 }
@@ -64,10 +55,8 @@ impl Layer<'_> {
                 Self::Curve(vec![(x, frame.y.low), (x, frame.y.high)], stroke).draw(sheet, frame);
             }
             Self::Stripe((low, high), fill) => {
-                let (left, right) = (
-                    frame.x_of(low.max(frame.x.low)),
-                    frame.x_of(high.min(frame.x.high)),
-                );
+                let left = frame.x_of(low.max(frame.x.low));
+                let right = frame.x_of(high.min(frame.x.high));
                 if right > left {
                     sheet.rectangle([left, frame.top, right - left, frame.height], fill);
                 }
@@ -83,7 +72,8 @@ impl Layer<'_> {
             }
             Self::Bars(bars, stroke) => {
                 for (x, (low, high)) in bars {
-                    let (x, is_finite) = (frame.x_of(x), frame.y.place(low).is_finite());
+                    let x = frame.x_of(x);
+                    let is_finite = frame.y.place(low).is_finite();
                     let bottom = if is_finite {
                         frame.y_of(low).min(2.0 * frame.bottom())
                     } else {
@@ -97,17 +87,6 @@ impl Layer<'_> {
                     let [left, top, width, height] = frame.box_of(cell);
                     ([left, top, width + overlap, height + overlap], colour)
                 }));
-            }
-            Self::Word((x, y), text, share) => {
-                let (x, y) = frame.place((frame.x.middle(x.0, x.1), frame.y.middle(y.0, y.1)));
-                let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
-                sheet.coloured_text(
-                    place,
-                    &text,
-                    LEGEND_TEXT,
-                    Anchor::Middle,
-                    Some(ink_on(share)),
-                );
             }
             Self::Drawn(draw) => draw(sheet, frame),
         }

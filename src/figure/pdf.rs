@@ -2,7 +2,7 @@
 //! looks the same everywhere. The same scene gives the same bytes on every machine.
 
 use super::font;
-use kuva::render::color::Color;
+use super::ink::parts;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 use pdf_writer::types::{
     CidFontType, FontFlags, LineCapStyle, LineJoinStyle, SystemInfo, UnicodeCmap,
@@ -36,7 +36,8 @@ pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
         opacities: Vec::new(),
     };
     // From the upper left corner, downwards.
-    let (scale, height) = (single(points), single(points * scene.height));
+    let scale = single(points);
+    let height = single(points * scene.height);
     page.content
         .transform([scale, 0.0, 0.0, -scale, 0.0, height]);
     page.content.set_line_join(LineJoinStyle::RoundJoin);
@@ -73,7 +74,7 @@ impl Page<'_> {
                 stroke,
                 stroke_width,
                 ..
-            } => self.line(points, stroke, *stroke_width),
+            } => self.line(points, parts(stroke), *stroke_width),
             Primitive::Rect {
                 x,
                 y,
@@ -84,12 +85,12 @@ impl Page<'_> {
                 ..
             } => {
                 self.with_opacity(*opacity, |page| {
-                    page.rectangle([*x, *y, *width, *height], fill);
+                    page.rectangle([*x, *y, *width, *height], parts(fill));
                 });
             }
             Primitive::RectBatch { x, y, w, h, fills } => {
                 for ((((&x, &y), &w), &h), fill) in x.iter().zip(y).zip(w).zip(h).zip(fills) {
-                    self.rectangle([x, y, w, h], fill);
+                    self.rectangle([x, y, w, h], parts(fill));
                 }
             }
             Primitive::CircleBatch {
@@ -100,7 +101,7 @@ impl Page<'_> {
                 fill_opacity,
                 ..
             } => {
-                self.with_opacity(*fill_opacity, |page| page.circles(cx, cy, *r, fill));
+                self.with_opacity(*fill_opacity, |page| page.circles(cx, cy, *r, parts(fill)));
             }
             Primitive::Text {
                 x,
@@ -111,7 +112,8 @@ impl Page<'_> {
                 color,
                 ..
             } => {
-                self.text((*x, *y), content, *size, *anchor, color.as_ref());
+                let rgb = color.as_ref().map_or([0.0; 3], parts);
+                self.text((*x, *y), content, *size, *anchor, rgb);
             }
             Primitive::ClipStart {
                 x,
@@ -135,13 +137,13 @@ impl Page<'_> {
         Ok(())
     }
 
-    fn line(&mut self, points: &[(f64, f64)], stroke: &Color, width: f64) {
-        let [red, green, blue] = parts(stroke);
+    fn line(&mut self, points: &[(f64, f64)], [red, green, blue]: [f32; 3], width: f64) {
         self.content
             .set_stroke_rgb(red, green, blue)
             .set_line_width(single(width));
         for (index, &(x, y)) in points.iter().enumerate() {
-            let (x, y) = (single(x), single(y));
+            let x = single(x);
+            let y = single(y);
             let _ = if index == 0 {
                 self.content.move_to(x, y)
             } else {
@@ -151,27 +153,26 @@ impl Page<'_> {
         self.content.stroke();
     }
 
-    fn fill(&mut self, fill: &Color) {
-        let [red, green, blue] = parts(fill);
+    fn fill(&mut self, [red, green, blue]: [f32; 3]) {
         self.content.set_fill_rgb(red, green, blue);
     }
 
-    fn rectangle(&mut self, sides: [f64; 4], fill: &Color) {
+    fn rectangle(&mut self, sides: [f64; 4], fill: [f32; 3]) {
         self.fill(fill);
         let [x, y, width, height] = sides.map(single);
         self.content.rect(x, y, width, height).fill_nonzero();
     }
 
     /// Points of a round pen: far shorter than curves. One by one: where dots overlap, faint ones add up.
-    fn circles(&mut self, xs: &[f64], ys: &[f64], radius: f64, fill: &Color) {
-        let [red, green, blue] = parts(fill);
+    fn circles(&mut self, xs: &[f64], ys: &[f64], radius: f64, [red, green, blue]: [f32; 3]) {
         self.content.save_state();
         self.content
             .set_stroke_rgb(red, green, blue)
             .set_line_cap(LineCapStyle::RoundCap);
         self.content.set_line_width(single(2.0 * radius));
         for (&x, &y) in xs.iter().zip(ys) {
-            let (x, y) = (single(x), single(y));
+            let x = single(x);
+            let y = single(y);
             self.content.move_to(x, y).line_to(x, y).stroke();
         }
         self.content.restore_state();
@@ -199,10 +200,11 @@ impl Page<'_> {
         text: &str,
         size: u32,
         anchor: TextAnchor,
-        color: Option<&Color>,
+        fill: [f32; 3],
     ) {
         let em = f32::from(self.face.units_per_em());
-        let (mut codes, mut width) = (Vec::new(), 0.0);
+        let mut codes = Vec::new();
+        let mut width = 0.0;
         for letter in text.chars() {
             let glyph = self.face.glyph_index(letter).unwrap_or(GlyphId(0));
             let advance = EM * f32::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) / em;
@@ -217,7 +219,7 @@ impl Page<'_> {
             TextAnchor::Middle => 0.5,
             TextAnchor::End => 1.0,
         };
-        self.fill(color.unwrap_or(&Color::Rgb(0, 0, 0)));
+        self.fill(fill);
         let left = single(x) - shift * width * size / EM;
         self.content.begin_text().set_font(FONT, size);
         self.content
@@ -228,7 +230,11 @@ impl Page<'_> {
     fn write(self, font: &[u8], width: f32, height: f32) -> Result<Vec<u8>, String> {
         let mut next = (1..).map(Ref::new);
         let mut id = || next.next().ok_or("there are too many objects");
-        let (catalog, pages, page, content, font_id) = (id()?, id()?, id()?, id()?, id()?);
+        let catalog = id()?;
+        let pages = id()?;
+        let page = id()?;
+        let content = id()?;
+        let font_id = id()?;
         let states: Vec<Ref> = self
             .opacities
             .iter()
@@ -259,7 +265,10 @@ impl Page<'_> {
         let drawn = compressed(&self.content.finish());
         pdf.stream(content, &drawn).filter(Filter::FlateDecode);
 
-        let (descendant, descriptor, file, to_unicode) = (id()?, id()?, id()?, id()?);
+        let descendant = id()?;
+        let descriptor = id()?;
+        let file = id()?;
+        let to_unicode = id()?;
         let mut whole = pdf.type0_font(font_id);
         whole
             .base_font(FONT_NAME)
@@ -322,12 +331,4 @@ fn state_name(index: usize) -> String {
 
 fn compressed(bytes: &[u8]) -> Vec<u8> {
     miniz_oxide::deflate::compress_to_vec_zlib(bytes, COMPRESSION)
-}
-
-/// Red, green and blue from 0 to 1.
-fn parts(color: &Color) -> [f32; 3] {
-    match color {
-        Color::Rgb(red, green, blue) => [*red, *green, *blue].map(|part| f32::from(part) / 255.0),
-        _ => [0.0; 3],
-    }
 }

@@ -2,21 +2,21 @@
 
 use super::BadOption;
 use super::font;
+use super::ink::{Dot, Fill, Ink, Stroke, color};
 use super::pdf::pdf;
 use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
 use crate::table::shown::shown_text;
+use crate::table::value::words;
 use anyhow::{Result, anyhow};
-use clap::ValueEnum;
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
-use kuva::render::color::Color;
 pub(super) use kuva::render::render::TextAnchor as Anchor;
 use kuva::render::render::{Primitive, Scene};
 
 /// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
 
-/// Symbols whose subscripts are no letters of their own; size of these, in tenths, and how far below the line they stand.
+/// Symbols whose subscripts are not letters of the font; their size, in tenths, and how far below the line they stand.
 const SUBSCRIPTED: [&str; 2] = ["K_d", "F_N"];
 const SMALL: u32 = 7;
 const LOWER: f64 = 0.2;
@@ -33,26 +33,19 @@ pub struct Picture {
     clips: usize,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    /// Vectors, for the browser and for changes by hand.
-    Svg,
-    Png,
-    Pdf,
+words! {
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Format {
+        /// Vectors, for the browser and for changes by hand.
+        Svg = "svg",
+        Png = "png",
+        Pdf = "pdf",
+    }
 }
 
 impl Format {
-    pub const ALL: [Self; 3] = [Self::Svg, Self::Png, Self::Pdf];
     /// Those that figures get if none is asked for.
     pub const DEFAULT: [Self; 2] = [Self::Svg, Self::Png];
-
-    pub const fn extension(self) -> &'static str {
-        match self {
-            Self::Svg => "svg",
-            Self::Png => "png",
-            Self::Pdf => "pdf",
-        }
-    }
 }
 
 impl Picture {
@@ -132,7 +125,7 @@ impl Picture {
         anyhow!(
             "figure {}: cannot be turned into {}: {reason}",
             self.name,
-            format.extension().to_uppercase()
+            format.word().to_uppercase()
         )
     }
 }
@@ -142,64 +135,12 @@ pub(super) fn snapped(place: f64) -> f64 {
     (2.0 * place).round() / 2.0
 }
 
-/// An opaque colour, `#rrggbb`.
-pub type Ink = &'static str;
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Stroke {
-    pub(super) ink: Ink,
-    pub(super) width: f64,
-    /// Lengths of dash and gap.
-    pub(super) dashes: Option<(f64, f64)>,
-}
-
-impl Stroke {
-    pub(super) const fn solid(ink: Ink, width: f64) -> Self {
-        Self {
-            ink,
-            width,
-            dashes: None,
-        }
-    }
-
-    pub(super) const fn dashed(ink: Ink, width: f64, dashes: (f64, f64)) -> Self {
-        Self {
-            ink,
-            width,
-            dashes: Some(dashes),
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Dot {
-    pub(super) ink: Ink,
-    pub(super) radius: f64,
-    pub(super) opacity: f64,
-}
-
-impl Dot {
-    pub(super) const fn solid(ink: Ink, radius: f64) -> Self {
-        Self {
-            ink,
-            radius,
-            opacity: 1.0,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Fill {
-    pub(super) ink: Ink,
-    pub(super) opacity: f64,
-}
-
 /// Drawing. Lengths are units of the SVG, from the upper left corner.
 impl Picture {
     pub(super) fn new(name: &str, look: &Look, (width, height): (f64, f64)) -> Self {
         let mut scene = Scene::new(width, height);
         scene.font_family = Some(FONTS.to_owned());
-        scene.text_color = Some(BLACK.to_owned());
+        scene.text_color = Some(BLACK.to_string());
         Self {
             name: name.to_owned(),
             style: look.style,
@@ -243,7 +184,7 @@ impl Picture {
         for points in lines {
             self.scene.add(Primitive::PolyLine {
                 points,
-                stroke: Color::from(stroke.ink),
+                stroke: color(stroke.ink),
                 stroke_width: stroke.width,
                 stroke_dasharray: None,
             });
@@ -257,7 +198,7 @@ impl Picture {
             y,
             width,
             height,
-            fill: Color::from(fill.ink),
+            fill: color(fill.ink),
             stroke: None,
             stroke_width: None,
             opacity: (fill.opacity < 1.0).then_some(fill.opacity),
@@ -265,8 +206,9 @@ impl Picture {
     }
 
     /// Rectangles x, y, width, height, each in its own colour.
-    pub(super) fn rectangles(&mut self, cells: impl IntoIterator<Item = ([f64; 4], Color)>) {
-        let (sides, fills): (Vec<[f64; 4]>, Vec<Color>) = cells.into_iter().unzip();
+    pub(super) fn rectangles(&mut self, cells: impl IntoIterator<Item = ([f64; 4], Ink)>) {
+        let (sides, inks): (Vec<[f64; 4]>, Vec<Ink>) = cells.into_iter().unzip();
+        let fills = inks.into_iter().map(color).collect();
         let [x, y, w, h] = [0, 1, 2, 3].map(|side| sides.iter().map(|sides| sides[side]).collect());
         self.scene.add(Primitive::RectBatch { x, y, w, h, fills });
     }
@@ -277,7 +219,7 @@ impl Picture {
             cx,
             cy,
             r: dot.radius,
-            fill: Color::from(dot.ink),
+            fill: color(dot.ink),
             fill_opacity: (dot.opacity < 1.0).then_some(dot.opacity),
             stroke: None,
             stroke_width: None,
@@ -295,7 +237,7 @@ impl Picture {
         text: &str,
         size: u32,
         anchor: Anchor,
-        color: Option<Color>,
+        ink: Option<Ink>,
     ) {
         // An SVG may hold no control characters.
         let content = shown_text(text).to_string();
@@ -308,7 +250,7 @@ impl Picture {
                 anchor,
                 rotate: None,
                 bold: false,
-                color,
+                color: ink.map(color),
             });
             return;
         };
@@ -328,7 +270,7 @@ impl Picture {
             Anchor::End => x - width,
         };
         for (part, size, y) in parts {
-            self.coloured_text((start, y), part, size, Anchor::Start, color.clone());
+            self.coloured_text((start, y), part, size, Anchor::Start, ink);
             start += font::width(part, size);
         }
     }
@@ -380,7 +322,9 @@ fn subscript(text: &str) -> Option<(&str, (&str, &str))> {
 /// Cuts a line into dashes.
 fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
     let mut dashes = Vec::new();
-    let (mut current, mut draws, mut left) = (Vec::new(), true, dash);
+    let mut current = Vec::new();
+    let mut draws = true;
+    let mut left = dash;
     for pair in points.windows(2) {
         let [(x, y), (end_x, end_y)] = [pair[0], pair[1]];
         let length = libm::hypot(end_x - x, end_y - y);

@@ -86,7 +86,8 @@ impl Grid {
 
     /// An axis for cells: it ends half a step beyond the values.
     pub(super) fn axis(&self, label: &str) -> Axis {
-        let (low, high) = (self.cell(0).0, self.cell(self.values.len() - 1).1);
+        let low = self.cell(0).0;
+        let high = self.cell(self.values.len() - 1).1;
         if self.is_linear {
             Axis::linear(label, low, high)
         } else {
@@ -115,7 +116,8 @@ impl Grid {
         } else {
             below
         };
-        let (low, high) = (at(index) - 0.5 * below, at(index) + 0.5 * above);
+        let low = at(index) - 0.5 * below;
+        let high = at(index) + 0.5 * above;
         if self.is_linear {
             (low, high)
         } else {
@@ -152,7 +154,8 @@ pub(super) mod tests {
             })
         };
         let of_modulated = |value: f64| (amplitude > 0.0).then_some(value);
-        let (locking_index, resultant_length) = (of_modulated(0.8), of_modulated(0.7));
+        let locking_index = of_modulated(0.8);
+        let resultant_length = of_modulated(0.7);
         let mean_friction = 280.0 - 1e7 * amplitude;
         let parameters = Parameters {
             modulation_amplitude: amplitude,

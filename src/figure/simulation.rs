@@ -3,10 +3,11 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::colour_bar::ColourBar;
-use super::frame::{Layout, OVERLAP};
+use super::frame::{Cell, Layout, OVERLAP, Place};
+use super::ink::{Ink, Stroke};
 use super::legend::{Mark, entry};
-use super::panel::{self, Cell, Layer, Panel, Place};
-use super::picture::{Picture, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
 use super::sets::common;
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
@@ -14,7 +15,6 @@ use crate::observe::MapRow;
 use crate::sets::label;
 use crate::table::value::floored;
 use anyhow::{Result, anyhow};
-use kuva::render::color::Color;
 use std::f64::consts::TAU;
 
 const NAME: &str = "simulation";
@@ -172,10 +172,8 @@ fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
     }
     let extremes = |column: &[(f64, f64)]| {
         let by_force = |left: &&(f64, f64), right: &&(f64, f64)| left.1.total_cmp(&right.1);
-        let (least, most) = (
-            column.iter().min_by(by_force).copied(),
-            column.iter().max_by(by_force).copied(),
-        );
+        let least = column.iter().min_by(by_force).copied();
+        let most = column.iter().max_by(by_force).copied();
         let mut pair: Vec<(f64, f64)> = least.into_iter().chain(most).collect();
         pair.sort_by(|left, right| left.0.total_cmp(&right.0));
         pair
@@ -185,10 +183,9 @@ fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
 
 /// Cells of the map on axes of this time and length: averages over the instants of a column one unit wide, equal
 /// neighbours joined.
-fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> Vec<(Cell, Color)> {
-    let (instants, time) = (map.len() / blocks, |instant: usize| {
-        map[instant * blocks].time
-    });
+fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> Vec<(Cell, Ink)> {
+    let instants = map.len() / blocks;
+    let time = |instant: usize| map[instant * blocks].time;
     let columns = floored(width).min(instants);
     // Half a spacing on both sides of an instant belongs to it.
     let spacing = (time(instants - 1) - time(0)) / (instants - 1) as f64;

@@ -1,20 +1,19 @@
 //! The look of all figures: paper, sizes of text, strokes, colours. Lengths on a sheet are units, of which a style says how
 //! long they are: text has the same size in every figure, whatever the size of the sheet.
 
-use super::picture::{Dot, Fill, Ink, Stroke};
-use crate::table::value::floored;
-use clap::ValueEnum;
-use kuva::render::color::Color;
-use std::str::FromStr;
+use super::ink::{Dot, Fill, Ink, Stroke};
+use crate::table::value::{floored, words};
 
-/// What a figure is for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Style {
-    /// Pages and slides: 192 pixels per inch, as large as the data need.
-    #[default]
-    Screen,
-    /// Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch; no small print.
-    Print,
+words! {
+    /// What a figure is for.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Style {
+        /// Pages and slides: 192 pixels per inch, as large as the data need.
+        #[default]
+        Screen = "screen",
+        /// Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch; no small print.
+        Print = "print",
+    }
 }
 
 /// Points, of 1/72 inch, per millimetre.
@@ -73,41 +72,6 @@ impl Size {
     }
 }
 
-/// `86mmx60mm`; lengths in mm, cm, in, pt or px, a pixel being 1/96 inch.
-impl FromStr for Size {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        /// Longest side in mm: a poster.
-        const LONGEST: f64 = 2000.0;
-        let length = |side: &str| {
-            let (number, unit) = side.split_at(side.find(|c: char| c.is_ascii_alphabetic())?);
-            let millimetres = match unit {
-                "mm" => 1.0,
-                "cm" => 10.0,
-                "in" => 25.4,
-                "pt" => 1.0 / POINTS_PER_MILLIMETRE,
-                "px" => 25.4 / 96.0,
-                _ => return None,
-            };
-            number
-                .parse::<f64>()
-                .ok()
-                .map(|number| number * millimetres)
-                .filter(|side| *side > 0.0 && *side <= LONGEST)
-        };
-        // The x of px is none between sides.
-        let between = text
-            .match_indices('x')
-            .map(|(at, _)| at)
-            .find(|&at| !text[..at].ends_with('p'));
-        let sides = between.and_then(|at| Some((length(&text[..at])?, length(&text[at + 1..])?)));
-        let (width, height) = sides
-            .ok_or("must be WIDTHxHEIGHT in mm, cm, in, pt or px, up to 2 m, such as 86mmx60mm")?;
-        Ok(Self { width, height })
-    }
-}
-
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
     pub style: Style,
@@ -151,23 +115,36 @@ pub(super) const NOTE_TEXT: u32 = 12;
 pub(super) const HALF_DIGIT: f64 = 0.36;
 
 /// Black for axes and text.
-pub(super) const BLACK: Ink = "#000000";
-pub(super) const DARK_GREY: Ink = "#555555";
+pub(super) const BLACK: Ink = Ink::new(0x000000);
+pub(super) const DARK_GREY: Ink = Ink::new(0x555555);
 /// For data in the background.
-pub(super) const GREY: Ink = "#8c8c8c";
-pub(super) const LIGHT_GREY: Ink = "#b8b8b8";
-pub(super) const WHITE: Ink = "#ffffff";
-pub(super) const RED: Ink = "#d62020";
-pub(super) const BLUE: Ink = "#1f55c4";
+pub(super) const GREY: Ink = Ink::new(0x8c8c8c);
+pub(super) const LIGHT_GREY: Ink = Ink::new(0xb8b8b8);
+pub(super) const WHITE: Ink = Ink::new(0xffffff);
+pub(super) const RED: Ink = Ink::new(0xd62020);
+pub(super) const BLUE: Ink = Ink::new(0x1f55c4);
 /// For lines side by side: colours that colour-blind readers can distinguish (Okabe and Ito).
 pub const INKS: [Ink; 6] = [
-    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
+    Ink::new(0x0072b2),
+    Ink::new(0xd55e00),
+    Ink::new(0x009e73),
+    Ink::new(0xcc79a7),
+    Ink::new(0xe69f00),
+    Ink::new(0x56b4e9),
 ];
 
 /// For dots on a scale: the darker of the shades, which are seen on white.
 pub const SCALE: [Ink; 10] = [
-    "#abd4ce", "#8fc7c7", "#74b9c1", "#5ba9ba", "#4598b2", "#3586a8", "#2a749c", "#22618e",
-    "#1e4e7c", "#1b3a68",
+    Ink::new(0xabd4ce),
+    Ink::new(0x8fc7c7),
+    Ink::new(0x74b9c1),
+    Ink::new(0x5ba9ba),
+    Ink::new(0x4598b2),
+    Ink::new(0x3586a8),
+    Ink::new(0x2a749c),
+    Ink::new(0x22618e),
+    Ink::new(0x1e4e7c),
+    Ink::new(0x1b3a68),
 ];
 
 /// Border and ticks of a frame.
@@ -214,32 +191,23 @@ const DIVERGING: [[f64; 3]; 3] = [
 ];
 
 /// A share from 0 to 1 as a colour on a light ground, pale at 0.
-pub(super) fn shade(share: f64) -> Color {
-    colour(mixed(&SHADES, share))
+pub(super) fn shade(share: f64) -> Ink {
+    ink(mixed(&SHADES, share))
 }
 
 /// A share from 0 to 1 as a colour, pale at 1/2.
-pub(super) fn diverging(share: f64) -> Color {
-    colour(mixed(&DIVERGING, share))
+pub(super) fn diverging(share: f64) -> Ink {
+    ink(mixed(&DIVERGING, share))
 }
 
-fn colour([red, green, blue]: [f64; 3]) -> Color {
+fn ink([red, green, blue]: [f64; 3]) -> Ink {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "from 0 to 255"
     )]
     let part = |part: f64| part.round() as u8;
-    Color::Rgb(part(red), part(green), part(blue))
-}
-
-/// Black or white, whichever is read on this shade.
-pub(super) fn ink_on(share: f64) -> Color {
-    Color::from(if lightness(mixed(&SHADES, share)) < 0.55 {
-        WHITE
-    } else {
-        BLACK
-    })
+    Ink([part(red), part(green), part(blue)])
 }
 
 fn mixed(colours: &[[f64; 3]], share: f64) -> [f64; 3] {
@@ -251,14 +219,14 @@ fn mixed(colours: &[[f64; 3]], share: f64) -> [f64; 3] {
     })
 }
 
-/// Lightness from 0 to 1, of the parts of a colour as they are stored.
-fn lightness([red, green, blue]: [f64; 3]) -> f64 {
-    (0.299 * red + 0.587 * green + 0.114 * blue) / 255.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// From 0 to 1, of the parts of a colour as they are stored.
+    fn lightness([red, green, blue]: [f64; 3]) -> f64 {
+        (0.299 * red + 0.587 * green + 0.114 * blue) / 255.0
+    }
 
     #[test]
     fn shades_darken_in_even_steps() {
@@ -276,41 +244,6 @@ mod tests {
             "{steps:?}"
         );
         assert!(lightness(mixed(&SHADES, 0.0)) > 0.95);
-    }
-
-    #[test]
-    fn sizes_are_read_in_their_units() {
-        let size = |text: &str| text.parse::<Size>().unwrap();
-        assert_eq!(
-            size("86mmx60mm"),
-            Size {
-                width: 86.0,
-                height: 60.0
-            }
-        );
-        assert_eq!(
-            size("8.6cmx6cm"),
-            Size {
-                width: 86.0,
-                height: 60.0
-            }
-        );
-        assert!((size("96pxx192px").height - 50.8).abs() < 1e-9);
-        assert!((size("72ptx1in").width - 25.4).abs() < 1e-9);
-        for wrong in [
-            "",
-            "86mm",
-            "86x60",
-            "0mmx60mm",
-            "-1mmx5mm",
-            "nanmmx5mm",
-            "9e9mmx5mm",
-            "86mmx60furlong",
-            "mmxmm",
-            "µmxµm",
-        ] {
-            assert!(wrong.parse::<Size>().is_err(), "{wrong}");
-        }
     }
 
     #[test]

@@ -2,10 +2,11 @@
 //! method has an ink, a drive a pattern of the line and a mark. Errors that are chance are not joined by lines.
 
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::Layout;
+use super::frame::{Ends, Layout};
+use super::ink::{Dot, Ink, Stroke};
 use super::legend::{Mark, entry};
-use super::panel::{self, Ends, Layer, Panel};
-use super::picture::{Dot, Ink, Picture, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
 use super::style::{INKS, Look, RADIUS, STRIPE, WHITE};
 use anyhow::{Result, anyhow};
 
@@ -112,10 +113,8 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
         .map(|point| point.work);
     let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
     let all = || panels.iter().flat_map(|panel| &panel.points);
-    let (methods, drives) = (
-        distinct(all().map(|point| &*point.method)),
-        distinct(all().map(|point| &*point.drive)),
-    );
+    let methods = distinct(all().map(|point| &*point.method));
+    let drives = distinct(all().map(|point| &*point.drive));
     let inks = methods.iter().zip(INKS.into_iter().cycle());
     let looks = inks.flat_map(|(method, ink)| {
         drives
@@ -244,9 +243,9 @@ mod tests {
             assert_eq!(svg.matches(&format!(">{text}<")).count(), times, "{text}");
         }
         // Of each solid line in a panel the line itself, two bars and two dots, and the mark in the legend.
-        assert_eq!(svg.matches(INKS[0]).count(), 5 + 1);
+        assert_eq!(svg.matches(&INKS[0].to_string()).count(), 5 + 1);
         // Where errors are chance there is no line: of the two methods in either panel two, one, two bars, and two dots.
-        assert_eq!(svg.matches(INKS[1]).count(), 5 + 2 * 4 + 2);
+        assert_eq!(svg.matches(&INKS[1].to_string()).count(), 5 + 2 * 4 + 2);
         assert!(work_precision("cost", &[], &Look::default()).is_err());
     }
 }

@@ -11,7 +11,7 @@
 //!
 //! Imports run one way: `value` <- `columns` <- `model` <- `solver` <- `observe`.
 //!
-//! A crate of its own: others can depend on it alone, and it compiles beside what tables and figures need.
+//! A separate crate: other programs can depend on it alone, and it compiles beside what tables and figures need.
 
 pub mod columns;
 pub mod model;

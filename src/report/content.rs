@@ -78,8 +78,8 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
         "backbone": backbone(layout).map_err(&damaged)?,
         "curves": curves(),
         // Colours of the figures.
-        "inks": INKS,
-        "scale": SCALE,
+        "inks": INKS.map(|ink| ink.to_string()),
+        "scale": SCALE.map(|ink| ink.to_string()),
         "cost": cost,
         "runs": runs,
     }))

@@ -7,13 +7,12 @@ use crate::table::storage::StoredFile;
 use arrow_array::RecordBatch;
 use arrow_ipc::writer::FileWriter;
 use arrow_schema::SchemaRef;
-use clap::ValueEnum;
 use parquet::arrow::ArrowWriter;
 use parquet::errors::ParquetError;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     Parquet,
     /// Plain text with a line of names; real numbers with as many digits as they have.
@@ -23,6 +22,8 @@ pub enum Format {
 }
 
 impl Format {
+    pub const ALL: [Self; 3] = [Self::Parquet, Self::Csv, Self::Arrow];
+
     pub const fn extension(self) -> &'static str {
         match self {
             Self::Parquet => FILE_EXTENSION,

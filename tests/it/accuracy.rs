@@ -96,7 +96,7 @@ fn a_sweep_gets_its_verdict_in_the_first_lines_and_the_result_beside_its_own() {
         "{}",
         lines[0]
     );
-    assert!(lines[0].contains("too few slips to tell: "), "{}", lines[0]);
+    assert!(lines[0].contains("too few slips: "), "{}", lines[0]);
     assert!(
         lines[1].contains("breaks are off by") && lines[2].contains("Statistical error"),
         "{}",

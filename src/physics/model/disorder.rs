@@ -15,7 +15,8 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 /// Name and version of the mapping from (seed, contact, generation) to a contact; written into every result.
 pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
 
-/// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits.
+/// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits. A third deviate needs words beyond those
+/// of all redraws, or another `RNG_SCHEME`: a wider draw would change every contact.
 const WORDS_PER_DRAW: u128 = 4;
 /// Generations in one refill of 64 words, the four blocks that the generator makes at a time.
 const DRAWS_PER_REFILL: u32 = 16;
@@ -82,10 +83,8 @@ impl Disorder {
         if self.buffered_from[contact] != generation - ahead {
             self.refill(contact, generation - ahead);
         }
-        let Draw {
-            mut threshold,
-            delay,
-        } = self.buffered[contact][ahead as usize];
+        let draw = self.buffered[contact][ahead as usize];
+        let mut threshold = draw.threshold;
         if threshold.is_nan() || threshold <= 0.0 {
             threshold = self.final_threshold(contact, generation);
         }
@@ -93,7 +92,7 @@ impl Disorder {
             threshold,
             stiffness: self.mean_stiffness * (threshold / self.mean_threshold).sqrt(),
             reach: (threshold * self.mean_threshold).sqrt() / self.mean_stiffness,
-            delay,
+            delay: draw.delay,
         }
     }
 
@@ -109,7 +108,7 @@ impl Disorder {
         self.buffered_from[contact] = first;
     }
 
-    /// The first threshold of a life that is positive, be it in the tails.
+    /// The first threshold of a life that is positive, also in the tails.
     #[cold]
     fn final_threshold(&mut self, contact: usize, generation: u32) -> f64 {
         let mut redraw = 0;
@@ -255,7 +254,7 @@ fn quantile_outside_tails(probability: f64) -> f64 {
     }
 }
 
-/// A quantile of the standard normal distribution, be it in the tails.
+/// A quantile of the standard normal distribution, also in the tails.
 #[expect(clippy::excessive_precision, reason = "coefficients as published")]
 pub fn standard_normal_quantile(probability: f64) -> f64 {
     const TAIL_NUMERATOR: [f64; 8] = [

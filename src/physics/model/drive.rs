@@ -43,11 +43,8 @@ struct Ramp {
 
 impl Ramp {
     fn new(parameters: &Parameters) -> Option<Self> {
-        let Parameters {
-            modulation_amplitude: amplitude,
-            ramp_time: time,
-            ..
-        } = *parameters;
+        let amplitude = parameters.modulation_amplitude;
+        let time = parameters.ramp_time;
         let period = parameters.modulation_period.filter(|_| time > 0.0)?;
         Some(Self {
             time,
@@ -142,7 +139,9 @@ impl Drive {
         }
         let periods = (time - self.cycle_start) / self.period;
         // u is θ + η (cos θ - 1) in units of V0 T/2π, at most θ, and so not further before this turn begins.
-        let (whole, level, eta) = (periods.floor(), TAU * periods.fract(), self.eta);
+        let whole = periods.floor();
+        let level = TAU * periods.fract();
+        let eta = self.eta;
         let load = |angle: f64| angle + eta * (libm::cos(angle) - 1.0);
         // It grows from 0 to the maximum, and from the minimum on.
         let (mut low, mut high) = match load_maximum_phase(eta) {
@@ -246,7 +245,8 @@ mod tests {
         ];
         for mut drive in drives {
             let mut walked = drive;
-            let (mut step, mut furthest) = (0_u32, 0.0_f64);
+            let mut step = 0_u32;
+            let mut furthest = 0.0_f64;
             for number in 1..200 {
                 let time = 0.0107 * f64::from(number);
                 drive.advance_to(time);

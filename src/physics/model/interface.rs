@@ -1,4 +1,4 @@
-//! The interface: the contacts between the blocks and the substrate, and what each block feels of them.
+//! The interface: the contacts between the blocks and the substrate, and the force that they exert on each block.
 //!
 //! A block's contacts act together: force on block j = (Σ k_i a_i) - (Σ k_i) x_j over its attached contacts, so a step
 //! costs O(N). Single contacts are examined only when the block reaches its nearest break position or a reattachment
@@ -12,6 +12,7 @@ use super::{BreakOn, Disorder, Parameters};
 use crate::value::words;
 use pulp::Scalar512b;
 use std::array;
+use std::ops::Deref;
 
 words! {
     /// What happened to a contact.
@@ -23,9 +24,9 @@ words! {
     }
 }
 
-/// One event of one contact, as observers see it.
+/// What happens to one contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactEvent {
+pub struct ContactChange {
     /// Time, in s.
     pub time: f64,
     /// Block, counted from 0 at the trailing edge.
@@ -43,6 +44,12 @@ pub struct ContactEvent {
     pub threshold: f64,
     /// Stiffness `k_i` of this life, in N/m.
     pub stiffness: f64,
+}
+
+/// A contact breaks or attaches, as observers see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactEvent {
+    pub what: ContactChange,
     /// Contacts of the whole slider that are attached after it.
     pub attached: u64,
     /// Integral of that number over time up to here, in s.
@@ -51,9 +58,17 @@ pub struct ContactEvent {
     pub mean_displacement: f64,
 }
 
+impl Deref for ContactEvent {
+    type Target = ContactChange;
+
+    fn deref(&self) -> &ContactChange {
+        &self.what
+    }
+}
+
 /// The number of attached contacts, and its integral over time.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Attached {
+struct Attached {
     count: u64,
     /// The integral up to the origin of time, if nothing changed from there on, in s.
     offset: f64,
@@ -62,7 +77,7 @@ pub(crate) struct Attached {
 impl Attached {
     /// Counts what happens at a time in s.
     #[inline(always)]
-    pub fn change(&mut self, change: Change, time: f64) {
+    fn change(&mut self, change: Change, time: f64) {
         match change {
             Change::Attach => {
                 self.count += 1;
@@ -82,7 +97,7 @@ impl Attached {
     }
 }
 
-/// What a block feels of eight contacts, and where they break. Contact i of a block lies in row i div 8 of the block, lane
+/// The force of eight contacts on their block, and where they break. Contact i of a block lies in row i div 8 of the block, lane
 /// i mod 8. Lanes beyond the last contact stay detached for ever.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
@@ -123,7 +138,7 @@ pub struct Interface {
     rows: Vec<ContactRow>,
     lives: Vec<Lives>,
     reattachments: Reattachments,
-    pub(crate) attached: Attached,
+    attached: Attached,
     /// Per block: Σ k_i of the attached contacts, in N/m.
     pub block_stiffness: Vec<f64>,
     /// Per block: Σ k_i a_i of the attached contacts, in N.
@@ -195,10 +210,11 @@ impl Interface {
             .flat_map(move |block| {
                 (0..self.contacts_per_block).map(move |contact| (block, contact))
             })
-            .map(|(block, contact)| self.event(block, contact, 0.0, 0.0, Change::Attach))
-            .map(|event| ContactEvent {
+            .map(|(block, contact)| ContactEvent {
+                what: self.change(block, contact, 0.0, 0.0, Change::Attach),
                 attached: self.attached.count,
-                ..event
+                attached_time: 0.0,
+                mean_displacement: 0.0,
             })
     }
 
@@ -206,12 +222,6 @@ impl Interface {
     #[inline(always)]
     pub fn next_reattachment(&self) -> f64 {
         self.reattachments.next().map_or(f64::INFINITY, Due::time)
-    }
-
-    /// Block of the next reattachment, if any contact is detached.
-    #[inline(always)]
-    pub fn next_reattachment_block(&self) -> Option<usize> {
-        self.reattachments.next().map(Due::block)
     }
 
     /// Time in s and block of the next reattachment, if it is due by a time in s.
@@ -226,33 +236,35 @@ impl Interface {
     /// Time in s of the next reattachment at a block, if it is due by a time in s; else infinite.
     #[inline(always)]
     pub fn next_reattachment_at(&mut self, block: usize, by: f64) -> f64 {
-        let mut next = f64::INFINITY;
         if self.next_reattachment() <= by {
-            self.look_ahead(|due, other| {
-                if due <= by && other == block {
-                    next = due;
-                }
-                due <= by && other != block
-            });
+            self.find_reattachment_at(block, by)
+        } else {
+            f64::INFINITY
         }
+    }
+
+    /// The same where something is due. Not inlined in the loops over contacts, where that is rare.
+    #[inline(never)]
+    fn find_reattachment_at(&mut self, block: usize, by: f64) -> f64 {
+        let mut next = f64::INFINITY;
+        self.look_ahead(|due, other, _| {
+            if due <= by && other == block {
+                next = due;
+            }
+            due <= by && other != block
+        });
         next
     }
 
-    /// Visits the reattachments to come, with time in s and block, in order, until told to stop.
-    pub fn look_ahead(&mut self, mut visit: impl FnMut(f64, usize) -> bool) {
-        self.reattachments
-            .look_ahead(|due| visit(due.time(), due.block()));
-    }
-
-    /// The same with stiffness in N/m and reach in m of the life that begins.
-    pub fn look_ahead_to_lives(&mut self, mut visit: impl FnMut(f64, usize, [f64; 2]) -> bool) {
-        let (lives, rows_per_block) = (&self.lives, self.rows_per_block);
+    /// Visits the reattachments to come, in order, with time in s, block, and the life that begins, as long as `visit` is
+    /// true.
+    pub fn look_ahead(&mut self, mut visit: impl FnMut(f64, usize, &Contact) -> bool) {
+        let lives = &self.lives;
+        let rows_per_block = self.rows_per_block;
         self.reattachments.look_ahead(|due| {
-            let Contact {
-                stiffness, reach, ..
-            } = lives[due.block() * rows_per_block + due.contact() / LANES].life
-                [due.contact() % LANES];
-            visit(due.time(), due.block(), [stiffness, reach])
+            let row = due.block() * rows_per_block + due.contact() / LANES;
+            let life = &lives[row].life[due.contact() % LANES];
+            visit(due.time(), due.block(), life)
         });
     }
 
@@ -261,39 +273,43 @@ impl Interface {
     /// # Panics
     /// When nothing is due: a bug in the solver.
     #[inline(always)]
-    pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
-        let event = self.reattach_running(Scalar512b, displacement);
-        self.sum(Scalar512b, event.block);
-        self.counted(event)
+    pub fn reattach_next(&mut self, displacement: f64) -> ContactChange {
+        let change = self.reattach_running(Scalar512b, displacement);
+        self.sum(Scalar512b, change.block);
+        change
     }
 
-    /// The same, not [counted](Self::counted), with the sums of the block carried on, rounded once more, and not computed
-    /// again.
+    /// The same with the sums of the block carried on, rounded once more, and not computed again.
     ///
     /// # Panics
     /// When nothing is due: a bug in the solver.
     #[inline(always)]
-    pub(crate) fn reattach_running<S: Simd>(&mut self, simd: S, displacement: f64) -> ContactEvent {
+    pub(crate) fn reattach_running<S: Simd>(
+        &mut self,
+        simd: S,
+        displacement: f64,
+    ) -> ContactChange {
         let due = self.reattachments.pop().expect("a reattachment is due");
-        let (block, contact) = (due.block(), due.contact());
+        let block = due.block();
+        let contact = due.contact();
         let [upper, lower] = self.attach(simd, block, contact, displacement);
         self.block_upper[block] = self.block_upper[block].min(upper);
         self.block_lower[block] = self.block_lower[block].max(lower);
-        let event = self.event(block, contact, due.time(), displacement, Change::Attach);
-        self.block_stiffness[block] += event.stiffness;
-        self.block_pull[block] += event.stiffness * displacement;
-        event
+        let change = self.change(block, contact, due.time(), displacement, Change::Attach);
+        self.block_stiffness[block] += change.stiffness;
+        self.block_pull[block] += change.stiffness * displacement;
+        change
     }
 
-    /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
-    /// passes each to `log`.
+    /// Breaks and counts every contact of a block whose threshold is reached at this displacement, in the order of contacts.
+    /// Passes each to `log`, with what [`Self::count`] gives.
     #[inline(always)]
     pub fn break_reached(
         &mut self,
         block: usize,
         time: f64,
         displacement: f64,
-        mut log: impl FnMut(ContactEvent),
+        mut log: impl FnMut(ContactChange, (u64, f64)),
     ) {
         for row in 0..self.rows_per_block {
             let mut reached = self.rows_of(block)[row].reached(Scalar512b, displacement);
@@ -303,8 +319,9 @@ impl Interface {
                     // A displacement that is not finite reaches lanes beyond the last contact.
                     break;
                 }
-                let (event, _) = self.break_contact(Scalar512b, block, contact, time, displacement);
-                log(self.counted(event));
+                let (change, _) =
+                    self.break_contact(Scalar512b, block, contact, time, displacement);
+                log(change, self.count(&change));
                 reached &= reached - 1;
             }
         }
@@ -355,8 +372,7 @@ impl Interface {
         }
     }
 
-    /// Breaks one contact, at a break position in m. Returns the event, not [counted](Self::counted), and when the contact
-    /// reattaches, in s. The block's sums and nearest break positions are left as they are: see [`Self::gather`].
+    /// Breaks one contact, at a break position in m. Returns the change, and when the contact reattaches, in s. The block's sums and nearest break positions are left as they are: see [`Self::gather`].
     #[inline(always)]
     pub(crate) fn break_contact<S: Simd>(
         &mut self,
@@ -365,20 +381,23 @@ impl Interface {
         contact: usize,
         time: f64,
         displacement: f64,
-    ) -> (ContactEvent, f64) {
-        let event = self.event(block, contact, time, displacement, Change::Break);
-        (event, self.detach(simd, block, contact, time))
+    ) -> (ContactChange, f64) {
+        let change = self.change(block, contact, time, displacement, Change::Break);
+        (change, self.detach(simd, block, contact, time))
     }
 
-    /// Counts an event, in the order of time, and enters how many contacts are attached after it.
+    /// Counts a change, in the order of time. Returns how many contacts are attached after it, and the integral of that number
+    /// up to there, in s.
     #[inline(always)]
-    pub(crate) fn counted(&mut self, event: ContactEvent) -> ContactEvent {
-        self.attached.change(event.change, event.time);
-        ContactEvent {
-            attached: self.attached.count,
-            attached_time: self.attached.integral(event.time),
-            ..event
-        }
+    pub(crate) fn count(&mut self, change: &ContactChange) -> (u64, f64) {
+        self.attached.change(change.change, change.time);
+        (self.attached.count, self.attached.integral(change.time))
+    }
+
+    /// Counts an attachment at a time in s, in the order of time.
+    #[inline(always)]
+    pub(crate) fn count_attachment(&mut self, time: f64) {
+        self.attached.change(Change::Attach, time);
     }
 
     /// Moves the origin by `time` s and `displacement` m.
@@ -425,34 +444,27 @@ impl Interface {
     }
 
     #[inline(always)]
-    fn event(
+    fn change(
         &self,
         block: usize,
         contact: usize,
         time: f64,
         displacement: f64,
         change: Change,
-    ) -> ContactEvent {
+    ) -> ContactChange {
         let (row, lane) = self.place(block, contact);
-        let Lives { life, generation } = &self.lives[row];
-        let Contact {
-            threshold,
-            stiffness,
-            ..
-        } = life[lane];
-        ContactEvent {
+        let lives = &self.lives[row];
+        let life = &lives.life[lane];
+        ContactChange {
             time,
             block,
             contact,
-            generation: generation[lane],
+            generation: lives.generation[lane],
             change,
             displacement,
-            force: stiffness * (displacement - self.rows[row].anchor[lane]),
-            threshold,
-            stiffness,
-            attached: 0,
-            attached_time: 0.0,
-            mean_displacement: 0.0,
+            force: life.stiffness * (displacement - self.rows[row].anchor[lane]),
+            threshold: life.threshold,
+            stiffness: life.stiffness,
         }
     }
 
@@ -466,15 +478,14 @@ impl Interface {
         displacement: f64,
     ) -> [f64; 2] {
         let (row, lane) = self.place(block, contact);
-        let Contact {
-            stiffness, reach, ..
-        } = self.lives[row].life[lane];
+        let life = self.lives[row].life[lane];
+        let reach = life.reach;
         let row = &mut self.rows[row];
         let levels = match self.break_on {
             BreakOn::Magnitude => [displacement + reach, displacement - reach],
             BreakOn::Tension => [displacement + reach, f64::NEG_INFINITY],
         };
-        simd.set(&mut row.attached_stiffness, lane, stiffness);
+        simd.set(&mut row.attached_stiffness, lane, life.stiffness);
         simd.set(&mut row.anchor, lane, displacement);
         simd.set(&mut row.upper, lane, levels[0]);
         simd.set(&mut row.lower, lane, levels[1]);
@@ -485,7 +496,8 @@ impl Interface {
     #[inline(always)]
     fn detach<S: Simd>(&mut self, simd: S, block: usize, contact: usize, time: f64) -> f64 {
         let (row, lane) = self.place(block, contact);
-        let (row, lives) = (&mut self.rows[row], &mut self.lives[row]);
+        let lives = &mut self.lives[row];
+        let row = &mut self.rows[row];
         simd.set(&mut row.attached_stiffness, lane, 0.0);
         simd.set(&mut row.upper, lane, f64::INFINITY);
         simd.set(&mut row.lower, lane, f64::NEG_INFINITY);
@@ -503,7 +515,8 @@ impl Interface {
     #[inline(always)]
     pub(crate) fn gather<S: Simd>(&mut self, simd: S, block: usize) {
         self.sum(simd, block);
-        let (mut upper, mut lower) = (simd.splat(f64::INFINITY), simd.splat(f64::NEG_INFINITY));
+        let mut upper = simd.splat(f64::INFINITY);
+        let mut lower = simd.splat(f64::NEG_INFINITY);
         for row in self.rows_of(block) {
             upper = upper.smaller(simd.load(&row.upper));
             lower = lower.larger(simd.load(&row.lower));
@@ -515,7 +528,8 @@ impl Interface {
     /// Computes the sums of a block again, in fixed lanes.
     #[inline(always)]
     fn sum<S: Simd>(&mut self, simd: S, block: usize) {
-        let (mut stiffness, mut pull) = (simd.splat(0.0), simd.splat(0.0));
+        let mut stiffness = simd.splat(0.0);
+        let mut pull = simd.splat(0.0);
         for row in self.rows_of(block) {
             let attached = simd.load(&row.attached_stiffness);
             stiffness = stiffness.plus(attached);
@@ -552,9 +566,10 @@ mod tests {
                 "{} of 150 reached",
                 expected.len()
             );
-            let (mut interface, mut broken) = (whole.clone(), Vec::new());
-            interface.break_reached(1, 0.0, displacement, |event| {
-                broken.push((event.block, event.contact));
+            let mut interface = whole.clone();
+            let mut broken = Vec::new();
+            interface.break_reached(1, 0.0, displacement, |change, _| {
+                broken.push((change.block, change.contact));
             });
             assert_eq!(
                 broken,
@@ -563,18 +578,18 @@ mod tests {
                     .map(|&contact| (1, contact))
                     .collect::<Vec<_>>()
             );
-            while interface.next_reattachment_block().is_some() {
-                let event = interface.reattach_next(0.3 * displacement);
+            while interface.next_reattachment().is_finite() {
+                let change = interface.reattach_next(0.3 * displacement);
                 let known = [
-                    interface.block_upper[event.block],
-                    interface.block_lower[event.block],
+                    interface.block_upper[change.block],
+                    interface.block_lower[change.block],
                 ];
-                interface.gather(Scalar512b, event.block);
+                interface.gather(Scalar512b, change.block);
                 assert_eq!(
                     known,
                     [
-                        interface.block_upper[event.block],
-                        interface.block_lower[event.block]
+                        interface.block_upper[change.block],
+                        interface.block_lower[change.block]
                     ]
                 );
             }

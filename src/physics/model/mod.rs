@@ -15,7 +15,7 @@ pub mod theory;
 pub use disorder::{Contact, Disorder, RNG_SCHEME, standard_normal_quantile};
 pub use drive::Drive;
 pub use fields::Description;
-pub use interface::{Change, ContactEvent, Interface};
+pub use interface::{Change, ContactChange, ContactEvent, Interface};
 pub(crate) use lanes::{LANES, Row};
 pub use parameters::{BreakOn, ParameterError, Parameters, Symbol};
 

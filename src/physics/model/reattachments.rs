@@ -114,7 +114,7 @@ impl Reattachments {
         Some(next)
     }
 
-    /// Visits them in order until told to stop.
+    /// Visits them in order, as long as `visit` is true.
     pub fn look_ahead(&mut self, mut visit: impl FnMut(Due) -> bool) {
         let mut sorted = std::mem::take(&mut self.work_space);
         let mut goes_on = self
@@ -202,10 +202,8 @@ impl Reattachments {
             let place = self.present.partition_point(|other| *other > due);
             self.present.insert(place, due);
         } else if bin - self.present_bin < BINS as u64 {
-            let (bin, contact) = (
-                place_of(bin),
-                due.block() * self.contacts_per_block + due.contact(),
-            );
+            let bin = place_of(bin);
+            let contact = due.block() * self.contacts_per_block + due.contact();
             self.due[contact] = due;
             self.after[contact] = self.first[bin];
             #[expect(clippy::cast_possible_truncation, reason = "at most 1e7 contacts")]
@@ -274,7 +272,9 @@ mod tests {
             steps in prop::collection::vec((0_usize..40, -4.0_f64..5.0, 0_usize..60), 1..400), shifts in any::<bool>()
         ) {
             let mut queue = Reattachments::new(8, 5, 1e-3);
-            let (mut heap, mut time, mut waiting) = (BinaryHeap::new(), 0.0, [false; 40]);
+            let mut heap = BinaryHeap::new();
+            let mut time = 0.0;
+            let mut waiting = [false; 40];
             for (step, (contact, exponent, pops)) in steps.into_iter().enumerate() {
                 if !std::mem::replace(&mut waiting[contact], true) {
                     // Ties, too.

@@ -155,11 +155,9 @@ impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
 
     #[inline(always)]
     fn with(mut self, lane: usize, value: f64) -> Self {
-        let (simd, chosen, value) = (
-            self.0,
-            self.0.splat_f64s(lane as f64),
-            self.0.splat_f64s(value),
-        );
+        let simd = self.0;
+        let chosen = self.0.splat_f64s(lane as f64);
+        let value = self.0.splat_f64s(value);
         let numbers = Self::load(simd, &NUMBERS);
         for k in 0..K {
             self.1[k] = simd.select_f64s(simd.equal_f64s(numbers.1[k], chosen), value, self.1[k]);

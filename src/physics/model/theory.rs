@@ -29,7 +29,8 @@ pub fn minimum_phase(eta: f64) -> Option<f64> {
     // Both in the period of the slip: the preceding maximum lies at Φ_max - 2π and the load, in units of V0 T/2π, is
     // φ + η cos φ.
     let target = maximum - TAU + eta * libm::cos(maximum);
-    let (mut low, mut high) = (-PI - maximum, maximum);
+    let mut low = -PI - maximum;
+    let mut high = maximum;
     loop {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {

@@ -67,11 +67,11 @@ impl DropDetector {
 
     pub(super) fn advance(&mut self, segment: &Segment<'_>) {
         let (low, high) = segment.bounds();
-        let tells_nothing = match self.bottom {
+        let changes_nothing = match self.bottom {
             None => high <= self.top.force && low > self.top.force - self.least,
             Some(bottom) => low >= bottom.force && high < bottom.force + self.least,
         };
-        if tells_nothing {
+        if changes_nothing {
             return;
         }
         segment.for_each_turn(|time, force| self.follow(time, force));
@@ -213,7 +213,8 @@ mod tests {
             ..Parameters::default()
         };
         let drive = Drive::new(&parameters);
-        let (stiffness, amplitude) = (drive.stiffness, drive.amplitude);
+        let stiffness = drive.stiffness;
+        let amplitude = drive.amplitude;
         let swing = |start: f64, duration: f64, slid: f64| Segment {
             start,
             duration,

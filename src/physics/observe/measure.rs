@@ -26,8 +26,10 @@ pub struct Measurements {
 impl Measurements {
     /// What an observer has measured in a simulation that ended with this summary.
     pub fn new(observer: SlipObserver, summary: Summary) -> Self {
-        let (averages, running_interval) = (observer.averages(), observer.running_interval());
-        let (ruptures, has_given_up) = (observer.ruptures, observer.has_given_up);
+        let averages = observer.averages();
+        let running_interval = observer.running_interval();
+        let ruptures = observer.ruptures;
+        let has_given_up = observer.has_given_up;
         let (slips, precursors) = observer.into_rows();
         Self {
             slips,

@@ -1,6 +1,6 @@
 //! Observation: turns contact events and segments into measurements, as the model's definitions say.
 //!
-//! Knows no solver's inside and no file. Each observer computes one thing; a run holds those that its sweep asks for.
+//! Knows neither the solvers nor files. Each observer measures one thing; a run has the observers that its sweep asks for.
 
 mod drops;
 mod measure;
@@ -10,6 +10,7 @@ mod records;
 mod regime;
 mod rupture;
 mod slip;
+mod slip_observer;
 
 pub use drops::Drops;
 pub use measure::{Measurements, measure};
@@ -20,4 +21,5 @@ pub use records::{
 };
 pub use regime::{Averages, Regime};
 pub use rupture::{Rupture, advance_speed};
-pub use slip::{Energies, Modulation, Precursor, Slip, SlipObserver};
+pub use slip::{Energies, Modulation, Precursor, Slip};
+pub use slip_observer::SlipObserver;

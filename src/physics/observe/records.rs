@@ -236,28 +236,16 @@ columns! {
 
 impl From<&ContactEvent> for ContactRow {
     fn from(event: &ContactEvent) -> Self {
-        let ContactEvent {
-            time,
-            block,
-            contact,
-            generation,
-            change,
-            displacement,
-            force,
-            threshold,
-            stiffness,
-            ..
-        } = *event;
         Self {
-            time,
-            block: block as u64 + 1,
-            contact: contact as u64 + 1,
-            generation: u64::from(generation),
-            change,
-            displacement,
-            force,
-            threshold,
-            stiffness,
+            time: event.time,
+            block: event.block as u64 + 1,
+            contact: event.contact as u64 + 1,
+            generation: u64::from(event.generation),
+            change: event.change,
+            displacement: event.displacement,
+            force: event.force,
+            threshold: event.threshold,
+            stiffness: event.stiffness,
         }
     }
 }

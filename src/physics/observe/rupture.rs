@@ -77,7 +77,8 @@ pub fn advance_speed(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option
     let (time, position) = points
         .clone()
         .fold((0.0, 0.0), |(t, p), point| (t + point.0, p + point.1));
-    let (time, position) = (time / count, position / count);
+    let time = time / count;
+    let position = position / count;
     let (covariance, variance) = points.fold((0.0, 0.0), |(covariance, variance), point| {
         let late = point.0 - time;
         (

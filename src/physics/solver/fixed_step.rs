@@ -3,15 +3,15 @@
 //! Source: the textbook scheme (Verlet 1967; Swope et al. 1982), the damping taken half before and half after the
 //! force, implicitly after, so that its limit of stability dt < 2/ω_max holds for any damping rate. Contract:
 //! first-order errors in the times of events, second-order between them; O(N) work per step through the block sums. It
-//! is kept plain: the baseline of speed, and a witness for the other solver. So that it is a fair one, its loops are
-//! compiled for the features of the processor, chosen at run time, as those of the other solver are; nothing is fused
+//! is kept plain: the baseline of speed, and a check of the other solver. For a fair comparison its loops are compiled
+//! for the features of the processor, chosen at run time, as those of the other solver are; nothing is fused
 //! or reassociated, so all give the same bits.
 
-use super::ledger::Audit;
+use super::ledger::{Audit, FinalState};
 use super::polynomial;
 use super::segment::{ForceAt, ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
-use crate::model::{ContactEvent, Drive, Interface, Parameters};
+use crate::model::{ContactChange, ContactEvent, Drive, Interface, Parameters};
 use pulp::Arch;
 use std::sync::atomic::Ordering;
 
@@ -49,31 +49,6 @@ impl Motion {
         a[0] *= inverse_mass;
     }
 
-    /// Enters the energies at the end into an audit.
-    fn record_final_energy(
-        &self,
-        audit: &Audit,
-        interface: &Interface,
-        drive: &Drive,
-        time: f64,
-        coupling: f64,
-        mass: f64,
-    ) {
-        let x = &self.displacement[..];
-        let stretched: f64 = x
-            .windows(2)
-            .map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]))
-            .sum();
-        let pulled = drive.motion(time).0 - x[0];
-        audit
-            .kinetic
-            .set(0.5 * mass * self.velocity.iter().map(|v| v * v).sum::<f64>());
-        audit.elastic.set(
-            0.5 * (coupling * stretched + drive.stiffness * pulled * pulled)
-                + interface.elastic_energy(x),
-        );
-    }
-
     /// Whether any block is at or past a break position.
     #[inline(always)]
     #[expect(
@@ -82,11 +57,9 @@ impl Motion {
     )]
     fn reaches_a_break(&self, interface: &Interface) -> bool {
         let blocks = self.displacement.len();
-        let (x, upper, lower) = (
-            &self.displacement[..blocks],
-            &interface.block_upper[..blocks],
-            &interface.block_lower[..blocks],
-        );
+        let x = &self.displacement[..blocks];
+        let upper = &interface.block_upper[..blocks];
+        let lower = &interface.block_lower[..blocks];
         (0..blocks).fold(false, |any, j| {
             any | (x[j] >= upper[j]) | (x[j] <= lower[j])
         })
@@ -118,7 +91,8 @@ fn integrate(
     audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
     let blocks = parameters.blocks;
-    let (mass, coupling) = (parameters.block_mass(), parameters.coupling_stiffness());
+    let mass = parameters.block_mass();
+    let coupling = parameters.coupling_stiffness();
     let mut drive = Drive::new(parameters);
     let mut interface = Interface::new(parameters);
     let mut motion = Motion {
@@ -201,7 +175,8 @@ fn integrate(
             duration: time_step,
             path,
         });
-        (force, force_rate) = (next_force, next_rate);
+        force = next_force;
+        force_rate = next_rate;
         summary.end_time = time;
 
         if interface.next_reattachment() <= time || motion.reaches_a_break(&interface) {
@@ -239,7 +214,12 @@ fn integrate(
         });
     }
     if let Some(audit) = audit {
-        motion.record_final_energy(audit, &interface, &drive, summary.end_time, coupling, mass);
+        let end = FinalState {
+            displacement: &motion.displacement,
+            velocity: &motion.velocity,
+            driven: drive.motion(summary.end_time).0,
+        };
+        audit.record_final_energy(end, &interface, mass, coupling, drive.stiffness);
     }
     observer.end(summary.end_time, &motion.displacement);
     Ok(summary)
@@ -255,20 +235,26 @@ fn change_contacts(
     observer: &mut dyn Observer,
 ) {
     let mean_displacement = displacement.iter().sum::<f64>() / displacement.len() as f64;
-    while interface.next_reattachment() <= time
-        && let Some(block) = interface.next_reattachment_block()
-    {
-        let event = interface.reattach_next(displacement[block]);
+    while let Some((_, block)) = interface.next_reattachment_by(time) {
+        let change = interface.reattach_next(displacement[block]);
+        let (attached, attached_time) = interface.count(&change);
         summary.reattachments += 1;
-        observer.contact(&ContactEvent { time, ..event });
+        observer.contact(&ContactEvent {
+            what: ContactChange { time, ..change },
+            attached,
+            attached_time,
+            mean_displacement: 0.0,
+        });
     }
     for (block, &x) in displacement.iter().enumerate() {
         if x >= interface.block_upper[block] || x <= interface.block_lower[block] {
-            interface.break_reached(block, time, x, |event| {
+            interface.break_reached(block, time, x, |what, (attached, attached_time)| {
                 summary.breaks += 1;
                 observer.contact(&ContactEvent {
+                    what,
+                    attached,
+                    attached_time,
                     mean_displacement,
-                    ..event
                 });
             });
         }
@@ -293,15 +279,15 @@ mod tests {
     #[cfg(target_arch = "x86_64")]
     use pulp::x86::{V3, V4};
 
-    /// All that an observer is told.
+    /// All that is reported to an observer.
     #[derive(Debug, Default, PartialEq)]
-    struct Told {
+    struct Reported {
         forces: Vec<[f64; 2]>,
         events: Vec<ContactEvent>,
         displacement: Vec<f64>,
     }
 
-    impl Observer for Told {
+    impl Observer for Reported {
         fn advance(&mut self, segment: &Segment<'_>) {
             self.forces.push([segment.end_force(), segment.impulse()]);
         }
@@ -343,11 +329,11 @@ mod tests {
                     events: u64::MAX,
                     interrupt: None,
                 };
-                let mut told = Told::default();
-                let audited = ledger::audited(&parameters, &mut told, |observer, audit| {
+                let mut reported = Reported::default();
+                let audited = ledger::audited(&parameters, &mut reported, |observer, audit| {
                     run(features, &parameters, 2e-6, limits, observer, Some(audit))
                 });
-                (format!("{features:?}"), (told, audited.unwrap()))
+                (format!("{features:?}"), (reported, audited.unwrap()))
             });
             let runs: Vec<_> = runs.collect();
             assert!(

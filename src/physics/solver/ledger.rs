@@ -13,7 +13,7 @@ use super::harmonic::Harmonic;
 use super::quadrature::Quadrature;
 use super::segment::{ForcePath, Segment};
 use super::{Observer, SimulationError, Summary};
-use crate::model::{Change, ContactEvent, Drive, Parameters};
+use crate::model::{Change, ContactEvent, Drive, Interface, Parameters};
 use std::cell::Cell;
 
 /// Nodes beyond those that a polynomial needs: exact to 1e-13 for a modulation that turns by four radians in a segment.
@@ -53,6 +53,14 @@ pub struct Spent {
     pub broken: f64,
 }
 
+/// The motion at the end: displacements and velocities of the blocks, in m and m/s, and the displacement of the driven end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FinalState<'a> {
+    pub displacement: &'a [f64],
+    pub velocity: &'a [f64],
+    pub driven: f64,
+}
+
 /// The entries that a solver makes; cells, since the meter reads them while it makes them.
 #[derive(Clone, Debug)]
 pub(super) struct Audit {
@@ -65,15 +73,36 @@ pub(super) struct Audit {
 
 impl Audit {
     fn new() -> Self {
-        let zero = || Cell::new(0.0);
-        let quadrature = Quadrature::new();
         Self {
-            quadrature,
-            damping: zero(),
-            left_out: zero(),
-            elastic: zero(),
-            kinetic: zero(),
+            quadrature: Quadrature::new(),
+            damping: Cell::new(0.0),
+            left_out: Cell::new(0.0),
+            elastic: Cell::new(0.0),
+            kinetic: Cell::new(0.0),
         }
+    }
+
+    /// Enters the energies at the end, of blocks with this `mass` in kg, springs of `coupling` N/m between them, and a driving
+    /// spring of `stiffness` N/m.
+    pub fn record_final_energy(
+        &self,
+        end: FinalState<'_>,
+        interface: &Interface,
+        mass: f64,
+        coupling: f64,
+        stiffness: f64,
+    ) {
+        let x = end.displacement;
+        let stretched: f64 = x
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]))
+            .sum();
+        let pulled = end.driven - x[0];
+        let springs = coupling * stretched + stiffness * pulled * pulled;
+        self.elastic
+            .set(0.5 * springs + interface.elastic_energy(x));
+        let squares: f64 = end.velocity.iter().map(|v| v * v).sum();
+        self.kinetic.set(0.5 * mass * squares);
     }
 
     /// Adds to an entry, in J.
@@ -93,17 +122,10 @@ struct Meter<'a> {
 
 impl Meter<'_> {
     fn so_far(&self) -> Spent {
-        let Self {
-            audit,
-            work,
-            broken,
-            ..
-        } = self;
-        let damping = audit.damping.get() + audit.left_out.get();
         Spent {
-            work: *work,
-            damping,
-            broken: *broken,
+            work: self.work,
+            damping: self.audit.damping.get() + self.audit.left_out.get(),
+            broken: self.broken,
         }
     }
 }
@@ -149,24 +171,16 @@ pub(super) fn audited(
         broken: 0.0,
     };
     let summary = run(&mut meter, &audit)?;
-    let Spent {
-        work,
-        damping,
-        broken,
-    } = meter.so_far();
-    let [elastic, kinetic, left_out] =
-        [&audit.elastic, &audit.kinetic, &audit.left_out].map(Cell::get);
-    Ok((
-        summary,
-        Ledger {
-            work,
-            elastic,
-            kinetic,
-            damping,
-            left_out,
-            broken,
-        },
-    ))
+    let spent = meter.so_far();
+    let ledger = Ledger {
+        work: spent.work,
+        elastic: audit.elastic.get(),
+        kinetic: audit.kinetic.get(),
+        damping: spent.damping,
+        left_out: audit.left_out.get(),
+        broken: spent.broken,
+    };
+    Ok((summary, ledger))
 }
 
 /// Work of the drive along a segment, in J.

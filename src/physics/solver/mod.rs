@@ -76,7 +76,7 @@ impl Default for Solver {
 }
 
 impl Solver {
-    /// From contact event to contact event with this tolerance, resolved as it is best.
+    /// From contact event to contact event with this tolerance, resolved in the way that is cheapest.
     pub const fn event_driven(tolerance: f64) -> Self {
         Self::EventDriven {
             tolerance,
@@ -118,7 +118,7 @@ pub trait Observer {
     /// What is spent up to the break that comes next, if a ledger is kept.
     fn spent(&mut self, _spent: Spent) {}
 
-    /// Whether it wants to be told of attachments. Those that do not need none of the segments that end there.
+    /// Whether attachments are reported to it. Without them, no segment ends at one.
     fn follows_attachments(&self) -> bool {
         true
     }

@@ -11,7 +11,7 @@ pub(crate) const MAX_COEFFICIENTS: usize = 33;
 const MAX_HALVINGS: u32 = 40;
 
 /// A Newton step below this part of its argument leaves an error of the order of its square: rounding.
-const QUADRATIC: f64 = 1e-9;
+pub(crate) const QUADRATIC: f64 = 1e-9;
 
 /// 1/p; 0 for p = 0.
 pub(crate) const INVERSE: [f64; MAX_COEFFICIENTS] = {
@@ -46,20 +46,6 @@ pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
     even + s * odd
 }
 
-/// `Σ c_p s^p` and its derivative.
-pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
-    let square = s * s;
-    let pairs = coefficients.chunks_exact(2);
-    let last = pairs.remainder().first().copied().unwrap_or(0.0);
-    let (mut even, mut odd, mut even_slope, mut odd_slope) = (last, 0.0, 0.0, 0.0);
-    for pair in pairs.rev() {
-        (even_slope, odd_slope) = (even_slope * square + even, odd_slope * square + odd);
-        (even, odd) = (even * square + pair[0], odd * square + pair[1]);
-    }
-    // Slopes of the sums are by s².
-    (even + s * odd, odd + 2.0 * s * (even_slope + s * odd_slope))
-}
-
 /// `Σ p (p-1) |c_p|`: a bound on the second derivative on [0, 1]. Two sums side by side.
 pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
     let (pairs, rest) = coefficients.as_chunks::<2>();
@@ -81,7 +67,8 @@ pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
     let square = centre * centre;
     let (pairs, rest) = coefficients.as_chunks::<2>();
     let mut sums = [rest.first().copied().unwrap_or(0.0), 0.0];
-    let (mut slopes, mut half_curvatures) = ([0.0; 2], [0.0; 2]);
+    let mut slopes = [0.0; 2];
+    let mut half_curvatures = [0.0; 2];
     for pair in pairs.iter().rev() {
         for i in 0..2 {
             half_curvatures[i] = half_curvatures[i] * square + slopes[i];
@@ -100,7 +87,8 @@ pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
 /// `Σ_{p>=2} |c_p|` and `Σ_{p>=2} p |c_p|`: bounds on [0, 1] for what the terms beyond the linear one add to the value
 /// and to the slope.
 pub(crate) fn beyond_linear(coefficients: &[f64]) -> (f64, f64) {
-    let (mut value_spread, mut slope_spread) = (0.0, 0.0);
+    let mut value_spread = 0.0;
+    let mut slope_spread = 0.0;
     for c in coefficients.iter().skip(2).rev() {
         value_spread += c.abs();
         slope_spread += value_spread;
@@ -226,86 +214,60 @@ fn root_between(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
         return None;
     }
     let sign = if rises { 1.0 } else { -1.0 };
-    Some(safeguarded_newton(low, high, 0.5 * (low + high), |s| {
-        let (value, slope) = value_and_slope(coefficients, s);
-        (sign * value, sign * slope)
+    Some(rising_root(low, high, 0.5 * (low + high), QUADRATIC, |s| {
+        let [value, slope, _] = expanded(coefficients, s);
+        newton_step(s, sign * value, sign * slope)
     }))
 }
 
 /// A step of third order below this part of its argument leaves an error of the order of its cube: rounding, unless the
 /// slope vanishes within a thousandth.
-const CUBIC: f64 = 1e-7;
+pub(crate) const CUBIC: f64 = 1e-7;
 
-/// Root of a polynomial that rises through zero once between `low` and `high`, sought from `first`: Halley's steps,
-/// else as [`safeguarded_newton`].
-pub(crate) fn safeguarded_halley(
-    coefficients: &[f64],
-    mut low: f64,
-    mut high: f64,
-    first: f64,
-) -> f64 {
-    let mut s = if first > low && first < high {
-        first
-    } else {
-        0.5 * (low + high)
-    };
-    loop {
-        let [height, slope, half_curvature] = expanded(coefficients, s);
-        if height >= 0.0 {
-            high = s;
-        } else {
-            low = s;
-        }
-        let halley = s - height * slope / (slope * slope - height * half_curvature);
-        if (low..=high).contains(&halley) && (halley - s).abs() <= CUBIC * high.abs().max(low.abs())
-        {
-            return halley;
-        }
-        let next = if halley > low && halley < high {
-            halley
-        } else {
-            0.5 * (low + high)
-        };
-        if next <= low || next >= high {
-            return next;
-        }
-        s = next;
-    }
+/// The value of a function, and where Newton's step from s leads.
+pub(crate) fn newton_step(s: f64, value: f64, slope: f64) -> (f64, f64) {
+    (value, s - value / slope)
 }
 
-/// Root of a function that rises through zero once between `low` and `high`: Newton's steps, bisection where they leave
-/// the bracket. A step so small that its square is rounding is the last. Returns the last iterate, never a stale end of
-/// the bracket.
-pub(crate) fn safeguarded_newton(
+/// The value of a polynomial, and where Halley's step from s leads.
+pub(crate) fn halley_step(coefficients: &[f64], s: f64) -> (f64, f64) {
+    let [value, slope, half_curvature] = expanded(coefficients, s);
+    let next = s - value * slope / (slope * slope - value * half_curvature);
+    (value, next)
+}
+
+/// Root of a function that rises through zero once between `low` and `high`, sought from `first`: steps of Newton or
+/// Halley, bisection where they leave the bracket. A step that is `small` beside the bracket is the last. Returns the
+/// last iterate, never a stale end of the bracket.
+#[inline]
+pub(crate) fn rising_root(
     mut low: f64,
     mut high: f64,
     first: f64,
-    function: impl Fn(f64) -> (f64, f64),
+    small: f64,
+    value_and_step: impl Fn(f64) -> (f64, f64),
 ) -> f64 {
-    let mut s = if first > low && first < high {
-        first
-    } else {
-        0.5 * (low + high)
+    // Strictly inside, or steps might alternate between the ends for ever.
+    let inside = |s: f64, low: f64, high: f64| {
+        if s > low && s < high {
+            s
+        } else {
+            0.5 * (low + high)
+        }
     };
+    let mut s = inside(first, low, high);
     loop {
-        let (height, slope) = function(s);
-        if height >= 0.0 {
+        let (value, step) = value_and_step(s);
+        if value >= 0.0 {
             high = s;
         } else {
             low = s;
         }
-        let newton = s - height / slope;
-        if (low..=high).contains(&newton)
-            && (newton - s).abs() <= QUADRATIC * high.abs().max(low.abs())
-        {
-            return newton;
+        let is_small = (step - s).abs() <= small * high.abs().max(low.abs());
+        if is_small && (low..=high).contains(&step) {
+            return step;
         }
-        // Strictly inside, or Newton's steps might alternate between the ends for ever.
-        let next = if newton > low && newton < high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
+        let next = inside(step, low, high);
         if next <= low || next >= high {
             return next;
         }
@@ -346,7 +308,9 @@ mod tests {
     fn newton_does_not_alternate_between_the_ends_for_ever() {
         // The arc tangent sends 1.39 to -1.39 and back.
         let swing = 1.391_745_200_270_735;
-        let root = safeguarded_newton(-2.0, 2.0, swing, |s| (libm::atan(s), 1.0 / (1.0 + s * s)));
+        let root = rising_root(-2.0, 2.0, swing, QUADRATIC, |s| {
+            newton_step(s, libm::atan(s), 1.0 / (1.0 + s * s))
+        });
         assert!(root.abs() < 1e-9, "{root}");
     }
 

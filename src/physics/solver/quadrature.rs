@@ -33,7 +33,8 @@ fn rule(count: usize) -> Vec<(f64, f64)> {
         let mut z = libm::cos(PI * (i as f64 + 0.75) / (order + 0.5));
         let mut slope = 1.0;
         for _ in 0..NEWTON_STEPS {
-            let (mut before, mut value) = (1.0, z);
+            let mut before = 1.0;
+            let mut value = z;
             for k in 2..=count {
                 let k = k as f64;
                 (before, value) = (

@@ -123,7 +123,8 @@ impl CubicStep {
         let [c0, c1, c2, c3] = self.coefficients().map(|coefficient| sign * coefficient);
         let value = |s: f64| (s, c0 + s * (c1 + s * (c2 + s * c3)));
         let slope = |s: f64| c1 + s * (2.0 * c2 + s * 3.0 * c3);
-        let (at_from, at_to) = (value(from), value(to));
+        let at_from = value(from);
+        let at_to = value(to);
         let at_end = if at_to.1 > at_from.1 { at_to } else { at_from };
         // The second derivative is linear. If it keeps its sign, there is a crest only where the slope changes its own.
         let keeps_sign = (c2 + 3.0 * c3 * from) * (c2 + 3.0 * c3 * to) > 0.0;
@@ -471,7 +472,8 @@ impl Segment<'_> {
                 } else {
                     inner.least
                 };
-                let (mut at, mut extreme) = (at, sign * value);
+                let mut at = at;
+                let mut extreme = sign * value;
                 let mut offer = |begin: f64, cubic: &CubicStep, from: f64, to: f64| {
                     let [low, high] = cubic.bounds();
                     if (if sign > 0.0 { high } else { -low })
@@ -568,7 +570,8 @@ mod tests {
             let segment = Segment { start: 3.0, duration: (last - first) * spacing, path };
             assert_turns(&segment);
             let samples = || (0..=2000).map(|i| segment.force_after(segment.duration * f64::from(i) / 2000.0));
-            let (highest, lowest) = (samples().fold(f64::MIN, f64::max), samples().fold(f64::MAX, f64::min));
+            let highest = samples().fold(f64::MIN, f64::max);
+            let lowest = samples().fold(f64::MAX, f64::min);
             let (_, maximum) = segment.maximum_above(f64::NEG_INFINITY).unwrap();
             let (_, minimum) = segment.minimum_below(f64::INFINITY).unwrap();
             prop_assert!(maximum >= highest - 1e-12 && maximum < highest + 2e-2, "{} {}", maximum, highest);

@@ -1,11 +1,9 @@
-//! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at
-//! the end.
+//! What the event-driven solver enters into the energy ledger along the way: damping along series and leaps.
 
 use super::chain::{Chain, State};
 use super::kernels::Kernels;
-use super::series::Series;
-use super::slider::Slider;
-use super::split::{BlockMotion, Split};
+use super::leap::Split;
+use super::taylor::Series;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;
 
@@ -56,15 +54,16 @@ impl Audit {
         let frequency = drive.angular_frequency;
         let coupling = chain.coupling[0][0];
         // Σ p1², Σ p1 q, Σ |q|² and Σ q²: the velocity is p1 - ω Im(q e^{iωt}).
-        let (mut ramp, mut mixed, mut size, mut square) = (0.0, [0.0; 2], 0.0, [0.0; 2]);
-        let (mut dropped, mut before) = (0.0, [0.0; 2]);
+        let mut ramp = 0.0;
+        let mut mixed = [0.0; 2];
+        let mut size = 0.0;
+        let mut square = [0.0; 2];
+        let mut dropped = 0.0;
+        let mut before = [0.0; 2];
         for j in 0..chain.layout.blocks {
-            let BlockMotion {
-                start,
-                rate,
-                wave: [real, imaginary],
-                ..
-            } = split.driven(chain, j);
+            let driven = split.driven(chain, j);
+            let rate = driven.rate;
+            let [real, imaginary] = driven.wave;
             ramp += rate * rate;
             mixed = [mixed[0] + rate * real, mixed[1] + rate * imaginary];
             size += real * real + imaginary * imaginary;
@@ -73,11 +72,10 @@ impl Audit {
                 square[1] + 2.0 * real * imaginary,
             ];
             // E(x_p + y) - E(x_p) = yᵀ (S (x_p + y/2) - b - drive) + m w (v_p + w/2), with the forces per mass.
-            let (x, v) = (start + real, rate - frequency * imaginary);
-            let (y, w) = (
-                chain.at(&state.displacement, j) - x,
-                chain.at(&state.velocity, j) - v,
-            );
+            let x = driven.start + real;
+            let v = rate - frequency * imaginary;
+            let y = chain.at(&state.displacement, j) - x;
+            let w = chain.at(&state.velocity, j) - v;
             let middle = x + 0.5 * y;
             let mut force = chain.at(&chain.diagonal, j) * middle - chain.at(&chain.pull, j);
             if j == 0 {
@@ -100,28 +98,6 @@ impl Audit {
             integral += 0.5 * frequency * (size * frequency * elapsed - swing);
         }
         Self::add(&self.damping, chain.mass * chain.damping_rate * integral);
-    }
-
-    /// Enters the energies at the end, with the drive at `driven` m.
-    pub(super) fn record_final_energy(&self, slider: &Slider, driven: f64) {
-        let Slider {
-            interface,
-            chain,
-            state,
-        } = slider;
-        let displacements: Vec<f64> = slider.displacements().collect();
-        let speeds = (0..chain.layout.blocks).map(|j| chain.at(&state.velocity, j));
-        let stretched: f64 = displacements
-            .windows(2)
-            .map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]))
-            .sum();
-        let sprung =
-            chain.drive_stiffness * (driven - displacements[0]) * (driven - displacements[0]);
-        self.kinetic
-            .set(0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>());
-        let chained = chain.mass * chain.coupling[0][0] * stretched;
-        self.elastic
-            .set(0.5 * (chained + sprung) + interface.elastic_energy(&displacements));
     }
 }
 

@@ -1,6 +1,6 @@
 //! The chain of blocks as the solver sees it: its coefficients in lanes, updated as contacts break and attach.
 
-use super::layout::Layout;
+use super::lane_layout::Layout;
 use crate::model::equation::StiffnessMatrix;
 use crate::model::simd::{Simd, Vector};
 use crate::model::{Interface, Parameters, Row};

@@ -6,7 +6,8 @@
 
 use crate::solver::harmonic::Harmonic;
 use crate::solver::polynomial::{
-    beyond_linear, expanded, rescaled, safeguarded_halley, safeguarded_newton, value,
+    CUBIC, QUADRATIC, beyond_linear, expanded, halley_step, newton_step, rescaled, rising_root,
+    value,
 };
 use std::f64::consts::{PI, TAU};
 
@@ -21,7 +22,8 @@ pub(super) fn first_exit(
     from: f64,
     end: f64,
 ) -> Option<f64> {
-    let (start, slope) = (coefficients[0], coefficients[1]);
+    let start = coefficients[0];
+    let slope = coefficients[1];
     let (value_spread, slope_spread) = beyond_linear(coefficients);
     let mut first = None;
     if start + slope.max(0.0) + value_spread >= upper {
@@ -58,7 +60,7 @@ fn first_reach(coefficients: &[f64], slope_spread: f64, from: f64, end: f64) -> 
                         .max(0.0)
                         .sqrt());
         return if slope > 0.0 {
-            rising_root(coefficients, from, end, guess)
+            rise(coefficients, from, end, guess)
         } else {
             None
         };
@@ -67,7 +69,8 @@ fn first_reach(coefficients: &[f64], slope_spread: f64, from: f64, end: f64) -> 
 }
 
 fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64> {
-    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let middle = 0.5 * (low + high);
+    let half = 0.5 * (high - low);
     let about = &rescaled(coefficients, low, high)[..coefficients.len()];
     let (value_spread, slope_spread) = beyond_linear(about);
     let slope = about[1];
@@ -80,7 +83,7 @@ fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64
             return Some(low);
         }
         let root = if slope > 0.0 {
-            rising_root(about, -1.0, 1.0, -about[0] / slope)
+            rise(about, -1.0, 1.0, -about[0] / slope)
         } else {
             None
         };
@@ -95,8 +98,9 @@ fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64
 
 /// The root of a polynomial that rises from below zero throughout [low, high], sought from `first`; `None` if it stays
 /// below.
-fn rising_root(coefficients: &[f64], low: f64, high: f64, first: f64) -> Option<f64> {
-    (value(coefficients, high) >= 0.0).then(|| safeguarded_halley(coefficients, low, high, first))
+fn rise(coefficients: &[f64], low: f64, high: f64, first: f64) -> Option<f64> {
+    (value(coefficients, high) >= 0.0)
+        .then(|| rising_root(low, high, first, CUBIC, |s| halley_step(coefficients, s)))
 }
 
 impl Harmonic {
@@ -113,9 +117,9 @@ impl Harmonic {
             };
         }
         let newton = |low: f64, high: f64| {
-            safeguarded_newton(low, high, high, |elapsed| {
+            rising_root(low, high, high, QUADRATIC, |elapsed| {
                 let (height, slope) = self.value_and_slope(elapsed);
-                (height - level, slope)
+                newton_step(elapsed, height - level, slope)
             })
         };
         let speed = self.amplitude * self.angular_frequency;
@@ -165,9 +169,9 @@ impl Harmonic {
         // Before the trough the motion falls, from the crest or from the start.
         let crest = low - (PI - 2.0 * (PI - trough)) / self.angular_frequency;
         let high = crest.max(from);
-        safeguarded_newton(high, low, low, |elapsed| {
+        rising_root(high, low, low, QUADRATIC, |elapsed| {
             let (height, slope) = self.value_and_slope(elapsed);
-            (level - height, -slope)
+            newton_step(elapsed, level - height, -slope)
         })
     }
 }
@@ -218,7 +222,8 @@ mod tests {
             levels in (0.001_f64..1.0, 0.001_f64..1.0),
         ) {
             let start = value(&coefficients, from);
-            let (lower, upper) = (start - levels.0, start + levels.1);
+            let lower = start - levels.0;
+            let upper = start + levels.1;
             let found = first_exit(&mut coefficients.clone(), [lower, upper], from, from + length);
             let until = found.unwrap_or(from + length);
             for i in 0..400 {

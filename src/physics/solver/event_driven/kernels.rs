@@ -1,12 +1,11 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
 use super::chain::{Chain, State};
-use super::grid::{Grid, GridDrive, GridStep, advance, velocity};
-use super::leap::{Bounds, Plan, leap};
-use super::series::{Series, evaluate, reachable};
+use super::grid::{Grid, GridStep, advance, velocity};
+use super::leap::{Bounds, Plan, Split, leap};
+use super::moving_frame::GridDrive;
 use super::slider::Slider;
-use super::split::Split;
-use super::taylor::{StepInput, expand};
+use super::taylor::{Series, StepInput, evaluate, expand, reachable};
 use crate::model::simd::Simd;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;

@@ -6,38 +6,33 @@
 //! position rigorously ([`taylor`], [`crossing`]). Contract: errors of displacement of the order of `tolerance` · f_s/k,
 //! and events in the right order within that.
 //!
-//! Displacements and times are kept in a moving [`frame`], so that neither loses digits in long runs.
+//! Displacements and times are kept in a [`moving_frame`], so that neither loses digits in long runs.
 
 mod audit;
 mod chain;
 mod crossing;
-mod elimination;
-mod frame;
 mod grid;
 mod kernels;
-mod layout;
+mod lane_layout;
 mod leap;
-mod series;
+mod moving_frame;
 mod slider;
-mod split;
-mod step;
 mod taylor;
 mod tolerances;
 
-use self::frame::Frame;
 use self::grid::Grid;
 use self::kernels::Kernels;
-use self::layout::Layout;
-use self::leap::{Bounds, Plan};
+use self::lane_layout::Layout;
+use self::leap::{Bounds, Split};
+use self::moving_frame::Frame;
 use self::slider::Slider;
-use self::split::Split;
-use self::step::{Step, StepControl};
+use self::taylor::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
-use super::ledger::Audit;
+use super::ledger::{Audit, FinalState};
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, Resolve, SimulationError, Summary};
-use crate::model::{ContactEvent, Drive, Parameters};
+use crate::model::{ContactChange, ContactEvent, Drive, Parameters};
 use std::sync::atomic::Ordering;
 
 /// A leap is tried only if no reattachment is due within this many longest Taylor steps, or steps of the grid.
@@ -110,7 +105,7 @@ impl<'a> Integration<'a> {
         let span = if takes_grid {
             grid::FRAME_SPAN
         } else {
-            frame::SPAN
+            moving_frame::SPAN
         };
         Self {
             limits,
@@ -167,8 +162,10 @@ impl<'a> Integration<'a> {
                 self.take_step(until_change, observer)?;
             }
             if self.summary.breaks + self.summary.reattachments > self.limits.events {
-                let (time, events) = (self.frame.now(), self.limits.events);
-                return Err(SimulationError::EventBudget { time, events });
+                return Err(SimulationError::EventBudget {
+                    time: self.frame.now(),
+                    events: self.limits.events,
+                });
             }
             // A value that is not finite spreads to the driven edge, if the run lasts.
             if !self.slider.state.displacement[0][0].is_finite() {
@@ -216,9 +213,28 @@ impl<'a> Integration<'a> {
         observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
         if let Some(audit) = self.audit {
-            audit.record_final_energy(&self.slider, self.frame.drive_motion().value(0.0));
+            self.record_final_energy(audit);
         }
         Ok(self.summary)
+    }
+
+    fn record_final_energy(&self, audit: &Audit) {
+        let slider = &self.slider;
+        let chain = &slider.chain;
+        let displacement: Vec<f64> = slider.displacements().collect();
+        let velocity =
+            (0..chain.layout.blocks).map(|block| chain.at(&slider.state.velocity, block));
+        audit.record_final_energy(
+            FinalState {
+                displacement: &displacement,
+                velocity: &velocity.collect::<Vec<_>>(),
+                driven: self.frame.drive_motion().value(0.0),
+            },
+            &slider.interface,
+            chain.mass,
+            chain.mass * chain.coupling[0][0],
+            chain.drive_stiffness,
+        );
     }
 
     /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next change of the drive or the end.
@@ -232,23 +248,16 @@ impl<'a> Integration<'a> {
     ) -> bool {
         self.update_velocities(observer);
         let drive = self.frame.drive_motion();
-        let (start, began) = (self.frame.now(), self.frame.time);
-        let Tolerances {
-            leap_error: error,
-            max_step,
-            ..
-        } = self.tolerances;
-        let passing = self
-            .takes_grid
-            .then_some([WORTHWHILE_GRID_LEAP * self.grid.step.length, until_change]);
-        let largest_force = self.largest_force;
+        let start = self.frame.now();
+        let began = self.frame.time;
+        let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
         let bounds = Bounds {
             start: began,
             horizon,
             until_cycle_end,
-            error,
-            largest_force,
-            passing,
+            error: self.tolerances.leap_error,
+            largest_force: self.largest_force,
+            passing: self.takes_grid.then_some([least, until_change]),
         };
         let attempt = self.kernels.leap(
             &mut self.split,
@@ -257,30 +266,27 @@ impl<'a> Integration<'a> {
             bounds,
             self.audit,
         );
-        let Plan {
-            segment,
-            reached,
-            is_whole,
-        } = match attempt {
+        let plan = match attempt {
             Ok(plan) => plan,
             Err(seconds) => {
-                self.next_leap = began + seconds.max(max_step);
+                self.next_leap = began + seconds.max(self.tolerances.max_step);
                 return false;
             }
         };
-        let segment = Segment { start, ..segment };
-        self.tell_leap(&segment, &drive, began, observer);
+        let segment = Segment {
+            start,
+            ..plan.segment
+        };
+        self.report_leap(&segment, &drive, began, observer);
         self.grid.is_on = false;
         self.summary.steps += 1;
         self.summary.leaps += 1;
         self.next_leap = 0.0;
-        self.arrive(segment.duration, is_whole);
-        match reached {
+        self.arrive(segment.duration, plan.is_whole);
+        match plan.reached {
             Some(block) => {
-                let (x, trailing) = (
-                    self.slider.displacement(block),
-                    self.slider.state.displacement[0][0],
-                );
+                let x = self.slider.displacement(block);
+                let trailing = self.slider.state.displacement[0][0];
                 let mean = self.slider.mean_displacement();
                 self.break_block(block, [x, mean], self.frame.shear_force(trailing), observer);
             }
@@ -289,9 +295,9 @@ impl<'a> Integration<'a> {
         true
     }
 
-    /// Tells the shear force along a leap that began at a time in s in the frame, and attaches on the driven solution what
+    /// Reports the shear force along a leap that began at a time in s in the frame, and attaches on the driven solution what
     /// it passed from the grid.
-    fn tell_leap(
+    fn report_leap(
         &mut self,
         leap: &Segment<'static>,
         drive: &Harmonic,
@@ -301,20 +307,20 @@ impl<'a> Integration<'a> {
         let ForcePath::Harmonic(path) = leap.path else {
             unreachable!("a leap follows the driven solution")
         };
-        let mut told = 0.0;
-        let mut tell = |until: f64, observer: &mut dyn Observer| {
+        let mut reported = 0.0;
+        let mut report = |until: f64, observer: &mut dyn Observer| {
             let path = Harmonic {
-                start: path.start + path.rate * told,
-                phase: path.phase + path.turn(told),
+                start: path.start + path.rate * reported,
+                phase: path.phase + path.turn(reported),
                 ..path
             };
-            let start = leap.start + told;
+            let start = leap.start + reported;
             observer.advance(&Segment {
                 start,
-                duration: until - told,
+                duration: until - reported,
                 path: ForcePath::Harmonic(path),
             });
-            told = until;
+            reported = until;
         };
         // What is due at the very end is attached to the state there.
         while let Some((due, block)) = self
@@ -323,8 +329,8 @@ impl<'a> Integration<'a> {
             .next_reattachment_by(began + leap.duration)
             && due - began < leap.duration
         {
-            if self.grid.tells_attachments() {
-                tell(due - began, observer);
+            if self.grid.wants_attachments() {
+                report(due - began, observer);
             }
             let x = self
                 .split
@@ -332,7 +338,7 @@ impl<'a> Integration<'a> {
                 .displacement(drive, due - began);
             self.attach_next(x, observer);
         }
-        tell(leap.duration, observer);
+        report(leap.duration, observer);
     }
 
     /// Advances time by `elapsed` s, exactly to the next reattachment if that ended the leap.
@@ -353,33 +359,54 @@ impl<'a> Integration<'a> {
         observer: &mut dyn Observer,
     ) {
         self.largest_force = force;
-        let (frame, summary) = (&self.frame, &mut self.summary);
+        let frame = &self.frame;
+        let summary = &mut self.summary;
         let mean_displacement = frame.absolute_displacement(mean);
-        self.slider.break_reached(block, frame.time, x, |event| {
+        let mut log = |change: ContactChange, (attached, attached_time): (u64, f64)| {
             summary.breaks += 1;
             observer.contact(&ContactEvent {
+                what: frame.absolute(change),
+                attached,
+                attached_time,
                 mean_displacement,
-                ..frame.absolute(event)
             });
-        });
+        };
+        self.slider.break_reached(block, frame.time, x, &mut log);
     }
 
     /// Reattaches all contacts that are due.
     fn reattach_due(&mut self, observer: &mut dyn Observer) {
-        while self.slider.interface.next_reattachment() <= self.frame.time
-            && let Some(block) = self.slider.interface.next_reattachment_block()
-        {
+        let now = self.frame.time;
+        while let Some((_, block)) = self.slider.interface.next_reattachment_by(now) {
             self.attach_next(self.slider.displacement(block), observer);
         }
     }
 
     /// Attaches the contact that is due next, at displacement `x` m of its block.
     fn attach_next(&mut self, x: f64, observer: &mut dyn Observer) {
-        let event = self.slider.attach_next(x);
+        let change = self.slider.attach_next(x);
         self.summary.reattachments += 1;
-        if self.grid.tells_attachments() {
-            observer.contact(&self.frame.absolute(event));
+        let count = self.slider.interface.count(&change);
+        if self.grid.wants_attachments() {
+            self.report_change(change, count, 0.0, observer);
         }
+    }
+
+    /// Reports a change to the observer, with the contacts attached after it and the integral of their number, and the mean
+    /// displacement of the blocks, in m.
+    fn report_change(
+        &self,
+        change: ContactChange,
+        (attached, attached_time): (u64, f64),
+        mean_displacement: f64,
+        observer: &mut dyn Observer,
+    ) {
+        observer.contact(&ContactEvent {
+            what: self.frame.absolute(change),
+            attached,
+            attached_time,
+            mean_displacement,
+        });
     }
 
     /// Moves the frame to where the slider and the clock are.
@@ -591,7 +618,8 @@ mod tests {
             .unwrap();
             log.events
         };
-        let (loose, tight) = (log(1e-4), log(1e-10));
+        let loose = log(1e-4);
+        let tight = log(1e-10);
         assert!(tight.len() > 200, "too few events to compare");
         assert_eq!(loose.len(), tight.len());
         for (event, exact) in loose.iter().zip(&tight) {

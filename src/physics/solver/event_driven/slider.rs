@@ -1,8 +1,8 @@
 //! The slider as it moves: its contacts, the chain that they make of the blocks, and the motion of the blocks.
 
 use super::chain::{Chain, State};
-use super::layout::Layout;
-use crate::model::{ContactEvent, Interface, Parameters};
+use super::lane_layout::Layout;
+use crate::model::{ContactChange, Interface, Parameters};
 use pulp::Scalar512b;
 
 /// Contacts, chain and motion, which change together. All displacements are those of the frame.
@@ -56,10 +56,11 @@ impl Slider {
         block: usize,
         time: f64,
         x: f64,
-        log: impl FnMut(ContactEvent),
+        log: impl FnMut(ContactChange, (u64, f64)),
     ) {
         let (row, lane) = self.chain.layout.slot(block);
-        let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
+        let upper = self.chain.upper[row][lane];
+        let lower = self.chain.lower[row][lane];
         // Rounding may leave the block just short of the position that it has reached.
         let reached = if upper - x <= x - lower {
             x.max(upper)
@@ -72,10 +73,10 @@ impl Slider {
 
     /// Attaches the contact that is due next, at displacement `x` m of its block.
     #[inline]
-    pub fn attach_next(&mut self, x: f64) -> ContactEvent {
-        let event = self.interface.reattach_running(Scalar512b, x);
-        self.chain.update(event.block, &self.interface);
-        self.interface.counted(event)
+    pub fn attach_next(&mut self, x: f64) -> ContactChange {
+        let change = self.interface.reattach_running(Scalar512b, x);
+        self.chain.update(change.block, &self.interface);
+        change
     }
 
     /// Moves the origin by `time` s and `displacement` m.

@@ -73,7 +73,8 @@ impl ForceHistory {
     /// The segment up to s in the last step, with `origin` s to add to times in the frame.
     #[inline]
     pub fn segment_to(&self, s: f64, spacing: f64, origin: f64) -> Option<Segment<'_>> {
-        let (first, last) = (self.steps.first()?, self.steps.last()?);
+        let first = self.steps.first()?;
+        let last = self.steps.last()?;
         let steps = (self.count - 1) as f64 + s - self.first;
         let before = if self.first > 0.0 {
             first.integral_to(self.first)

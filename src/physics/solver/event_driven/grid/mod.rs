@@ -1,25 +1,26 @@
-//! Resolved motion on a constant grid of time: steps of two stencils ([`step`]), corrected for contact events where
-//! they happen ([`events`]). Errors are of fourth order in the step, so that one tolerance steers it.
+//! The grid: motion in constant steps of time, of two stencils each ([`step`], where they are derived from the exact recurrence
+//! of a damped oscillator), corrected for contact events where they happen ([`contacts`]).
 //!
-//! Cheaper than Taylor steps by a factor at tolerances of 1e-7 and above: nothing is redone when an event comes.
+//! Setting: `tolerance`, from which [`step_length`] follows; errors are of fourth order in the step. At tolerances of 1e-7
+//! and above it is several times as fast as Taylor steps, as nothing is computed twice when an event comes.
 
-mod events;
+mod contacts;
 mod history;
 mod step;
 
-pub(super) use self::step::{GridDrive, GridStep, velocity};
+pub(super) use self::step::{GridStep, velocity};
 
-use self::events::{StepEvents, change_contacts};
+use self::contacts::{StepEvents, change_contacts};
 use self::history::ForceHistory;
 use self::step::{MAX_RUN, march};
 use super::chain::{Chain, State};
-use super::frame::{Frame, MIN_RESOLUTION};
+use super::moving_frame::{Frame, GridDrive, MIN_RESOLUTION};
 use super::slider::Slider;
 use super::taylor::StepInput;
 use super::{Integration, WORTHWHILE_GRID_LEAP};
 use crate::model::equation::largest_frequency;
 use crate::model::simd::Simd;
-use crate::model::{Change, ContactEvent, Parameters};
+use crate::model::{Change, Parameters};
 use crate::solver::segment::CubicStep;
 use crate::solver::{Observer, SimulationError};
 use crate::value::floored;
@@ -31,7 +32,7 @@ const MAX_STEP: f64 = 2.5;
 const CONTACT_SHARE: f64 = 0.12;
 /// Time in the frame at which it moves, in s: rounding is far below the errors of the grid.
 pub(super) const FRAME_SPAN: f64 = 4.0;
-/// Steps of history after which it is told.
+/// Steps of history after which it is reported.
 const MAX_HISTORY: usize = 4 * MAX_RUN;
 
 /// Length of a step for a tolerance relative to the contact reach, in s.
@@ -53,11 +54,11 @@ pub(super) struct Grid {
     pub is_on: bool,
     pub drive: GridDrive,
     events: StepEvents,
-    /// Shear force since the last segment told.
+    /// Shear force since the last segment reported.
     history: ForceHistory,
     /// Shear force at the present point, in N.
     force: f64,
-    /// The last break told since an entry or a move of the frame, in s in the frame, and the pause after which a rupture
+    /// The last break reported since an entry or a move of the frame, in s in the frame, and the pause after which a rupture
     /// may begin, in s: half of that after which it does.
     last_break: f64,
     pause: f64,
@@ -85,14 +86,14 @@ impl Grid {
         step_length(parameters, tolerance) >= MIN_RESOLUTION * f64::EPSILON * FRAME_SPAN
     }
 
-    /// Whether the observer is told of attachments.
-    pub fn tells_attachments(&self) -> bool {
-        self.events.tells_attachments
+    /// Whether attachments are reported to the observer.
+    pub fn wants_attachments(&self) -> bool {
+        self.events.wants_attachments
     }
 
     /// Notes what the observer follows.
     pub fn set_observed(&mut self, observer: &dyn Observer) {
-        self.events.tells_attachments = observer.follows_attachments();
+        self.events.wants_attachments = observer.follows_attachments();
         self.history.keeps_all = observer.follows_force();
     }
 
@@ -131,7 +132,8 @@ impl Grid {
         [force, bend]: [f64; 2],
         start_bend: f64,
     ) {
-        let (step, drive) = (&self.step, &self.drive);
+        let step = &self.step;
+        let drive = &self.drive;
         let x = |block: usize| {
             if block < chain.layout.blocks {
                 chain.at(&state.displacement, block)
@@ -139,7 +141,8 @@ impl Grid {
                 0.0
             }
         };
-        let (here, rise) = (x(0), step.increment[0][0]);
+        let here = x(0);
+        let rise = step.increment[0][0];
         let own = step.force_on(0, 0, x(1), here) + step.pulling * drive.displacement();
         // h² x'' at the start of the step and, from the law of motion, at its end.
         let first = start_bend - bend * step.inverse_stiffness;
@@ -178,7 +181,7 @@ pub(super) fn advance<S: Simd, const R: usize>(
     let at_start = grid.follow_run(done, before);
     let start_bend = grid.drive.bend_before();
     let start = time + (done - 1) as f64 * grid.step.length;
-    grid.events.events.clear();
+    grid.events.changes.clear();
     (grid.events.breaks, grid.events.reattachments) = (0, 0);
     if !grid.step.reached.is_empty()
         || slider.interface.next_reattachment() <= start + grid.step.length
@@ -213,7 +216,8 @@ impl Integration<'_> {
             min_order: 0,
             drive,
         };
-        let (chain, state) = (&self.slider.chain, &self.slider.state);
+        let chain = &self.slider.chain;
+        let state = &self.slider.state;
         if !self
             .kernels
             .expand(chain, state, &input, &mut self.step.series)
@@ -245,10 +249,10 @@ impl Integration<'_> {
         Ok(())
     }
 
-    /// Completes the state, if it is on the grid, by velocities, and tells what is left to tell.
+    /// Completes the state, if it is on the grid, by velocities, and reports what is left to report.
     pub(super) fn update_velocities(&mut self, observer: &mut dyn Observer) {
         if self.grid.is_on {
-            self.tell_force(1.0, observer);
+            self.report_force(1.0, observer);
             let Self {
                 kernels,
                 slider,
@@ -311,16 +315,16 @@ impl Integration<'_> {
                 .next_leap
                 .max(self.frame.time + WORTHWHILE_GRID_LEAP * length);
         }
-        self.tell_events(start, observer);
+        self.report_changes(start, observer);
         self.largest_force = self.largest_force.max(self.grid.force);
         if self.grid.history.len() > MAX_HISTORY {
-            self.tell_force(1.0, observer);
+            self.report_force(1.0, observer);
         }
         Ok(true)
     }
 
-    /// Tells the shear force up to s in the last step.
-    fn tell_force(&mut self, s: f64, observer: &mut dyn Observer) {
+    /// Reports the shear force up to s in the last step.
+    fn report_force(&mut self, s: f64, observer: &mut dyn Observer) {
         let length = self.grid.step.length;
         let grid = &mut self.grid;
         if let Some(segment) = grid
@@ -334,46 +338,47 @@ impl Integration<'_> {
         }
     }
 
-    /// Tells what has happened in the last step, and the shear force up to it: event after event to an observer that
-    /// follows attachments; else up to the last break, and before to those at the leading edge, at which a slip's onset is
-    /// known, and to the first if it may begin a rupture.
-    fn tell_events(&mut self, start: f64, observer: &mut dyn Observer) {
-        if self.grid.events.events.is_empty() {
-            return;
-        }
-        let events = std::mem::take(&mut self.grid.events.events);
-        if events.iter().any(|event| event.change == Change::Break) {
+    /// Reports what has happened in the last step, which began at `start` s in the frame, and the shear force up to it: change
+    /// after change to an observer that follows attachments; else up to the last break, and before to those at the leading
+    /// edge, at which a slip's onset is known, and to the first if it may begin a rupture.
+    fn report_changes(&mut self, start: f64, observer: &mut dyn Observer) {
+        let changes = std::mem::take(&mut self.grid.events.changes);
+        let mut attachments = std::mem::take(&mut self.grid.events.attachments);
+        let mut uncounted = attachments.drain(..).peekable();
+        if changes.iter().any(|change| change.change == Change::Break) {
             self.largest_force = f64::NEG_INFINITY;
         }
         let [mean, rise] = self.grid.events.mean;
-        let may_begin = events[0].time - self.grid.last_break > self.grid.pause;
         let leading = self.slider.chain.layout.blocks - 1;
-        let mut rest = &events[..];
+        let mut rest = &changes[..];
         while let [first, ..] = rest {
-            let is_alone =
-                self.grid.tells_attachments() || (may_begin && rest.len() == events.len());
-            let last = if is_alone {
+            let may_begin =
+                rest.len() == changes.len() && first.time - self.grid.last_break > self.grid.pause;
+            let last = if may_begin || self.grid.wants_attachments() {
                 Some(0)
             } else {
-                rest.iter().position(|event| event.block == leading)
+                rest.iter().position(|change| change.block == leading)
             };
-            let (told, later) = rest.split_at(last.map_or(rest.len(), |last| last + 1));
-            let until = told.last().unwrap_or(first).time;
-            self.tell_force(
-                ((until - start) * self.grid.step.inverse_length).clamp(0.0, 1.0),
-                observer,
-            );
-            for event in told {
-                let left = 1.0 - (event.time - start) * self.grid.step.inverse_length;
-                let mean_displacement = self.frame.absolute_displacement(mean - left * rise);
-                observer.contact(&ContactEvent {
-                    mean_displacement,
-                    ..self.frame.absolute(*event)
-                });
+            let (reported, later) = rest.split_at(last.map_or(rest.len(), |last| last + 1));
+            let until = reported.last().unwrap_or(first).time;
+            let s = (until - start) * self.grid.step.inverse_length;
+            self.report_force(s.clamp(0.0, 1.0), observer);
+            for change in reported {
+                while let Some(due) = uncounted.next_if(|due| *due <= change.time) {
+                    self.slider.interface.count_attachment(due);
+                }
+                let count = self.slider.interface.count(change);
+                let left = 1.0 - (change.time - start) * self.grid.step.inverse_length;
+                let mean = self.frame.absolute_displacement(mean - left * rise);
+                self.report_change(*change, count, mean, observer);
             }
             rest = later;
         }
-        self.grid.last_break = events.last().map_or(f64::NEG_INFINITY, |event| event.time);
-        self.grid.events.events = events;
+        uncounted.for_each(|due| self.slider.interface.count_attachment(due));
+        if let Some(last) = changes.last() {
+            self.grid.last_break = last.time;
+        }
+        self.grid.events.changes = changes;
+        self.grid.events.attachments = attachments;
     }
 }

@@ -11,79 +11,14 @@
 //! drive u adds to the second derivative of the force. It is exact for damping, for equilibrium and for uniform motion.
 //! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present law.
 
-use super::super::chain::{Chain, State};
-use super::super::layout::{FIRST_BLOCK, Layout};
-use super::events::Correction;
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
+use crate::solver::event_driven::chain::{Chain, State};
+use crate::solver::event_driven::lane_layout::{FIRST_BLOCK, Layout};
+use crate::solver::event_driven::moving_frame::GridDrive;
 
 /// Longest run of steps without a look at the clock.
 pub(super) const MAX_RUN: usize = 64;
-
-/// The drive's displacement at a point of the grid, and what takes it to the next.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in super::super) struct GridDrive {
-    /// Displacement of the ramp, in m, and its rise in a step.
-    pub ramp: [f64; 2],
-    /// Δ cos θ and -Δ sin θ at the phase θ, in m.
-    pub swing: [f64; 2],
-    /// Sine and cosine of the turn ωh of a step.
-    pub turn: [f64; 2],
-    /// ωh, in rad; 0 without modulation.
-    pub angle: f64,
-}
-
-impl GridDrive {
-    /// Displacement, in m.
-    #[inline(always)]
-    pub fn displacement(&self) -> f64 {
-        self.ramp[0] + self.swing[0]
-    }
-
-    /// Displacement one step before, in m.
-    #[inline(always)]
-    pub fn displacement_before(&self) -> f64 {
-        (self.ramp[0] - self.ramp[1]) + self.swing_before()
-    }
-
-    /// Δ cos θ one step before, in m.
-    #[inline(always)]
-    fn swing_before(&self) -> f64 {
-        self.swing[0] * self.turn[1] - self.swing[1] * self.turn[0]
-    }
-
-    /// h² u'' one step before, in m.
-    #[inline(always)]
-    pub fn bend_before(&self) -> f64 {
-        -self.angle * self.angle * self.swing_before()
-    }
-
-    /// h u', in m.
-    #[inline(always)]
-    pub fn increment(&self) -> f64 {
-        self.ramp[1] + self.angle * self.swing[1]
-    }
-
-    /// h² u'', in m.
-    #[inline(always)]
-    pub fn bend(&self) -> f64 {
-        -self.angle * self.angle * self.swing[0]
-    }
-
-    /// Moves on by a step.
-    #[inline(always)]
-    pub fn advance(&mut self) {
-        self.ramp[0] += self.ramp[1];
-        if self.angle != 0.0 {
-            let ([sine, cosine], [along, across]) = (self.turn, self.swing);
-            // Δ cos(θ + ωh) and -Δ sin(θ + ωh).
-            self.swing = [
-                along * cosine + across * sine,
-                across * cosine - along * sine,
-            ];
-        }
-    }
-}
 
 /// Row and lane of a block and of those beside.
 #[derive(Clone, Copy, Debug)]
@@ -103,7 +38,8 @@ impl Place {
                 .filter(|other| *other < layout.blocks)
                 .map(|other| layout.slot(other))
         };
-        let (before, after) = (beside(block.checked_sub(1)), beside(Some(block + 1)));
+        let before = beside(block.checked_sub(1));
+        let after = beside(Some(block + 1));
         let share = |beside: Option<(usize, usize)>| if beside.is_some() { 1.0 } else { 0.0 };
         let shares = [share(before), share(after)];
         Self {
@@ -115,9 +51,16 @@ impl Place {
     }
 }
 
+/// Displacement at the end of a step and increment from its start, or what events add to them, in m.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Correction {
+    pub displacement: f64,
+    pub increment: f64,
+}
+
 /// What a step multiplies with, in units of h².
 #[derive(Clone, Debug)]
-pub(in super::super) struct GridStep {
+pub struct GridStep {
     /// Length h, in s, its inverse and its square.
     pub length: f64,
     pub inverse_length: f64,
@@ -223,8 +166,7 @@ impl GridStep {
         self.lower.copy_from_slice(&chain.lower);
     }
 
-    /// Takes over what a block feels of its contacts: the diagonal of S in N/m, the pull in N, the nearest break positions
-    /// in m.
+    /// Takes over the force of a block's contacts: the diagonal of S in N/m, the pull in N, the nearest break positions in m.
     #[inline(always)]
     pub(super) fn update<S: Simd>(
         &mut self,
@@ -344,12 +286,18 @@ fn march_in_registers<S: Simd, const R: usize>(
 ) -> usize {
     let displacement = &mut displacement[..R];
     let increment = &mut step.increment[..R];
-    let (pull, diagonal, own) = (&step.pull[..R], &step.diagonal[..R], &step.own[..R]);
-    let (couplings, second_couplings) = (&step.couplings[..R], &step.second_couplings[..R]);
-    let (upper, lower) = (&step.upper[..R], &step.lower[..R]);
+    let pull = &step.pull[..R];
+    let diagonal = &step.diagonal[..R];
+    let own = &step.own[..R];
+    let couplings = &step.couplings[..R];
+    let second_couplings = &step.second_couplings[..R];
+    let upper = &step.upper[..R];
+    let lower = &step.lower[..R];
     let first_lane = simd.load(&FIRST_BLOCK);
     let decay = simd.splat(step.decay);
-    let (mut x, mut q, mut f) = ([first_lane; R], [first_lane; R], [first_lane; R]);
+    let mut x = [first_lane; R];
+    let mut q = [first_lane; R];
+    let mut f = [first_lane; R];
     for r in 0..R {
         x[r] = simd.load(&displacement[r]);
         q[r] = simd.load(&increment[r]);
@@ -437,14 +385,15 @@ fn march_in_memory<S: Simd, const R: usize>(
     let rows = if R == 0 { chain.layout.rows } else { R };
     let x = &mut displacement[..rows];
     let last = rows - 1;
-    let (q, force) = (&mut step.increment[..rows], &mut step.force[..rows]);
-    let (pull, diagonal, own) = (
-        &step.pull[..rows],
-        &step.diagonal[..rows],
-        &step.own[..rows],
-    );
-    let (couplings, second_couplings) = (&step.couplings[..rows], &step.second_couplings[..rows]);
-    let (upper, lower) = (&step.upper[..rows], &step.lower[..rows]);
+    let q = &mut step.increment[..rows];
+    let force = &mut step.force[..rows];
+    let pull = &step.pull[..rows];
+    let diagonal = &step.diagonal[..rows];
+    let own = &step.own[..rows];
+    let couplings = &step.couplings[..rows];
+    let second_couplings = &step.second_couplings[..rows];
+    let upper = &step.upper[..rows];
+    let lower = &step.lower[..rows];
     let first_lane = simd.load(&FIRST_BLOCK);
     let decay = simd.splat(step.decay);
     for done in 1..=steps {
@@ -535,7 +484,7 @@ fn note_reached<S: Simd>(
 /// Writes the velocities at the present point, in m/s, from a step on a copy: the central difference less the part of
 /// the third derivative, which follows from the derivative of the law of motion.
 #[inline(always)]
-pub(in super::super) fn velocity<S: Simd, const R: usize>(
+pub fn velocity<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     step: &mut GridStep,
@@ -594,7 +543,7 @@ pub(in super::super) fn velocity<S: Simd, const R: usize>(
 mod tests {
     use super::*;
     use crate::model::Drive;
-    use crate::solver::event_driven::frame::{Frame, SPAN};
+    use crate::solver::event_driven::moving_frame::{Frame, SPAN};
     use crate::solver::event_driven::slider::Slider;
     use pulp::Scalar512b as Baseline;
 
@@ -652,7 +601,8 @@ mod tests {
             damping_rate: 1e4,
             ..parameters()
         };
-        let (length, velocity) = (2e-6, bare.drive_velocity);
+        let length = 2e-6;
+        let velocity = bare.drive_velocity;
         // The tension between blocks falls by mγV0 from one to the next.
         let drag = bare.block_mass() * bare.damping_rate * velocity;
         let mut start = vec![-drag * bare.blocks as f64 / bare.drive_stiffness; bare.blocks];

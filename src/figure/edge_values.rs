@@ -2,10 +2,11 @@
 
 use super::axis::Axis;
 use super::frame::Layout;
+use super::ink::{Dot, Stroke};
 use super::legend::{Mark, entry};
-use super::own::MAX_TICKS;
 use super::panel::{self, Layer, Panel};
-use super::picture::{Dot, Picture, Stroke};
+use super::picture::Picture;
+use super::quantity::MAX_TICKS;
 use super::sets::axis_of;
 use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
 use crate::model::Symbol;
@@ -64,7 +65,8 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
             statistics.push(statistic);
         }
     }
-    let (mut legend, mut layers) = (Vec::new(), Vec::new());
+    let mut legend = Vec::new();
+    let mut layers = Vec::new();
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
         legend.push(entry(
@@ -129,7 +131,7 @@ mod tests {
         assert!(
             [INKS[0], INKS[1]]
                 .iter()
-                .all(|ink| svg.matches(ink).count() > 2)
+                .all(|ink| svg.matches(&ink.to_string()).count() > 2)
         );
         assert!(
             edges(&rows[..2], &Look::default()).is_none(),

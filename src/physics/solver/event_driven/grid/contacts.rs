@@ -2,15 +2,16 @@
 //!
 //! Within a step, s from 0 to 1, a block moves as X(s) = x + s q + ((r³ - r) a0 + (s³ - s) a1)/6 with r = 1 - s, where
 //! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes the force on its block and so its motion by
-//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see [`super::super::step`], where
+//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see [`taylor`](crate::solver::event_driven::taylor), where
 //! the same terms are derived. Added at s = 1 they correct the displacement, and at s = 0, backwards, the increment.
 
-use super::super::slider::Slider;
 use super::Grid;
-use super::step::{GridDrive, GridStep, Place};
+use super::step::{Correction, GridStep, Place};
 use crate::model::simd::Simd;
-use crate::model::{Change, ContactEvent, Interface, Row};
-use crate::solver::polynomial::safeguarded_halley;
+use crate::model::{ContactChange, Interface, Row};
+use crate::solver::event_driven::moving_frame::GridDrive;
+use crate::solver::event_driven::slider::Slider;
+use crate::solver::polynomial::{CUBIC, halley_step, rising_root};
 
 const SIXTH: f64 = 1.0 / 6.0;
 /// A step of third order below this leaves an error of its cube: a billionth of a step of the grid.
@@ -34,29 +35,25 @@ struct Path {
     beside: Correction,
 }
 
-/// Displacement at the end of a step and increment from its start, or what events add to them, in m.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Correction {
-    pub displacement: f64,
-    pub increment: f64,
-}
-
 impl Path {
     /// The path of a block over the last step, under the present law.
     #[inline(always)]
     fn new(slider: &Slider, step: &GridStep, drive: &GridDrive, block: usize) -> Self {
-        let (x, q) = (&slider.state.displacement, &step.increment);
+        let x = &slider.state.displacement;
+        let q = &step.increment;
         let Place {
             slot: (row, lane),
             before,
             after,
             shares,
         } = step.places[block];
-        let (end, rise) = (x[row][lane], q[row][lane]);
+        let end = x[row][lane];
+        let rise = q[row][lane];
         let beside = |rows: &[Row]| {
             shares[0].mul_add(rows[before.0][before.1], shares[1] * rows[after.0][after.1])
         };
-        let (beside_end, beside_rise) = (beside(x), beside(q));
+        let beside_end = beside(x);
+        let beside_rise = beside(q);
         let pulls = if block == 0 { step.pulling } else { 0.0 };
         let last_force = pulls.mul_add(
             drive.displacement(),
@@ -69,15 +66,11 @@ impl Path {
         );
         // x'' = φ - γh x' at both ends, with the slopes of this very path.
         let damping = step.damping;
-        let (from, to) = (
-            damping.mul_add(-rise, first_force),
-            damping.mul_add(-rise, last_force),
-        );
+        let from = damping.mul_add(-rise, first_force);
+        let to = damping.mul_add(-rise, last_force);
         let [across, along_first, along_last] = step.damped;
-        let (first, last) = (
-            across.mul_add(to, along_first * from),
-            across.mul_add(-from, along_last * to),
-        );
+        let first = across.mul_add(to, along_first * from);
+        let last = across.mul_add(-from, along_last * to);
         let slope = SIXTH.mul_add(-2.0f64.mul_add(first, last), rise);
         let coefficients = [end - rise, slope, 0.5 * first, (last - first) * SIXTH, 0.0];
         Self {
@@ -189,7 +182,7 @@ impl Path {
         let sign = if self.end() >= level { 1.0 } else { -1.0 };
         let mut beyond = self.coefficients.map(|coefficient| sign * coefficient);
         beyond[0] -= sign * level;
-        safeguarded_halley(&beyond, self.from, 1.0, guess)
+        rising_root(self.from, 1.0, guess, CUBIC, |s| halley_step(&beyond, s))
     }
 }
 
@@ -197,9 +190,9 @@ impl Path {
 #[derive(Clone, Debug, Default)]
 pub(super) struct StepEvents {
     /// Whether attachments are collected, too.
-    pub tells_attachments: bool,
+    pub wants_attachments: bool,
     /// What has happened, in the order of time, in the frame; and how often in this run of steps.
-    pub events: Vec<ContactEvent>,
+    pub changes: Vec<ContactChange>,
     pub breaks: u64,
     pub reattachments: u64,
     /// Means over the blocks after breaks: displacement and increment, in m.
@@ -207,7 +200,7 @@ pub(super) struct StepEvents {
     /// Blocks that reach a break position, and where in the step.
     paths: Vec<(Path, f64)>,
     /// Times of attachments that are not collected, in the frame, in s, in order.
-    attachments: Vec<f64>,
+    pub attachments: Vec<f64>,
     /// Contacts that a block reaches, and where they break, in m.
     contacts: Vec<(f64, usize)>,
 }
@@ -277,30 +270,9 @@ pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut 
         );
         settle(simd, slider, step, &path);
     }
-    count_in_order(&mut slider.interface, events);
-}
-
-/// Puts the events of a step, in which block came after block, in the order of time and counts them.
-#[inline(always)]
-fn count_in_order(
-    interface: &mut Interface,
-    StepEvents {
-        events,
-        attachments,
-        ..
-    }: &mut StepEvents,
-) {
-    if !events.is_sorted_by(|a, b| a.time <= b.time) {
-        events.sort_by(|a, b| a.time.total_cmp(&b.time));
+    if !events.changes.is_sorted_by(|a, b| a.time <= b.time) {
+        events.changes.sort_by(|a, b| a.time.total_cmp(&b.time));
     }
-    let mut attachments = attachments.drain(..).peekable();
-    for event in events {
-        while let Some(due) = attachments.next_if(|due| *due <= event.time) {
-            interface.attached.change(Change::Attach, due);
-        }
-        *event = interface.counted(*event);
-    }
-    attachments.for_each(|due| interface.attached.change(Change::Attach, due));
 }
 
 /// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach. `first` is
@@ -334,10 +306,10 @@ fn break_along<S: Simd>(
             if time > until {
                 break;
             }
-            let (event, due) = interface.break_contact(simd, block, contact, time, level);
+            let (change, due) = interface.break_contact(simd, block, contact, time, level);
             let [_, slope, half_curvature] = path.at(s);
-            let stiffened = -step.by_mass * event.stiffness;
-            let second = 0.5 * step.by_mass * event.force;
+            let stiffened = -step.by_mass * change.stiffness;
+            let second = 0.5 * step.by_mass * change.force;
             let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
             let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second)
                 - 0.25 * step.damping * third;
@@ -347,7 +319,7 @@ fn break_along<S: Simd>(
             let beside = 0.5 * SIXTH * step.coupling * second;
             path.beside.displacement += beside * ahead;
             path.beside.increment += beside * (ahead - back);
-            events.events.push(event);
+            events.changes.push(change);
             until = until.min(due);
             broken += 1;
         }
@@ -372,14 +344,14 @@ fn attach<S: Simd>(
 ) {
     let s = s.clamp(0.0, 1.0);
     let [x, slope, half_curvature] = path.at(s);
-    let event = interface.reattach_running(simd, x);
-    if events.tells_attachments {
-        events.events.push(event);
+    let change = interface.reattach_running(simd, x);
+    if events.wants_attachments {
+        events.changes.push(change);
     } else {
-        events.attachments.push(event.time);
+        events.attachments.push(change.time);
     }
     events.reattachments += 1;
-    let stiffened = step.by_mass * event.stiffness;
+    let stiffened = step.by_mass * change.stiffness;
     let third = -SIXTH * stiffened * slope;
     let fourth = -0.5 * SIXTH * stiffened * half_curvature - 0.25 * step.damping * third;
     path.change_by(s, [0.0, third, fourth]);

@@ -5,11 +5,11 @@
 //! the next, fall below the error allowed. The sum of the terms' magnitudes bounds how far each block moves within the
 //! step.
 
-use super::chain::{Chain, State};
-use super::layout::FIRST_BLOCK;
 use super::series::{DriveDerivatives, INVERSE_FACTORIAL, Series};
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
+use crate::solver::event_driven::chain::{Chain, State};
+use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
 use crate::solver::polynomial::MAX_COEFFICIENTS;
 
 /// Largest order of a step.
@@ -20,7 +20,7 @@ const MIN_ORDER: usize = 3;
 
 /// What a step needs to know about its length and the drive.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct StepInput {
+pub struct StepInput {
     /// Length h, in s.
     pub length: f64,
     /// Bound that the last terms must meet, in m.
@@ -33,7 +33,7 @@ pub(super) struct StepInput {
 /// Expands the state into a series; false if it does not converge within [`MAX_ORDER`]. Compiled for `R` rows, or for
 /// any number if that is 0; so are the loops below.
 #[inline(always)]
-pub(super) fn expand<S: Simd, const R: usize>(
+pub fn expand<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     state: &State,
@@ -47,7 +47,8 @@ pub(super) fn expand<S: Simd, const R: usize>(
         diagonal,
         ..
     } = series;
-    let (coupling, diagonal) = (&mut coupling[..rows], &mut diagonal[..rows]);
+    let coupling = &mut coupling[..rows];
+    let diagonal = &mut diagonal[..rows];
     let square = simd.splat(input.length * input.length);
     let minus_square = simd.splat(-(input.length * input.length));
     for (scaled, coupling) in coupling.iter_mut().zip(&chain.coupling[..rows]) {
@@ -211,7 +212,8 @@ fn sweep<S: Simd>(
 /// allowed.
 #[inline(always)]
 fn are_small<S: Simd>(simd: S, terms: &[Row], rows: usize, order: usize, error: f64) -> bool {
-    let (mut in_lower, mut in_higher) = (simd.splat(0.0), simd.splat(0.0));
+    let mut in_lower = simd.splat(0.0);
+    let mut in_higher = simd.splat(0.0);
     for (lower, higher) in terms[..rows].iter().zip(&terms[rows..]) {
         in_lower = simd.load(lower).abs().larger(in_lower);
         in_higher = simd.load(higher).abs().larger(in_higher);

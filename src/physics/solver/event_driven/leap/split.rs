@@ -12,11 +12,11 @@
 //! hold if S' is positive definite: a bound for each block, and its decay. With a = γ/2 it is sharp unless a mode is
 //! overdamped; then a is halved until S' is positive definite.
 
-use super::chain::{Chain, State};
 use super::elimination::{Elimination, Number, outer};
-use super::layout::FIRST_BLOCK;
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Row};
+use crate::solver::event_driven::chain::{Chain, State};
+use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::segment::ForcePath;
 
@@ -27,7 +27,7 @@ const FIXED: f64 = 1e150;
 
 /// The driven solution of one block: p0 in m, p1 in m/s, q in m, and |q|.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct BlockMotion {
+pub struct BlockMotion {
     pub start: f64,
     pub rate: f64,
     pub wave: [f64; 2],
@@ -36,7 +36,7 @@ pub(super) struct BlockMotion {
 
 /// The motion at the start of a leap, split: driven solution and free motion of a row of blocks.
 #[derive(Clone, Debug)]
-pub(super) struct SplitRow {
+pub struct SplitRow {
     /// p0 in m, p1 in m/s, q in m, and |q|.
     pub start: Row,
     pub rate: [Row; 1],
@@ -49,7 +49,7 @@ pub(super) struct SplitRow {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Split {
+pub struct Split {
     pub rows: Vec<SplitRow>,
     /// The rate a at which the bound on the free motion decays, in 1/s.
     pub decay_rate: f64,
@@ -62,7 +62,8 @@ pub(super) struct Split {
 
 impl Split {
     pub fn new(chain: &Chain) -> Self {
-        let (layout, mut fixed) = (chain.layout, chain.layout.filled(0.0));
+        let layout = chain.layout;
+        let mut fixed = chain.layout.filled(0.0);
         for (row, lane) in (layout.blocks..LANES * layout.rows).map(|block| layout.slot(block)) {
             fixed[row][lane] = FIXED;
         }
@@ -89,18 +90,12 @@ impl Split {
     /// The driven solution of a block.
     pub fn driven(&self, chain: &Chain, block: usize) -> BlockMotion {
         let (row, lane) = chain.layout.slot(block);
-        let SplitRow {
-            start,
-            rate: [rate],
-            wave: [real, imaginary],
-            swing,
-            ..
-        } = &self.rows[row];
+        let row = &self.rows[row];
         BlockMotion {
-            start: start[lane],
-            rate: rate[lane],
-            wave: [real[lane], imaginary[lane]],
-            swing: swing[lane],
+            start: row.start[lane],
+            rate: row.rate[0][lane],
+            wave: [row.wave[0][lane], row.wave[1][lane]],
+            swing: row.swing[lane],
         }
     }
 
@@ -109,16 +104,9 @@ impl Split {
     #[inline(always)]
     pub fn speed_and_compliance(&self, chain: &Chain, drive: &Harmonic, block: usize) -> [f64; 2] {
         let (row, lane) = chain.layout.slot(block);
-        let SplitRow {
-            rate: [rate],
-            swing,
-            compliance,
-            ..
-        } = &self.rows[row];
-        [
-            rate[lane] + drive.angular_frequency * swing[lane],
-            compliance[lane],
-        ]
+        let row = &self.rows[row];
+        let speed = row.rate[0][lane] + drive.angular_frequency * row.swing[lane];
+        [speed, row.compliance[lane]]
     }
 
     /// Splits a state, and bounds the free motion. Returns the largest bound on a displacement, in m; `None` if the free
@@ -133,14 +121,17 @@ impl Split {
     ) -> Option<f64> {
         let shift = simd.splat(self.find_decay(simd, chain)?);
         let cut = self.solve(simd, chain, drive);
-        let (outer, minus_two) = (outer(simd, chain), simd.splat(-2.0));
+        let outer = outer(simd, chain);
+        let minus_two = simd.splat(-2.0);
         let before = cut.to_next_lane().times(outer);
-        let (mut energy, mut y_before, mut y_first) =
-            (simd.splat(0.0), simd.splat(0.0), simd.splat(0.0));
+        let mut energy = simd.splat(0.0);
+        let mut y_before = simd.splat(0.0);
+        let mut y_first = simd.splat(0.0);
         for ((r, row), entry) in self.rows.iter_mut().enumerate().zip(&self.stiffness.rows) {
             let alone = before.mul_add(simd.load(&entry.after[0]), simd.load(&row.start));
             let start = cut.mul_add(simd.load(&entry.before[0]), alone);
-            let (real, imaginary) = (simd.load(&row.wave[0]), simd.load(&row.wave[1]));
+            let real = simd.load(&row.wave[0]);
+            let imaginary = simd.load(&row.wave[1]);
             start.store(&mut row.start);
             let y = simd.load(&state.displacement[r]).minus(start).minus(real);
             // d/dt Re(q e^{iωt}) = -ω Im q at the start.
@@ -200,7 +191,8 @@ impl Split {
         );
         if drive.amplitude > 0.0 {
             let (sine, cosine) = libm::sincos(drive.phase);
-            let (frequency, force) = (drive.angular_frequency, pulling * drive.amplitude);
+            let frequency = drive.angular_frequency;
+            let force = pulling * drive.amplitude;
             complex.eliminate(
                 simd,
                 chain,
@@ -210,7 +202,8 @@ impl Split {
             let waves = rows.iter_mut().map(|row| &mut row.wave);
             complex.pull_first(simd, chain, [force * cosine, force * sine], waves);
             for row in rows.iter_mut() {
-                let (real, imaginary) = (simd.load(&row.wave[0]), simd.load(&row.wave[1]));
+                let real = simd.load(&row.wave[0]);
+                let imaginary = simd.load(&row.wave[1]);
                 real.mul_add(real, imaginary.times(imaginary))
                     .root()
                     .store(&mut row.swing);
@@ -258,7 +251,9 @@ impl Split {
             gain: [gain],
             ..
         } = &self.shifted;
-        let (outer, coupling, after) = (outer(simd, chain), simd.load(coupling), simd.load(gain));
+        let outer = outer(simd, chain);
+        let coupling = simd.load(coupling);
+        let after = simd.load(gain);
         let before = after.to_next_lane();
         let product = coupling.times(before).times(after);
         let root = product
@@ -270,10 +265,8 @@ impl Split {
             .over(root.plus(simd.splat(1.0)));
         let mut largest = simd.splat(0.0);
         for (row, entry) in self.rows.iter_mut().zip(entries) {
-            let (along, back) = (
-                simd.load(&entry.after[0]).times(outer),
-                simd.load(&entry.before[0]),
-            );
+            let along = simd.load(&entry.after[0]).times(outer);
+            let back = simd.load(&entry.before[0]);
             let mixed = along.mul_add(before, back.times(twice_mixed));
             let own = back
                 .times(after)
@@ -310,16 +303,10 @@ impl BlockMotion {
             return f64::INFINITY;
         }
         let phase = libm::atan2(self.wave[1], self.wave[0]);
-        let Self {
-            start,
-            rate,
-            swing: amplitude,
-            ..
-        } = *self;
         let motion = Harmonic {
-            start,
-            rate,
-            amplitude,
+            start: self.start,
+            rate: self.rate,
+            amplitude: self.swing,
             phase,
             angular_frequency: drive.angular_frequency,
         };
@@ -363,9 +350,9 @@ impl BlockMotion {
 
 #[cfg(test)]
 mod tests {
-    use super::super::slider::Slider;
     use super::*;
     use crate::model::Parameters;
+    use crate::solver::event_driven::slider::Slider;
     use pulp::Scalar512b as Baseline;
 
     /// Pseudo-random numbers in [0, 1).
@@ -420,7 +407,8 @@ mod tests {
         equation: impl Fn(usize) -> Equation,
         solution: impl Fn(usize) -> [f64; 2],
     ) -> f64 {
-        let (blocks, coupling) = (chain.layout.blocks, chain.coupling[0][0]);
+        let blocks = chain.layout.blocks;
+        let coupling = chain.coupling[0][0];
         let mut worst = 0.0_f64;
         for block in 0..blocks {
             let ([real, imaginary], right) = equation(block);
@@ -459,10 +447,8 @@ mod tests {
                 })
                 .collect()
         };
-        let (behind, ahead) = (
-            pivots(&mut entries.iter().copied()),
-            pivots(&mut entries.iter().rev().copied()),
-        );
+        let behind = pivots(&mut entries.iter().copied());
+        let ahead = pivots(&mut entries.iter().rev().copied());
         let is_definite = behind
             .iter()
             .zip(&entries)
@@ -522,7 +508,8 @@ mod tests {
             );
         }
         let driven = |block: usize| split.driven(&chain, block);
-        let (pulling, frequency) = (chain.drive_stiffness / chain.mass, drive.angular_frequency);
+        let pulling = chain.drive_stiffness / chain.mass;
+        let frequency = drive.angular_frequency;
         let first = |block: usize, force: f64| if block == 0 { pulling * force } else { 0.0 };
         let stiffness = |block: usize| chain.at(&chain.diagonal, block);
         let missed = [
@@ -563,7 +550,9 @@ mod tests {
             "{what:?}: {missed:?}"
         );
         let inverse = inverse_diagonal(&chain, shift(rate)).unwrap();
-        let (mut twice_energy, mut before, mut widest) = (0.0, 0.0, 0.0_f64);
+        let mut twice_energy = 0.0;
+        let mut before = 0.0;
+        let mut widest = 0.0_f64;
         for block in 0..parameters.blocks {
             let (row, lane) = chain.layout.slot(block);
             let BlockMotion {

@@ -1,15 +1,15 @@
 //! The Taylor series of a step: x(t + s h) = Σ Y_p s^p/p! for s in [0, 1], with Y_p = h^p x^(p); its values, and
-//! which blocks may break. [`super::taylor`] computes it.
+//! which blocks may break. [`super::recurrence`] computes it.
 
-use super::chain::{Chain, State};
-use super::layout::Layout;
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
+use crate::solver::event_driven::chain::{Chain, State};
+use crate::solver::event_driven::lane_layout::Layout;
 use crate::solver::polynomial::{INVERSE, MAX_COEFFICIENTS};
 use pulp::Scalar512b;
 
 /// 1/p!.
-pub(super) const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
+pub const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
     let mut inverse = [1.0; MAX_COEFFICIENTS];
     let mut p = 1;
     while p < MAX_COEFFICIENTS {
@@ -21,7 +21,7 @@ pub(super) const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
 
 /// The drive's displacement U over a step: h^p U^(p), order after order, in m.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct DriveDerivatives {
+pub struct DriveDerivatives {
     /// Ramp at the start, and its rise over the step.
     pub ramp: [f64; 2],
     /// Δ cos θ and -Δ sin θ at the phase θ of the start.
@@ -43,7 +43,7 @@ impl DriveDerivatives {
 
 /// The series of one step.
 #[derive(Clone, Debug)]
-pub(super) struct Series {
+pub struct Series {
     pub rows: usize,
     /// Rows of Y_0, then of Y_1, and so on, in m.
     pub terms: Vec<Row>,
@@ -74,6 +74,12 @@ impl Series {
         if R == 0 { self.rows } else { R }
     }
 
+    /// The rows of one order, of which there are `rows`.
+    #[inline(always)]
+    fn order_terms(&self, order: usize, rows: usize) -> &[Row] {
+        &self.terms[order * rows..][..rows]
+    }
+
     /// Writes the coefficients Y_p/p! of one block, in m.
     pub fn block(&self, row: usize, lane: usize, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
@@ -98,7 +104,9 @@ impl Series {
 
     /// Adds to the first coefficients Y_p/p! of one block, in m. The order is at least that of the last.
     pub fn add(&mut self, row: usize, lane: usize, coefficients: &[f64]) {
-        let (mut at, mut factorial, mut order) = (row, 1.0, 0.0);
+        let mut at = row;
+        let mut factorial = 1.0;
+        let mut order = 0.0;
         for coefficient in coefficients {
             self.terms[at][lane] += factorial * coefficient;
             self.excursion[row][lane] += coefficient.abs();
@@ -110,7 +118,8 @@ impl Series {
 
     /// Lower and upper bound on the displacement of one block within the step, in m.
     pub fn range(&self, row: usize, lane: usize) -> [f64; 2] {
-        let (start, excursion) = (self.terms[row][lane], self.excursion[row][lane]);
+        let start = self.terms[row][lane];
+        let excursion = self.excursion[row][lane];
         [start - excursion, start + excursion]
     }
 
@@ -130,12 +139,10 @@ impl Series {
     }
 }
 
-/// Rows that are taken through all orders together, since their sums need not wait for each other.
-const ROWS: usize = 3;
-
-/// State at s in [0, 1] of a step of `length` s.
+/// State at s in [0, 1] of a step of `length` s: Horner's scheme, nested, Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same
+/// from Y_1 for the slope.
 #[inline(always)]
-pub(super) fn evaluate<S: Simd, const R: usize>(
+pub fn evaluate<S: Simd, const R: usize>(
     simd: S,
     series: &Series,
     s: f64,
@@ -143,120 +150,72 @@ pub(super) fn evaluate<S: Simd, const R: usize>(
     state: &mut State,
 ) {
     let rows = series.rows_in::<R>();
-    let mut r = 0;
-    while r + ROWS <= rows {
-        evaluate_rows::<S, ROWS>(simd, series, rows, r, s, length, state);
-        r += ROWS;
-    }
-    while r < rows {
-        evaluate_rows::<S, 1>(simd, series, rows, r, s, length, state);
-        r += 1;
-    }
-}
-
-/// Horner's scheme, nested: Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same from Y_1 for the slope.
-#[inline(always)]
-fn evaluate_rows<S: Simd, const G: usize>(
-    simd: S,
-    series: &Series,
-    rows: usize,
-    first: usize,
-    s: f64,
-    length: f64,
-    state: &mut State,
-) {
     let order = series.order;
-    let inverse_length = simd.splat(1.0 / length);
-    let mut at = order * rows + first;
-    let mut value = [simd.splat(0.0); G];
-    for (value, term) in value.iter_mut().zip(&series.terms[at..at + G]) {
-        *value = simd.load(term);
+    let values = &mut state.displacement[..rows];
+    let slopes = &mut state.velocity[..rows];
+    let last = series.order_terms(order, rows);
+    for r in 0..rows {
+        let term = simd.load(&last[r]);
+        term.store(&mut values[r]);
+        term.store(&mut slopes[r]);
     }
-    let mut slope = value;
-    let mut for_value = simd.splat(s * INVERSE[order]);
-    for inverse in INVERSE[1..order].iter().rev() {
-        at -= rows;
-        let for_slope = simd.splat(s * inverse);
-        for ((value, slope), term) in value
-            .iter_mut()
-            .zip(&mut slope)
-            .zip(&series.terms[at..at + G])
-        {
-            let term = simd.load(term);
-            *value = value.mul_add(for_value, term);
-            *slope = slope.mul_add(for_slope, term);
+    for p in (1..order).rev() {
+        let for_value = simd.splat(s * INVERSE[p + 1]);
+        let for_slope = simd.splat(s * INVERSE[p]);
+        let terms = series.order_terms(p, rows);
+        for r in 0..rows {
+            let term = simd.load(&terms[r]);
+            let value = simd.load(&values[r]).mul_add(for_value, term);
+            let slope = simd.load(&slopes[r]).mul_add(for_slope, term);
+            value.store(&mut values[r]);
+            slope.store(&mut slopes[r]);
         }
-        for_value = for_slope;
     }
-    for ((value, term), x) in value
-        .iter()
-        .zip(&series.terms[first..first + G])
-        .zip(&mut state.displacement[first..first + G])
-    {
-        value.mul_add(for_value, simd.load(term)).store(x);
-    }
-    for (slope, v) in slope.iter().zip(&mut state.velocity[first..first + G]) {
-        slope.times(inverse_length).store(v);
+    let for_value = simd.splat(s * INVERSE[1]);
+    let inverse_length = simd.splat(1.0 / length);
+    let first = series.order_terms(0, rows);
+    for r in 0..rows {
+        let value = simd
+            .load(&values[r])
+            .mul_add(for_value, simd.load(&first[r]));
+        let slope = simd.load(&slopes[r]).times(inverse_length);
+        value.store(&mut values[r]);
+        slope.store(&mut slopes[r]);
     }
 }
 
 /// Row and lane of every block that may reach a break position within the step.
 #[inline(always)]
-pub(super) fn reachable<S: Simd, const R: usize>(
+pub fn reachable<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     series: &mut Series,
     blocks: &mut Vec<(usize, usize)>,
 ) {
     let rows = series.rows_in::<R>();
-    blocks.clear();
-    let mut r = 0;
-    while r + ROWS <= rows {
-        reachable_rows::<S, ROWS>(simd, chain, series, rows, r, blocks);
-        r += ROWS;
-    }
-    while r < rows {
-        reachable_rows::<S, 1>(simd, chain, series, rows, r, blocks);
-        r += 1;
-    }
-}
-
-#[inline(always)]
-fn reachable_rows<S: Simd, const G: usize>(
-    simd: S,
-    chain: &Chain,
-    series: &mut Series,
-    rows: usize,
-    first: usize,
-    blocks: &mut Vec<(usize, usize)>,
-) {
-    let order = series.order;
-    let mut excursion = [simd.splat(0.0); G];
-    let mut at = first;
-    for inverse in &INVERSE_FACTORIAL[1..=order] {
-        at += rows;
+    let (starts, later) = series.terms.split_at(rows);
+    let excursion = &mut series.excursion[..rows];
+    excursion.fill(Row::filled(0.0));
+    for (terms, inverse) in later
+        .chunks_exact(rows)
+        .zip(&INVERSE_FACTORIAL[1..=series.order])
+    {
         let weight = simd.splat(*inverse);
-        for (excursion, term) in excursion.iter_mut().zip(&series.terms[at..at + G]) {
-            *excursion = simd.load(term).abs().mul_add(weight, *excursion);
+        for r in 0..rows {
+            let sum = simd.load(&excursion[r]);
+            let term = simd.load(&terms[r]).abs();
+            term.mul_add(weight, sum).store(&mut excursion[r]);
         }
     }
-    let own = first..first + G;
-    let (bounds, starts) = (
-        &mut series.excursion[own.clone()],
-        &series.terms[own.clone()],
-    );
-    let (upper, lower) = (&chain.upper[own.clone()], &chain.lower[own]);
-    let mut reached = [0; G];
-    for g in 0..G {
-        excursion[g].store(&mut bounds[g]);
-        let x = simd.load(&starts[g]);
-        let above = x.plus(excursion[g]).reaches(simd.load(&upper[g]));
-        let below = simd.load(&lower[g]).reaches(x.minus(excursion[g]));
-        reached[g] = above | below;
-    }
-    for (g, mut reached) in reached.into_iter().enumerate() {
+    blocks.clear();
+    for r in 0..rows {
+        let x = simd.load(&starts[r]);
+        let excursion = simd.load(&excursion[r]);
+        let above = x.plus(excursion).reaches(simd.load(&chain.upper[r]));
+        let below = simd.load(&chain.lower[r]).reaches(x.minus(excursion));
+        let mut reached = above | below;
         while reached != 0 {
-            blocks.push((first + g, reached.trailing_zeros() as usize));
+            blocks.push((r, reached.trailing_zeros() as usize));
             reached &= reached - 1;
         }
     }

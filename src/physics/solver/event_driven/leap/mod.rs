@@ -1,15 +1,20 @@
 //! Leaps over quiet time along the driven solution.
 //!
-//! Between events the motion is a driven solution and a free motion about it, which decays and is bounded for each block ([`super::split`]). A leap may therefore start while the free motion is still
-//! large, if the bound shows that meanwhile no block reaches a break position, and that the shear force has been or
-//! will be larger than it can be meanwhile. What is left of the free motion when the next event comes
-//! has fallen under the tolerance, and is dropped.
-//! Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at its end, no event on the way,
-//! and no largest shear force.
+//! Setting: `tolerance`. Method: between events the motion is a driven solution and a free motion about it, which decays and
+//! is bounded for each block ([`split`], where the bound is derived). So a leap may start while the free motion is still
+//! large, if the bound shows that no block reaches a break position meanwhile, and that the shear force has been or will be
+//! larger than it can be meanwhile. When the next event comes, the rest of the free motion is below the tolerance and is
+//! dropped. Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at its end, no event on the
+//! way, and no largest shear force.
 
+mod elimination;
+mod split;
+
+pub(super) use self::split::Split;
+
+use self::split::SplitRow;
 use super::chain::{Chain, State};
 use super::slider::Slider;
-use super::split::{Split, SplitRow};
 use crate::model::Interface;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::harmonic::Harmonic;
@@ -67,9 +72,13 @@ fn passing_horizon(
     largest: f64,
 ) -> Result<f64, f64> {
     let loose = libm::log(largest / (LOOSE * error)) / split.decay_rate;
-    let (allowed, per_mass) = (PASSED_SHARE * error, 1.0 / chain.mass);
-    let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, most);
-    interface.look_ahead_to_lives(|due, block, [stiffness, reach]| {
+    let allowed = PASSED_SHARE * error;
+    let per_mass = 1.0 / chain.mass;
+    let mut displaced = 0.0;
+    let mut rate = 0.0;
+    let mut last = 0.0;
+    let mut limit = most;
+    interface.look_ahead(|due, block, life| {
         let seconds = due - start;
         let by_then = displaced + rate * (seconds - last);
         if seconds >= limit || by_then > allowed {
@@ -81,9 +90,9 @@ fn passing_horizon(
         }
         (displaced, last) = (by_then, seconds);
         let [speed, compliance] = split.speed_and_compliance(chain, drive, block);
-        rate += per_mass * stiffness * speed * compliance;
+        rate += per_mass * life.stiffness * speed * compliance;
         // Nor may it break.
-        limit = limit.min(seconds + (reach - ASTRAY * error).max(0.0) / speed);
+        limit = limit.min(seconds + (life.reach - ASTRAY * error).max(0.0) / speed);
         true
     });
     let horizon = if rate > 0.0 {
@@ -98,7 +107,7 @@ fn passing_horizon(
     }
 }
 
-/// Looks for a leap under a drive that moves as given. The free motion of a block is at most `largest` m. If there is none,
+/// Looks for a leap under a drive that moves as given, with free motion of a block of at most `largest` m. Without one, returns
 /// after how many seconds to look again.
 #[inline(always)]
 fn plan<S: Simd>(
@@ -208,9 +217,9 @@ fn hides_no_peak<S: Simd>(
     let mut ahead = (moving + further).min(until_cycle_end);
     if ahead > horizon {
         // Nor does a contact break that attaches on the way.
-        interface.look_ahead_to_lives(|due, block, [_, reach]| {
-            ahead =
-                ahead.min(due - start + reach / split.speed_and_compliance(chain, drive, block)[0]);
+        interface.look_ahead(|due, block, life| {
+            let [speed, _] = split.speed_and_compliance(chain, drive, block);
+            ahead = ahead.min(due - start + life.reach / speed);
             due - start < ahead
         });
     }
@@ -253,14 +262,13 @@ pub(super) fn leap<S: Simd>(
 /// bound remains.
 #[inline(always)]
 fn stays_clear<S: Simd>(simd: S, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool {
-    let (seconds, left) = (simd.splat(seconds), simd.splat(left));
+    let seconds = simd.splat(seconds);
+    let left = simd.splat(left);
     let mut clear = u8::MAX;
     for ((row, upper), lower) in split.rows.iter().zip(&chain.upper).zip(&chain.lower) {
-        let (start, bound, swing) = (
-            simd.load(&row.start),
-            simd.load(&row.bound),
-            simd.load(&row.swing),
-        );
+        let start = simd.load(&row.start);
+        let bound = simd.load(&row.bound);
+        let swing = simd.load(&row.swing);
         // Ramp and decaying bound together are convex in time: largest at the ends.
         let late = start
             .plus(simd.load(&row.rate[0]).times(seconds))
@@ -281,8 +289,10 @@ fn first_reached<S: Simd>(
     drive: &Harmonic,
     [decay, horizon]: [f64; 2],
 ) -> (f64, Option<usize>) {
-    let (mut first, mut until) = ((horizon, None), f64::NAN);
-    let (mut ends, mut bend) = ([(0.0, 0.0); 2], 0.0);
+    let mut first = (horizon, None);
+    let mut until = f64::NAN;
+    let mut ends = [(0.0, 0.0); 2];
+    let mut bend = 0.0;
     for (r, row) in split.rows.iter().enumerate() {
         if until != first.0 {
             // The cosine exceeds its ends by no more than it bends in between; over long times it is anything up to |q|.
@@ -296,7 +306,8 @@ fn first_reached<S: Simd>(
             };
             bend = if is_short { 0.5 * half * half } else { 1.0 };
         }
-        let (start, rate) = (simd.load(&row.start), simd.load(&row.rate[0]));
+        let start = simd.load(&row.start);
+        let rate = simd.load(&row.rate[0]);
         let from = start
             .plus(rate.times(simd.splat(decay)))
             .plus(turned(simd, row, ends[0]));
@@ -304,7 +315,8 @@ fn first_reached<S: Simd>(
             .plus(rate.times(simd.splat(until)))
             .plus(turned(simd, row, ends[1]));
         let beyond = simd.load(&row.swing).times(simd.splat(bend));
-        let (highest, lowest) = (from.larger(to).plus(beyond), from.smaller(to).minus(beyond));
+        let highest = from.larger(to).plus(beyond);
+        let lowest = from.smaller(to).minus(beyond);
         let mut lanes = highest.reaches(simd.load(&chain.upper[r]))
             | simd.load(&chain.lower[r]).reaches(lowest);
         while lanes != 0 {
@@ -331,14 +343,16 @@ fn follow<S: Simd>(simd: S, split: &Split, drive: &Harmonic, elapsed: f64, state
     } else {
         (0.0, 1.0)
     };
-    let (elapsed, frequency) = (simd.splat(elapsed), simd.splat(drive.angular_frequency));
+    let elapsed = simd.splat(elapsed);
+    let frequency = simd.splat(drive.angular_frequency);
     for ((row, x), v) in split
         .rows
         .iter()
         .zip(&mut state.displacement)
         .zip(&mut state.velocity)
     {
-        let (start, rate) = (simd.load(&row.start), simd.load(&row.rate[0]));
+        let start = simd.load(&row.start);
+        let rate = simd.load(&row.rate[0]);
         start
             .plus(rate.times(elapsed))
             .plus(turned(simd, row, (sine, cosine)))
@@ -360,7 +374,7 @@ fn turned<S: Simd>(simd: S, row: &SplitRow, (sine, cosine): (f64, f64)) -> S::Ve
 
 #[cfg(test)]
 mod tests {
-    use super::super::split::BlockMotion;
+    use super::split::BlockMotion;
     use super::*;
     use crate::model::Parameters;
     use pulp::Scalar512b as Baseline;

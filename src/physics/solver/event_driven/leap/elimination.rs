@@ -19,17 +19,17 @@
 //!
 //! All pivots are positive if the matrix is positive definite, and only then. None grows with the length of the chain.
 
-use super::chain::Chain;
-use super::layout::FIRST_BLOCK;
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
+use crate::solver::event_driven::chain::Chain;
+use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
 
 /// Part of its diagonal entry that a pivot must exceed: less is rounding, and the matrix not surely positive definite.
 const MIN_PIVOT: f64 = 1e-12;
 
 /// A real (C = 1) or complex (C = 2) number in every lane.
 #[derive(Clone, Copy)]
-pub(super) struct Number<S: Simd, const C: usize>(pub S, pub [S::Vector; C]);
+pub struct Number<S: Simd, const C: usize>(pub S, pub [S::Vector; C]);
 
 /// Loops, since closures may be compiled without the features of the token.
 impl<S: Simd, const C: usize> Number<S, C> {
@@ -78,7 +78,8 @@ impl<S: Simd, const C: usize> Number<S, C> {
     fn plus_product(self, left: Self, right: Self) -> Self {
         let mut sum = self.plus_scaled(left, right.1[0]);
         if C > 1 {
-            let (across, minus) = (right.1[C - 1], self.0.splat(0.0).minus(left.1[C - 1]));
+            let across = right.1[C - 1];
+            let minus = self.0.splat(0.0).minus(left.1[C - 1]);
             sum.1[0] = minus.mul_add(across, sum.1[0]);
             sum.1[C - 1] = left.1[0].mul_add(across, sum.1[C - 1]);
         }
@@ -125,7 +126,7 @@ impl<S: Simd, const C: usize> Number<S, C> {
 
 /// What elimination leaves of a row: 1/p, k, H, y H and b.
 #[derive(Clone, Debug)]
-pub(super) struct Eliminated<const C: usize> {
+pub struct Eliminated<const C: usize> {
     pub inverse: [Row; C],
     pub ratio: [Row; C],
     pub own: [Row; C],
@@ -135,7 +136,7 @@ pub(super) struct Eliminated<const C: usize> {
 
 /// The chain with a diagonal of real or complex numbers, eliminated.
 #[derive(Clone, Debug)]
-pub(super) struct Elimination<const C: usize> {
+pub struct Elimination<const C: usize> {
     pub rows: Vec<Eliminated<C>>,
     /// y in the last row, and F.
     carried: [Row; C],
@@ -174,12 +175,17 @@ impl<const C: usize> Elimination<C> {
         shift: [f64; C],
     ) -> bool {
         let rows = chain.layout.rows;
-        let (entries, couplings) = (&mut self.rows[..rows], &chain.coupling[..rows]);
-        let (zero, shift) = (Number::splat(simd, [0.0; C]), Number::splat(simd, shift));
+        let entries = &mut self.rows[..rows];
+        let couplings = &chain.coupling[..rows];
+        let zero = Number::splat(simd, [0.0; C]);
+        let shift = Number::splat(simd, shift);
         let mut one = zero;
         one.1[0] = simd.splat(1.0);
-        let (mut ratio, mut along, mut pivot) = (zero, one, zero);
-        let (mut least, mut positive) = (simd.splat(0.0), u8::MAX);
+        let mut ratio = zero;
+        let mut along = one;
+        let mut pivot = zero;
+        let mut least = simd.splat(0.0);
+        let mut positive = u8::MAX;
         for r in 0..rows {
             let mut entry = shift;
             entry.1[0] = entry.1[0]
@@ -200,7 +206,8 @@ impl<const C: usize> Elimination<C> {
             }
         }
         along.store(&mut self.carried);
-        let (mut own, mut before) = (zero, one);
+        let mut own = zero;
+        let mut before = one;
         for (r, entry) in entries.iter_mut().enumerate().rev() {
             if r + 1 < rows {
                 let ratio = Number::load(simd, &entry.ratio);
@@ -272,7 +279,7 @@ impl<const C: usize> Elimination<C> {
 
 /// Coupling of the first row to the block before, which lies in the last row of the lane before.
 #[inline(always)]
-pub(super) fn outer<S: Simd>(simd: S, chain: &Chain) -> S::Vector {
+pub fn outer<S: Simd>(simd: S, chain: &Chain) -> S::Vector {
     simd.load(&chain.coupling[0])
         .to_lane_before()
         .to_next_lane()

@@ -1,9 +1,8 @@
 //! The moving frame: time, displacement and drive, counted from an origin that follows the slider, so that neither time
 //! nor displacement loses digits in long runs.
 
-use super::grid::GridDrive;
-use super::series::DriveDerivatives;
-use crate::model::{ContactEvent, Drive};
+use super::taylor::DriveDerivatives;
+use crate::model::{ContactChange, Drive};
 use crate::solver::harmonic::Harmonic;
 
 /// Time in the frame at which it moves where Taylor steps locate events to rounding, in s.
@@ -13,6 +12,71 @@ pub(super) const MIN_RESOLUTION: f64 = 1_048_576.0;
 /// The frame moves by multiples of these, so that its sums are exact: 2^-20 s and 2^-40 m.
 const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
 const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
+
+/// The drive's displacement at a point of the grid, and what takes it to the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct GridDrive {
+    /// Displacement of the ramp, in m, and its rise in a step.
+    pub ramp: [f64; 2],
+    /// Δ cos θ and -Δ sin θ at the phase θ, in m.
+    pub swing: [f64; 2],
+    /// Sine and cosine of the turn ωh of a step.
+    pub turn: [f64; 2],
+    /// ωh, in rad; 0 without modulation.
+    pub angle: f64,
+}
+
+impl GridDrive {
+    /// Displacement, in m.
+    #[inline(always)]
+    pub fn displacement(&self) -> f64 {
+        self.ramp[0] + self.swing[0]
+    }
+
+    /// Displacement one step before, in m.
+    #[inline(always)]
+    pub fn displacement_before(&self) -> f64 {
+        (self.ramp[0] - self.ramp[1]) + self.swing_before()
+    }
+
+    /// Δ cos θ one step before, in m.
+    #[inline(always)]
+    fn swing_before(&self) -> f64 {
+        self.swing[0] * self.turn[1] - self.swing[1] * self.turn[0]
+    }
+
+    /// h² u'' one step before, in m.
+    #[inline(always)]
+    pub fn bend_before(&self) -> f64 {
+        -self.angle * self.angle * self.swing_before()
+    }
+
+    /// h u', in m.
+    #[inline(always)]
+    pub fn increment(&self) -> f64 {
+        self.ramp[1] + self.angle * self.swing[1]
+    }
+
+    /// h² u'', in m.
+    #[inline(always)]
+    pub fn bend(&self) -> f64 {
+        -self.angle * self.angle * self.swing[0]
+    }
+
+    /// Moves on by a step.
+    #[inline(always)]
+    pub fn advance(&mut self) {
+        self.ramp[0] += self.ramp[1];
+        if self.angle != 0.0 {
+            let ([sine, cosine], [along, across]) = (self.turn, self.swing);
+            // Δ cos(θ + ωh) and -Δ sin(θ + ωh).
+            self.swing = [
+                along * cosine + across * sine,
+                across * cosine - along * sine,
+            ];
+        }
+    }
+}
 
 /// The frame, and the drive in it.
 #[derive(Clone, Debug)]
@@ -69,14 +133,13 @@ impl Frame {
         self.origin_displacement + displacement
     }
 
-    /// An event of the frame with time and displacement counted from the start of the run.
+    /// A change in the frame with time and displacement counted from the start of the run.
     #[inline]
-    pub fn absolute(&self, event: ContactEvent) -> ContactEvent {
-        let time = self.absolute_time(event.time);
-        ContactEvent {
-            time,
-            displacement: self.absolute_displacement(event.displacement),
-            ..event
+    pub fn absolute(&self, change: ContactChange) -> ContactChange {
+        ContactChange {
+            time: self.absolute_time(change.time),
+            displacement: self.absolute_displacement(change.displacement),
+            ..change
         }
     }
 
@@ -141,18 +204,12 @@ impl Frame {
 
     /// The drive's displacement from now on, within the cycle, in m.
     pub fn drive_motion(&self) -> Harmonic {
-        let Drive {
-            velocity,
-            amplitude,
-            angular_frequency,
-            ..
-        } = self.drive;
         Harmonic {
             start: self.ramp(),
-            rate: velocity,
-            amplitude,
+            rate: self.drive.velocity,
+            amplitude: self.drive.amplitude,
             phase: self.phase(),
-            angular_frequency,
+            angular_frequency: self.drive.angular_frequency,
         }
     }
 

@@ -1,4 +1,8 @@
-//! One Taylor step, and the contact events within it.
+//! Taylor steps: motion as a series in time ([`series`], [`recurrence`]), each step up to its next contact events.
+//!
+//! Setting: `tolerance`, of which each step may take a share ([`super::tolerances`]). Method: Taylor series to the order at
+//! which they converge, as described by À. Jorba and M. Zou, Exp. Math. 14, 99 (2005); a bound on each block's motion
+//! isolates the first crossing of a break position ([`super::crossing`]).
 //!
 //! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of
 //! k_i a_i over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and
@@ -11,15 +15,20 @@
 //!
 //! and by terms of higher order that spread along the chain. As long as these stay below a small part of the error of a
 //! step, the event is merged into it: the change is added to the series, which stays accurate after the event. The step
-//! ends where it would no longer be. Contract: events in the right order, also of blocks whose series has changed.
+//! ends where the series would no longer be accurate. Contract: events in the right order, also of blocks whose series has
+//! changed.
+
+mod recurrence;
+mod series;
+
+pub(super) use self::recurrence::{StepInput, expand};
+pub(super) use self::series::{DriveDerivatives, Series, evaluate, reachable};
 
 use super::Integration;
 use super::chain::Chain;
 use super::crossing::first_exit;
-use super::layout::Layout;
-use super::series::Series;
+use super::lane_layout::Layout;
 use super::slider::Slider;
-use super::taylor::StepInput;
 use crate::model::Change;
 use crate::solver::polynomial;
 use crate::solver::segment::{ForceAt, ForcePath, Segment};
@@ -173,7 +182,8 @@ impl Integration<'_> {
         let until_attach = self.slider.interface.next_reattachment() - self.frame.time
             + self.control.attach_window;
         self.expand(horizon.min(until_attach))?;
-        let (start, length) = (self.step.start, self.step.length);
+        let start = self.step.start;
+        let length = self.step.length;
         if !self.frame.resolves(length) {
             return Err(SimulationError::StepTooShort {
                 time: self.frame.now(),
@@ -181,7 +191,9 @@ impl Integration<'_> {
             });
         }
         self.summary.steps += 1;
-        let (mut done, mut end, mut merged) = (0.0, (horizon / length).min(1.0), 0);
+        let mut done = 0.0;
+        let mut end = (horizon / length).min(1.0);
+        let mut merged = 0;
         let mut force = ForceAt {
             force: self.step.force[0],
             integral: 0.0,
@@ -207,8 +219,8 @@ impl Integration<'_> {
                 _ if due <= end => self
                     .slider
                     .interface
-                    .next_reattachment_block()
-                    .map(|block| (Change::Attach, block, due)),
+                    .next_reattachment_by(f64::INFINITY)
+                    .map(|(_, block)| (Change::Attach, block, due)),
                 _ => None,
             };
             let s = event.map_or(end, |(_, _, s)| s);
@@ -261,7 +273,8 @@ impl Integration<'_> {
         force: ForceAt,
         observer: &mut dyn Observer,
     ) -> ForceAt {
-        let (start, length) = (self.step.start, self.step.length);
+        let start = self.step.start;
+        let length = self.step.length;
         let end_force = ForceAt::new(&self.step.force, last);
         observer.advance(&Segment {
             start: self.frame.absolute_time(start + first * length),
@@ -291,10 +304,8 @@ impl Integration<'_> {
         observer: &mut dyn Observer,
     ) -> f64 {
         let [x, slope, half_curvature] = self.step.expanded(&self.slider.chain, block, s);
-        let (stiffness, pull) = (
-            self.slider.interface.block_stiffness[block],
-            self.slider.interface.block_pull[block],
-        );
+        let stiffness = self.slider.interface.block_stiffness[block];
+        let pull = self.slider.interface.block_pull[block];
         match change {
             Change::Break => {
                 let mean = self.step.series.mean(&self.slider.chain, s);
@@ -305,8 +316,9 @@ impl Integration<'_> {
         if self.step.series.order < MERGED_ORDER {
             return 0.0;
         }
-        let (chain, interface, length) =
-            (&self.slider.chain, &self.slider.interface, self.step.length);
+        let chain = &self.slider.chain;
+        let interface = &self.slider.interface;
+        let length = self.step.length;
         let square = length * length;
         let stiffened = (interface.block_stiffness[block] - stiffness) * square / chain.mass;
         let pulled = (interface.block_pull[block] - pull) * square / chain.mass;
@@ -340,7 +352,8 @@ impl Integration<'_> {
     pub(super) fn expand(&mut self, horizon: f64) -> Result<(), SimulationError> {
         let max_step = self.tolerances.max_step;
         let wanted = self.control.typical_advance.min(horizon).min(max_step);
-        let (mut halvings, mut length) = (0, max_step);
+        let mut halvings = 0;
+        let mut length = max_step;
         while halvings < MAX_HALVINGS && 0.5 * length >= wanted {
             halvings += 1;
             length *= 0.5;

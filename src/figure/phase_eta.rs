@@ -1,11 +1,12 @@
-//! φ against η (Fig. 3e): the density of slips, the back-bone of Eq. 2, and averages over sets that have a phase.
+//! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and averages over sets that have a phase.
 
 use super::axis::{Axis, angle_bounds, bounds};
 use super::colour_bar::ColourBar;
-use super::frame::{Layout, OVERLAP};
+use super::frame::{Cell, Ends, Layout, OVERLAP, Place};
+use super::ink::{Dot, Stroke};
 use super::legend::{Mark, entry};
-use super::panel::{self, Cell, Ends, Layer, Panel, Place};
-use super::picture::{Dot, Picture, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
 use super::sets::Grid;
 use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
@@ -34,7 +35,7 @@ const FAINTEST: f64 = 0.25 / (2.0 * PI);
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
-pub(super) fn backbone(
+pub(super) fn phase_eta(
     points: &[Point],
     bins: &[BackboneBin],
     sets: &[SetRow],
@@ -166,7 +167,8 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
             .into_iter()
             .zip(values);
         let clipped = |((low, high), eta): ((f64, f64), f64)| {
-            let (low, high) = (low.max(eta / WIDEST), high.min(eta * WIDEST));
+            let low = low.max(eta / WIDEST);
+            let high = high.min(eta * WIDEST);
             // None reaches over η = 1, where the load begins to fall in each period.
             (
                 if eta > SAME { low.max(1.0) } else { low },
@@ -181,10 +183,8 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     }
     let place = |eta: f64| libm::log10(eta) * COLUMNS_PER_DECADE;
     #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
-    let (first, last) = (
-        place(values[0]).floor() as i32,
-        place(values[values.len() - 1]).floor() as i32,
-    );
+    let first = place(values[0]).floor() as i32;
+    let last = place(values[values.len() - 1]).floor() as i32;
     let edge = |column: i32| libm::exp10(f64::from(column) / COLUMNS_PER_DECADE);
     (first..=last)
         .map(|column| (edge(column), edge(column + 1)))

@@ -1,7 +1,7 @@
-//! What a command of accuracy leaves behind: everything as JSON, and figures.
+//! The files of a study: everything as JSON, and figures.
 
 use super::study::{Findings, MethodRow, Study};
-use super::{cost, other_settings, verdict};
+use super::{other_settings, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::destination::{Destination, Kind, refuse_reserved};
@@ -15,12 +15,25 @@ use std::sync::atomic::AtomicBool;
 
 const FORMAT: u32 = 6;
 
+/// Name of the processor as the operating system gives it, and the architecture.
+pub fn processor() -> String {
+    let description = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let field = |key: &str| {
+        let line = description.lines().find(|line| line.starts_with(key))?;
+        line.split_once(':')
+            .map(|(_, value)| value.trim().to_owned())
+    };
+    let name = field("model name").unwrap_or_else(|| "unknown processor".to_owned());
+    let clock = field("cpu MHz").map_or_else(String::new, |clock| format!(", {clock} MHz"));
+    format!("{name} ({}{clock})", std::env::consts::ARCH)
+}
+
 /// What a study found, as JSON.
 pub fn to_json(study: &Study, findings: &Findings) -> Value {
     json!({
         "format": FORMAT,
         "program": PROGRAM,
-        "processor": cost::processor(),
+        "processor": processor(),
         "first_seed": study.first_seed,
         "seeds": study.seeds,
         "first_set_multiple": study.first_set_multiple,
@@ -56,7 +69,7 @@ pub fn write(
     stop: Stop,
 ) -> Result<Vec<PathBuf>> {
     let mut sets: Vec<Parameters> = Vec::new();
-    for set in study.sets.iter().map(unmodulated) {
+    for set in study.sets.iter().map(Parameters::without_modulation) {
         if !sets.contains(&set) {
             sets.push(set);
         }
@@ -95,12 +108,11 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
                         samples; bars: 95 %. Errors of break times: median, bars up to the largest.";
     const EXTRAPOLATED: &str = " * Cost extrapolated from that of a step.";
     let breaks = points(&findings.methods, set, |row| {
-        let (error, largest) = (row.break_times.median?, row.break_times.largest?);
-        Some((error, (error, largest)))
+        let error = row.break_times.median?;
+        Some((error, (error, row.break_times.largest?)))
     });
-    let label = "Error of break times (s)".to_owned();
     let mut panels = vec![ErrorPanel {
-        label,
+        label: "Error of break times (s)".to_owned(),
         by_chance: None,
         points: breaks,
     }];
@@ -122,7 +134,7 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     let mut mine = findings
         .methods
         .iter()
-        .filter(|row| unmodulated(&row.parameters) == *set);
+        .filter(|row| row.parameters.without_modulation() == *set);
     let extrapolated = if mine.any(|row| row.cost.is_extrapolated()) {
         EXTRAPOLATED
     } else {
@@ -139,19 +151,6 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     work_precision(WORK, &panels, &look)
 }
 
-fn unmodulated(set: &Parameters) -> Parameters {
-    let Parameters {
-        modulation_amplitude,
-        modulation_period,
-        ..
-    } = Parameters::default();
-    Parameters {
-        modulation_amplitude,
-        modulation_period,
-        ..set.clone()
-    }
-}
-
 /// Each method under each modulation of the sets that are this one without: `error` gives an error and its uncertainty.
 fn points(
     rows: &[MethodRow],
@@ -160,7 +159,7 @@ fn points(
 ) -> Vec<WorkPrecision> {
     let rows: Vec<&MethodRow> = rows
         .iter()
-        .filter(|row| unmodulated(&row.parameters) == *set)
+        .filter(|row| row.parameters.without_modulation() == *set)
         .collect();
     let modulations = || {
         rows.iter()
@@ -208,17 +207,15 @@ mod tests {
     static NEVER: AtomicBool = AtomicBool::new(false);
 
     fn findings() -> Findings {
-        let (parameters, solver) = (
-            Parameters::default(),
-            Method::from(Solver::FixedStep { time_step: 1e-6 }),
-        );
+        let parameters = Parameters::default();
+        let solver = Method::from(Solver::FixedStep { time_step: 1e-6 });
         let break_times = BreakErrors {
             breaks: Some(100),
             missing: Some(0),
             median: Some(1e-7),
             largest: Some(1e-6),
         };
-        let cost = cost::Cost {
+        let cost = super::super::Cost {
             per_simulated_second: 0.2,
             per_slip: 0.02,
             steps_per_slip: 1e5,
@@ -307,13 +304,11 @@ mod tests {
     #[test]
     fn every_field_of_the_json_is_documented() {
         let page = include_str!("../../docs/commands.md");
-        let (study, findings) = (
-            Study {
-                sets: vec![Parameters::default()],
-                ..Study::quick()
-            },
-            findings(),
-        );
+        let study = Study {
+            sets: vec![Parameters::default()],
+            ..Study::quick()
+        };
+        let findings = findings();
         let row = page
             .lines()
             .find(|line| line.starts_with("| `accuracy` |"))

@@ -1,0 +1,423 @@
+//! Charts: a dot for each set against a column, with error bars where there are intervals. The overview of a sweep and
+//! custom figures are charts.
+
+use super::BadOption;
+use super::axis::Axis;
+use super::frame::{Ends, LEFT, Layout, Place};
+use super::hues::Hues;
+use super::ink::{Dot, Ink, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::Picture;
+use super::quantity::{Quantity, parameter, without_value};
+use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, drive_alone};
+use crate::model::Symbol;
+use crate::observe::Regime;
+use crate::reduce::{SetRow, Swept, Values, ascending, is_same};
+use std::collections::BTreeMap;
+
+/// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
+const REDUCTION: Ends = (0.2, 0.3);
+const WIDTH: f64 = 560.0;
+const HEIGHT: f64 = 400.0;
+/// Panels in a row, and in all.
+pub(super) const MAX_COLUMNS: usize = 3;
+const MAX_PANELS: usize = 9;
+const PANEL_WIDTH: f64 = 260.0;
+const PANEL_HEIGHT: f64 = 220.0;
+const PANEL_GAP: f64 = 26.0;
+/// Between columns, for the labels of their axes.
+const LABEL_GAP: f64 = 16.0;
+/// Lines between sets; more would be a net.
+const MAX_LINES: usize = 24;
+pub(super) const LINE_WIDTH: f64 = 1.0;
+/// Sets up to which dots and bars have their full size.
+const FEW_SETS: usize = 200;
+pub(super) const SMALL_RADIUS: f64 = 2.5;
+/// By how much the hole in the dot of a set that slides is smaller.
+pub(super) const HOLE: f64 = 1.6;
+
+/// Sets against a column: a panel for each quantity and each value of another column.
+pub(super) struct Chart<'a> {
+    pub(super) rows: &'a [SetRow],
+    pub(super) swept: &'a [Swept],
+    pub(super) x: Quantity<'a>,
+    pub(super) ys: Vec<Quantity<'a>>,
+    pub(super) colour: Option<Quantity<'a>>,
+    pub(super) panels: Option<Values>,
+}
+
+/// How the sets of a chart are drawn.
+pub(super) struct Dots {
+    pub(super) hues: Option<Hues>,
+    radius: f64,
+    /// Sets that are joined, line by line.
+    pub(super) lines: Vec<Vec<usize>>,
+}
+
+impl<'a> Chart<'a> {
+    pub(super) fn draw(&self, name: &str, look: &Look) -> Result<Picture, BadOption> {
+        let Self { x, ys, .. } = self;
+        let sets: Vec<usize> = (0..self.rows.len())
+            .filter(|&set| x.has(set) && ys.iter().any(|y| y.has(set)))
+            .collect();
+        if sets.is_empty() {
+            return Err(self.refuse_empty());
+        }
+        let free = self.free();
+        let x_axis = x.axis(&sets)?;
+        let y_axis = |y: &Quantity<'_>| {
+            let all = sets.iter().chain(&free).copied();
+            y.axis(&all.filter(|&set| y.has(set)).collect::<Vec<_>>())
+        };
+        let y_axes: Vec<Axis> = ys.iter().map(y_axis).collect::<Result<_, BadOption>>()?;
+        let is_on = |axis: &Axis, quantity: &Quantity<'_>, set| {
+            quantity
+                .number(set)
+                .is_some_and(|value| axis.contains(value))
+        };
+        let is_inside = |set: &usize| {
+            let mut pairs = ys.iter().zip(&y_axes);
+            is_on(&x_axis, x, *set) && pairs.any(|(y, axis)| is_on(axis, y, *set))
+        };
+        let inside: Vec<usize> = sets.iter().copied().filter(is_inside).collect();
+        if inside.is_empty() {
+            let problem = format!(
+                "none of {} sets lies within --xlim and --ylim; give wider ones",
+                sets.len()
+            );
+            return Err(x.refuse(&problem));
+        }
+        let dots = Dots {
+            hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
+            radius: if inside.len() > FEW_SETS {
+                SMALL_RADIUS
+            } else {
+                RADIUS
+            },
+            lines: self.lines(&sets),
+        };
+        let groups = groups(self.panels.as_ref(), &sets)?;
+        let (layout, height) = layout(ys.len(), groups.len());
+        let mut panels: Vec<Panel<'_>> = Vec::new();
+        for (y, axis) in ys.iter().zip(y_axes) {
+            for (title, members) in &groups {
+                let layers = self.layers(y, &x_axis, &dots, members, &free);
+                let mut panel = Panel::new(height, x_axis.clone(), axis.clone(), layers);
+                if groups.len() > 1 {
+                    if !panels.len().is_multiple_of(layout.columns) {
+                        panel.y.label.clear();
+                    }
+                    panel.heading = Some(title.clone());
+                }
+                if panels.len() + 1 == layout.columns {
+                    panel.bar = dots.hues.as_ref().and_then(Hues::bar);
+                }
+                panels.push(panel);
+            }
+        }
+        let look = look.with_note(&self.note(&inside, free.len()));
+        let legend = self.legend(&inside, &free, &dots);
+        Ok(panel::draw(name, &look, layout, &legend, panels))
+    }
+
+    fn refuse_empty(&self) -> BadOption {
+        let Self { x, ys, .. } = self;
+        let is_log = x.is_log && x.column.distinct.first().is_none_or(|least| *least <= 0.0);
+        let kind = if is_log || ys.iter().any(|y| y.is_log) {
+            "no set has a value > 0"
+        } else {
+            "no set has a value"
+        };
+        let names: Vec<&str> = std::iter::once(x).chain(ys).map(Quantity::name).collect();
+        let names = names.join(" and ");
+        let problem = format!("{kind} of both {names}; nothing can be drawn");
+        ys.first().unwrap_or(x).refuse(&problem)
+    }
+
+    /// Sets without modulation, where the axis is that of the modulation: they have no place on it, but a level.
+    fn free(&self) -> Vec<usize> {
+        let is_free = |&set: &usize| {
+            self.x.symbol == Some(Symbol::T)
+                && self.rows[set].parameters.modulation_period.is_none()
+                && !self.x.has(set)
+        };
+        let free: Vec<usize> = (0..self.rows.len()).filter(is_free).collect();
+        if free.len() > INKS.len() {
+            Vec::new()
+        } else {
+            free
+        }
+    }
+
+    /// Sets that differ in the x axis alone, in its order.
+    fn lines(&self, sets: &[usize]) -> Vec<Vec<usize>> {
+        let Some(symbol) = self.x.symbol else {
+            return Vec::new();
+        };
+        // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.
+        if self
+            .colour
+            .as_ref()
+            .is_some_and(|colour| colour.symbol.is_none())
+            || self.ys.iter().any(|y| y.symbol.is_some())
+        {
+            return Vec::new();
+        }
+        let others: Vec<_> = self
+            .swept
+            .iter()
+            .filter(|other| parameter(other.name()) != Some(symbol))
+            .map(Swept::places)
+            .collect();
+        let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
+        for &set in sets {
+            lines
+                .entry(others.iter().map(|places| places[set]).collect())
+                .or_default()
+                .push(set);
+        }
+        let mut lines: Vec<Vec<usize>> =
+            lines.into_values().filter(|line| line.len() > 1).collect();
+        let number = |set| self.x.number(set).unwrap_or(f64::NAN);
+        for line in &mut lines {
+            line.sort_by(|&left, &right| number(left).total_cmp(&number(right)));
+        }
+        if lines.len() > MAX_LINES {
+            Vec::new()
+        } else {
+            lines
+        }
+    }
+
+    fn ink(&self, dots: &Dots, set: usize) -> Ink {
+        let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) else {
+            return INKS[0];
+        };
+        colour.number(set).map_or(GREY, |value| hues.ink(value))
+    }
+
+    /// Sets as dots, joined, with their intervals along both axes, over those without modulation and the drive's part.
+    fn layers(
+        &self,
+        y: &Quantity<'_>,
+        x_axis: &Axis,
+        dots: &Dots,
+        members: &[usize],
+        free: &[usize],
+    ) -> Vec<Layer<'a>> {
+        let level = |set: &usize| {
+            let ink = if dots.hues.is_some() {
+                self.ink(dots, *set)
+            } else {
+                GREY
+            };
+            Some(Layer::Level(y.number(*set)?, Stroke { ink, ..REFERENCE }))
+        };
+        let mut layers: Vec<Layer<'a>> = Vec::new();
+        layers.extend(self.reduction(y).map(|ends| Layer::Stripe(ends, STRIPE)));
+        if y.name() == "slip_share" {
+            layers.extend(Regime::MIN_SHARES.map(|share| Layer::Level(share, REFERENCE)));
+        }
+        layers.extend(free.iter().filter_map(level));
+        for line in &dots.lines {
+            let line: Vec<usize> = line
+                .iter()
+                .copied()
+                .filter(|set| members.contains(set))
+                .collect();
+            self.add_line(&mut layers, y, dots, &line);
+        }
+        if dots.lines.is_empty() {
+            let alone = members.iter().filter_map(|&set| self.drive_at(y, set));
+            let dot = Dot::solid(GREY, SMALL_RADIUS);
+            layers.push(Layer::Dots(alone.collect(), dot));
+        }
+        for &set in members {
+            self.add_bars(&mut layers, y, x_axis, dots, set);
+        }
+        let mut all = vec![Layer::Inside(layers)];
+        for &set in members {
+            let place: Vec<Place> = self.place(y, set).into_iter().collect();
+            let dot = Dot {
+                opacity: 0.9,
+                ..Dot::solid(self.ink(dots, set), dots.radius)
+            };
+            all.push(Layer::Dots(place.clone(), dot));
+            if self.slides(set) {
+                all.push(Layer::Dots(place, Dot::solid(WHITE, dots.radius - HOLE)));
+            }
+        }
+        all
+    }
+
+    fn place(&self, y: &Quantity<'_>, set: usize) -> Option<Place> {
+        self.x.number(set).zip(y.number(set))
+    }
+
+    /// The place of what the drive alone explains.
+    fn drive_at(&self, y: &Quantity<'_>, set: usize) -> Option<Place> {
+        self.x.number(set).zip(y.drive.as_ref()?.numbers[set])
+    }
+
+    /// Joins sets, those of one colour, and what the drive alone explains of them.
+    fn add_line(&self, layers: &mut Vec<Layer<'a>>, y: &Quantity<'_>, dots: &Dots, line: &[usize]) {
+        let Some(first) = line.first() else {
+            return;
+        };
+        let alone = line.iter().filter_map(|&set| self.drive_at(y, set));
+        let stroke = drive_alone(self.ink(dots, *first));
+        layers.push(Layer::Curve(alone.collect(), stroke));
+        let known: Vec<usize> = line.iter().copied().filter(|&set| y.has(set)).collect();
+        for pair in known.windows(2) {
+            let ink = self.ink(dots, pair[0]);
+            if ink == self.ink(dots, pair[1]) {
+                let ends = pair.iter().filter_map(|&set| self.place(y, set));
+                layers.push(Layer::Curve(ends.collect(), Stroke::solid(ink, LINE_WIDTH)));
+            }
+        }
+    }
+
+    /// The intervals of a set along both axes.
+    fn add_bars(
+        &self,
+        layers: &mut Vec<Layer<'a>>,
+        y: &Quantity<'_>,
+        x_axis: &Axis,
+        dots: &Dots,
+        set: usize,
+    ) {
+        let Some((at_x, at_y)) = self.place(y, set) else {
+            return;
+        };
+        let width = if dots.radius < RADIUS {
+            LINE_WIDTH
+        } else {
+            BAR_WIDTH
+        };
+        let stroke = Stroke::solid(self.ink(dots, set), width);
+        if let Some(ends) = y.interval(set) {
+            layers.push(Layer::Bars(vec![(at_x, ends)], stroke));
+        }
+        if let Some((low, high)) = self.x.interval(set) {
+            let left = if x_axis.place(low).is_finite() {
+                low
+            } else {
+                x_axis.low
+            };
+            layers.push(Layer::Curve(vec![(left, at_y), (high, at_y)], stroke));
+        }
+    }
+
+    pub(super) fn slides(&self, set: usize) -> bool {
+        self.rows[set].regime == Some(Regime::Sliding)
+    }
+
+    /// Amplitudes at which the paper finds a significant reduction of the friction to begin, on the x axis.
+    pub(super) fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
+        let is_fixed = |symbol| {
+            self.swept
+                .iter()
+                .all(|swept| parameter(swept.name()) != Some(symbol))
+        };
+        let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
+        let free = self
+            .rows
+            .iter()
+            .find(|row| row.parameters.modulation_period.is_none());
+        let free = free.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
+        let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
+        Some((REDUCTION.0 * unit, REDUCTION.1 * unit))
+    }
+}
+
+/// Columns and widths of panels, and their height.
+fn layout(quantities: usize, groups: usize) -> (Layout, f64) {
+    let (columns, [width, height]) = match (quantities, groups) {
+        (1, 1) => (1, [WIDTH, HEIGHT]),
+        (1, 4) => (2, [PANEL_WIDTH, PANEL_HEIGHT]),
+        (1, count) => (count.min(MAX_COLUMNS), [PANEL_WIDTH, PANEL_HEIGHT]),
+        // Quantities one under the other, or two and two.
+        (2 | 3, 1) => (1, [WIDTH, 0.5 * HEIGHT]),
+        (_, 1) => (2, [1.25 * PANEL_WIDTH, PANEL_HEIGHT]),
+        (_, count) => (count, [PANEL_WIDTH, 0.8 * PANEL_HEIGHT]),
+    };
+    let mut layout = Layout {
+        columns,
+        column_gap: LEFT + LABEL_GAP,
+        ..Layout::column(width)
+    };
+    if quantities == 1 {
+        layout.row_gap = PANEL_GAP;
+    }
+    (layout, height)
+}
+
+/// The sets of each panel and its title.
+fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<usize>)>, BadOption> {
+    let Some(values) = panels else {
+        return Ok(vec![(String::new(), sets.to_vec())]);
+    };
+    let of = |value: f64| {
+        let is_of = |set: &usize| values.numbers[*set].is_some_and(|number| is_same(value, number));
+        (
+            values.setting(value),
+            sets.iter().copied().filter(is_of).collect::<Vec<_>>(),
+        )
+    };
+    let mut groups: Vec<_> = ascending(values.numbers.iter().copied().flatten())
+        .into_iter()
+        .map(of)
+        .collect();
+    groups.retain(|(_, sets)| !sets.is_empty());
+    // Sets without a value, such as a frequency at Δ = 0, have a separate panel.
+    let without: Vec<usize> = sets
+        .iter()
+        .copied()
+        .filter(|&set| values.numbers[set].is_none())
+        .collect();
+    if !groups.is_empty() && !without.is_empty() {
+        groups.insert(0, (without_value(values), without));
+    }
+    let problem = match groups.len() {
+        0 => "no set has a value of it".to_owned(),
+        1..=MAX_PANELS => return Ok(groups),
+        count => {
+            format!("has {count} values, and {MAX_PANELS} panels fit a page; show it with --colour")
+        }
+    };
+    Err(BadOption::new("panels", &values.column.name, &problem))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::custom::tests::rows;
+    use super::*;
+    use crate::reduce::swept;
+
+    #[test]
+    fn only_sets_that_differ_in_x_alone_are_joined() {
+        let lines = |rows: &[SetRow], name: &str| {
+            let swept = swept(rows);
+            let x = Quantity::of(rows, "x", name).unwrap();
+            let sets: Vec<usize> = (0..rows.len()).collect();
+            Chart {
+                rows,
+                swept: &swept,
+                x,
+                ys: Vec::new(),
+                colour: None,
+                panels: None,
+            }
+            .lines(&sets)
+        };
+        let rows = rows(8);
+        assert_eq!(lines(&rows, "V0"), [vec![1, 3, 5, 7], vec![0, 2, 4, 6]]);
+        assert!(lines(&rows, "tau_mean").is_empty() && lines(&rows, "Delta").is_empty());
+        let mut periods = vec![rows[0].clone(); 3];
+        for (row, period) in periods.iter_mut().zip([0.02, 0.01, 0.04]) {
+            row.parameters.parameters.modulation_period = Some(period);
+            row.frequency = Some(1.0 / period);
+        }
+        assert_eq!(lines(&periods, "frequency"), [vec![2, 0, 1]]);
+    }
+}

@@ -1,0 +1,325 @@
+//! Custom figures: any column of the table of sets, or a formula of columns, against any other.
+
+use super::chart::Chart;
+use super::quantity::{Limits, Quantity, parameter};
+use super::{BadOption, Look, Picture};
+use crate::reduce::{SetRow, Swept, swept};
+
+/// What a custom figure shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CustomFigure {
+    /// Column, or formula of columns such as `Kd*Delta`, on the x axis.
+    pub x: String,
+    /// Column on the y axis, with error bars if it has an interval; or a formula, without.
+    pub y: String,
+    /// Column that colours show; else the next parameter that was swept.
+    pub colour: Option<String>,
+    /// Column whose values get a panel each.
+    pub panels: Option<String>,
+    /// The letters of the logarithmic axes; else those that were swept so, or whose values lie decades apart.
+    pub log: Option<String>,
+    pub xlim: Limits,
+    pub ylim: Limits,
+    pub xlabel: Option<String>,
+    pub ylabel: Option<String>,
+}
+
+/// Draws a dot for each set; sets that differ in the parameter on the x axis alone are joined.
+pub(super) fn custom(
+    rows: &[SetRow],
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture, BadOption> {
+    let mut x = Quantity::of(rows, "x", &figure.x)?;
+    x.limits = figure.xlim;
+    x.label = figure.xlabel.as_deref();
+    let mut y = Quantity::of(rows, "y", &figure.y)?;
+    y.limits = figure.ylim;
+    y.label = figure.ylabel.as_deref();
+    if let Some(axes) = &figure.log {
+        x.is_log = axes.contains('x');
+        y.is_log = axes.contains('y');
+    }
+    let named = |option, name: &Option<String>| {
+        name.as_ref()
+            .map(|name| Quantity::of(rows, option, name))
+            .transpose()
+    };
+    let panels = named("panels", &figure.panels)?;
+    let swept = swept(rows);
+    let is_free = |swept: &&Swept| {
+        let symbol = parameter(swept.name());
+        x.symbol != symbol && panels.as_ref().is_none_or(|panels| panels.symbol != symbol)
+    };
+    let next = || {
+        swept
+            .iter()
+            .find(is_free)
+            .map(|next| next.name().to_owned())
+    };
+    let colour = named("colour", &figure.colour.clone().or_else(next))?;
+    // Formulas have letters that no file name should have.
+    let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let name = format!("{}-{}", y.name(), x.name()).replace(|letter| !is_plain(letter), "-");
+    Chart {
+        rows,
+        swept: &swept,
+        x,
+        ys: vec![y],
+        colour,
+        panels: panels.map(|panels| panels.column.values),
+    }
+    .draw(&name, look)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::chart::LINE_WIDTH;
+    use super::super::style::{BAR_WIDTH, Style};
+    use super::*;
+    use crate::model::Parameters;
+    use crate::model::selected::Selected;
+    use crate::reduce::Interval;
+
+    /// Sets at rising V0, and two amplitudes.
+    pub(in crate::figure) fn rows(count: u32) -> Vec<SetRow> {
+        let row = |step: u32| {
+            let parameters = Parameters {
+                drive_velocity: 1e-6 * f64::from(1 << step),
+                modulation_amplitude: if step.is_multiple_of(2) { 1e-6 } else { 0.0 },
+                modulation_period: step.is_multiple_of(2).then_some(0.02),
+                ..Parameters::default()
+            };
+            let tau = 10.0 / f64::from(1 << step);
+            SetRow {
+                frequency: parameters.modulation_period.map(|period| 1.0 / period),
+                parameters: Selected::new(parameters.validated().unwrap()),
+                tau_mean: Some(tau),
+                tau_interval: Some(Interval {
+                    low: 0.9 * tau,
+                    high: 1.1 * tau,
+                }),
+                ..SetRow::default()
+            }
+        };
+        (0..count).map(row).collect()
+    }
+
+    fn figure() -> CustomFigure {
+        CustomFigure {
+            x: "V0".into(),
+            y: "tau_mean".into(),
+            ..CustomFigure::default()
+        }
+    }
+
+    fn svg(figure: &CustomFigure) -> String {
+        custom(&rows(8), figure, &Look::default()).unwrap().svg()
+    }
+
+    fn problem(figure: &CustomFigure) -> String {
+        custom(&rows(8), figure, &Look::default())
+            .err()
+            .unwrap()
+            .to_string()
+    }
+
+    #[test]
+    fn each_option_changes_what_it_says() {
+        let plain = svg(&figure());
+        // Velocities that double, and intervals that halve.
+        assert!(
+            plain.contains(">Drive velocity V₀ (m/s)<")
+                && plain.contains(">Mean interval ⟨τ⟩ (s)<")
+        );
+        assert!(
+            plain.contains(">10⁻⁵<") && plain.contains(">Δ = 0<") && plain.contains(">Δ = 1 µm<")
+        );
+        let bars = |svg: &str| {
+            svg.matches(&format!(r#"stroke-width="{BAR_WIDTH}""#))
+                .count()
+        };
+        let no_interval = CustomFigure {
+            y: "eta".into(),
+            ..figure()
+        };
+        assert_eq!((bars(&plain), bars(&svg(&no_interval))), (8, 0));
+        let linear = svg(&CustomFigure {
+            log: Some("none".into()),
+            ..figure()
+        });
+        assert!(linear.contains(">Drive velocity V₀ (10⁻⁶ m/s)<") && !linear.contains(">10⁻⁵<"));
+        let scale = svg(&CustomFigure {
+            colour: Some("V0".into()),
+            ..figure()
+        });
+        assert!(
+            scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = ") && !scale.contains("Δ = ")
+        );
+        let panels = svg(&CustomFigure {
+            panels: Some("Delta".into()),
+            ..figure()
+        });
+        assert!(panels.contains(">(a)<") && panels.contains(">(b)<") && panels.contains(">Δ = 0<"));
+        let limits = svg(&CustomFigure {
+            xlim: (Some(1e-6), Some(1e-5)),
+            ..figure()
+        });
+        assert!(
+            limits.contains("not shown: 4 of 8 sets, without a value or outside the axes"),
+            "{limits}"
+        );
+        let label = svg(&CustomFigure {
+            ylabel: Some("τ".into()),
+            ..figure()
+        });
+        assert!(label.contains(">τ<") && !label.contains("Mean interval"));
+        let without = svg(&CustomFigure {
+            colour: Some("T".into()),
+            ..figure()
+        });
+        assert!(without.contains(">T = 20 ms<") && without.contains(">Δ = 0<"));
+        let words = svg(&CustomFigure {
+            x: "break_on".into(),
+            ..figure()
+        });
+        assert!(words.contains(">magnitude<"));
+    }
+
+    #[test]
+    fn mistakes_are_refused_with_what_to_do() {
+        for (figure, expected) in [
+            (
+                CustomFigure {
+                    x: "v0".into(),
+                    ..figure()
+                },
+                "--x v0: no such column; did you mean V0?",
+            ),
+            (
+                CustomFigure {
+                    colour: Some("colour".into()),
+                    ..figure()
+                },
+                "--colour colour: no such column; `stickslip plot --list`",
+            ),
+            (
+                CustomFigure {
+                    x: "break_on".into(),
+                    log: Some("x".into()),
+                    ..figure()
+                },
+                "--log x: break_on holds words",
+            ),
+            (
+                CustomFigure {
+                    x: "break_on".into(),
+                    xlim: (Some(1.0), None),
+                    ..figure()
+                },
+                "--xlim 1:: break_on holds words",
+            ),
+            (
+                CustomFigure {
+                    y: "drop_mean".into(),
+                    ..figure()
+                },
+                "no set has a value of both V0 and drop_mean",
+            ),
+            (
+                CustomFigure {
+                    y: "eta".into(),
+                    x: "T_to".into(),
+                    log: Some("y".into()),
+                    ..figure()
+                },
+                "no set has a value > 0",
+            ),
+            (
+                CustomFigure {
+                    xlim: (Some(2.0), Some(1.0)),
+                    ..figure()
+                },
+                "--xlim 2:1: the lower end must be less",
+            ),
+            (
+                CustomFigure {
+                    xlim: (Some(-1.0), None),
+                    log: Some("x".into()),
+                    ..figure()
+                },
+                "--xlim -1:: must be > 0",
+            ),
+            (
+                CustomFigure {
+                    xlim: (Some(1.0), Some(2.0)),
+                    ..figure()
+                },
+                "none of 8 sets lies within",
+            ),
+            (
+                CustomFigure {
+                    panels: Some("regime".into()),
+                    ..figure()
+                },
+                "--panels regime: no set has a value of it",
+            ),
+        ] {
+            let found = problem(&figure);
+            assert!(found.contains(expected), "{found}");
+        }
+        let many = CustomFigure {
+            panels: Some("V0".into()),
+            ..figure()
+        };
+        let error = custom(&rows(12), &many, &Look::default())
+            .err()
+            .unwrap()
+            .to_string();
+        assert!(
+            error.contains(
+                "--panels V0: has 12 values, and 9 panels fit a page; show it with --colour"
+            ),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn sets_of_one_measured_colour_are_not_joined_and_what_nothing_shows_is_said() {
+        let strokes = |figure: &CustomFigure| {
+            svg(figure)
+                .matches(&format!(r#"stroke-width="{LINE_WIDTH}""#))
+                .count()
+        };
+        let measured = CustomFigure {
+            colour: Some("tau_mean".into()),
+            ..figure()
+        };
+        assert!(strokes(&figure()) > strokes(&measured));
+        let pooled = "not told apart: sets that differ in Δ";
+        assert!(svg(&measured).contains(pooled) && !svg(&figure()).contains(pooled));
+        assert!(
+            !svg(&CustomFigure {
+                x: "V0*Delta".into(),
+                ..measured
+            })
+            .contains(pooled)
+        );
+    }
+
+    #[test]
+    fn a_style_does_not_change_the_data() {
+        let dots = |style| {
+            let look = Look {
+                style,
+                ..Look::default()
+            };
+            custom(&rows(8), &figure(), &look)
+                .unwrap()
+                .svg()
+                .matches("<circle")
+                .count()
+        };
+        assert_eq!(dots(Style::Screen), dots(Style::Print));
+    }
+}

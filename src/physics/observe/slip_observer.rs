@@ -1,0 +1,511 @@
+//! Finds slips and precursors from the contact events, and measures them on the shear force.
+//!
+//! Definitions: a slip is a rupture that breaks contacts at every block and lets go of at least half of those that held, and
+//! a tenth of all; a precursor any other of at least `precursor_size` breaks; smaller ones are creep. The onset of a slip is
+//! the largest shear force between the previous slip's end (its last break) and the instant at which its rupture reaches
+//! the leading edge; it lies at an extreme of F_S or at an event, located exactly.
+
+use super::Recording;
+use super::drops::{DropDetector, Drops};
+use super::phase::phase;
+use super::regime::Averages;
+use super::rupture::{Rupture, advance_speed};
+use super::slip::{Energies, Modulation, Precursor, Slip};
+use crate::model::{Change, ContactEvent, Drive, Parameters};
+use crate::solver::{Observer, Segment, Spent};
+
+/// A largest shear force, in N, and its time, in s.
+#[derive(Clone, Copy, Debug)]
+struct Peak {
+    time: f64,
+    force: f64,
+}
+
+impl Peak {
+    fn raise(&mut self, other: Peak) {
+        if other.force > self.force {
+            *self = other;
+        }
+    }
+}
+
+/// An instant, and what has been counted up to it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Instant {
+    time: f64,
+    /// Shear force, in N.
+    force: f64,
+    /// Its integral over time, in N s.
+    impulse: f64,
+    /// Integral of the number of attached contacts, in s.
+    attached_time: f64,
+    /// Time within slips, in s.
+    slipping: f64,
+    /// Mean displacement of the blocks, in m.
+    mean_displacement: f64,
+    /// Zero unless energies are recorded.
+    spent: Spent,
+}
+
+/// Largest shear forces since the last slip's end, since the last rupture of precursor size, and since the last break.
+#[derive(Clone, Debug)]
+struct Peaks {
+    since_slip: Peak,
+    since_precursor: Peak,
+    since_break: Peak,
+}
+
+/// Precursors of the slip to come.
+#[derive(Clone, Debug, Default)]
+struct Pending {
+    count: u64,
+    /// Breaks in the largest.
+    largest: u64,
+    last_onset: Option<f64>,
+    /// Those that advanced the reach: time and position.
+    advances: Vec<(f64, f64)>,
+    /// The furthest block that they reach, from 0.
+    furthest: Option<usize>,
+}
+
+/// The instants between which averages over time are taken.
+#[derive(Clone, Debug, Default)]
+struct Span {
+    start_up_end: Option<Instant>,
+    last_slip_end: Option<Instant>,
+    /// Halfway from the last slip to where the job gives up.
+    settled: Option<Instant>,
+    /// Time within slips that have ended, in s.
+    slipping: f64,
+}
+
+/// The drive in its cycle at an instant of a slip or precursor.
+#[derive(Clone, Debug)]
+struct Drives {
+    at_slip_onset: Drive,
+    at_precursor_onset: Drive,
+    /// At the first or last break of the last slip.
+    at_break: Drive,
+}
+
+/// What makes a rupture a slip or a precursor, and when it and the job end.
+#[derive(Clone, Copy, Debug)]
+struct Criteria {
+    precursor_size: u64,
+    /// All contacts, attached or not.
+    contacts: u64,
+    crossing_time: f64,
+    give_up_time: f64,
+}
+
+impl Criteria {
+    fn is_recorded(&self, rupture: &Rupture) -> bool {
+        rupture.size >= self.precursor_size || rupture.is_slip(self.contacts)
+    }
+}
+
+/// An observer that finds slips and precursors.
+#[derive(Clone, Debug)]
+pub struct SlipObserver {
+    parameters: Parameters,
+    recording: Recording,
+    criteria: Criteria,
+    drives: Drives,
+    /// The end of the last segment, but for what is counted at events.
+    now: Instant,
+    /// The last event, and the contacts attached after it.
+    at_event: Instant,
+    attached: u64,
+    peaks: Peaks,
+    rupture: Option<Active>,
+    slips_seen: u64,
+    last_onset: Option<f64>,
+    slips: Vec<Slip>,
+    precursors: Vec<Precursor>,
+    pending: Pending,
+    span: Span,
+    pub(super) has_given_up: bool,
+    /// Ruptures of any size that have ended.
+    pub(super) ruptures: u64,
+    /// Drops, if they are recorded, and first and last break of every slip.
+    drops: Option<DropDetector>,
+    breaks_of_slips: Vec<(f64, f64)>,
+}
+
+/// A rupture in progress, with what is measured on its force.
+#[derive(Clone, Debug)]
+struct Active {
+    rupture: Rupture,
+    /// Peak since the last slip, when the rupture reached the leading edge.
+    onset: Option<Peak>,
+    /// Peak since the last precursor, when the rupture began.
+    precursor_onset: Peak,
+    /// Least force so far, and up to the last break, in N.
+    least: f64,
+    least_at_last_break: f64,
+    first: Instant,
+    last: Instant,
+    /// Whether the shear force was rising at the onset.
+    onset_cut: bool,
+}
+
+impl SlipObserver {
+    pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
+        let start = Peak {
+            time: 0.0,
+            force: 0.0,
+        };
+        let contacts = (parameters.blocks * parameters.contacts_per_block) as u64;
+        let criteria = Criteria {
+            precursor_size: recording
+                .precursor_size
+                .unwrap_or(parameters.contacts_per_block as u64),
+            contacts,
+            crossing_time: parameters.wave_crossing_time(),
+            give_up_time: recording.give_up_time(parameters),
+        };
+        let drive = Drive::new(parameters);
+        let drops = recording.drop_size;
+        Self {
+            parameters: parameters.clone(),
+            recording: *recording,
+            criteria,
+            drives: Drives {
+                at_slip_onset: drive,
+                at_precursor_onset: drive,
+                at_break: drive,
+            },
+            now: Instant::default(),
+            at_event: Instant::default(),
+            attached: contacts,
+            peaks: Peaks {
+                since_slip: start,
+                since_precursor: start,
+                since_break: start,
+            },
+            rupture: None,
+            slips_seen: 0,
+            last_onset: None,
+            slips: Vec::new(),
+            precursors: Vec::new(),
+            pending: Pending::default(),
+            span: Span::default(),
+            has_given_up: false,
+            ruptures: 0,
+            drops: drops.map(|size| DropDetector::new(parameters, size)),
+            breaks_of_slips: Vec::new(),
+        }
+    }
+
+    /// Slips past start-up, and their precursors if they are recorded.
+    pub fn into_rows(mut self) -> (Vec<Slip>, Vec<Precursor>) {
+        // Precursors of a slip that the job does not have belong to none.
+        let slips = self.slips.len() as u64;
+        self.precursors.retain(|precursor| precursor.slip < slips);
+        if let Some(drops) = self.drops {
+            let discarded = self.breaks_of_slips.len() - self.slips.len();
+            let of_slips = drops
+                .of_slips(&self.breaks_of_slips)
+                .into_iter()
+                .skip(discarded);
+            self.slips
+                .iter_mut()
+                .zip(of_slips)
+                .for_each(|(slip, drops)| slip.drops = drops);
+        }
+        (self.slips, self.precursors)
+    }
+
+    /// Averages over time, from the end of start-up to that of the last slip. What follows belongs to it if no slip has come
+    /// for half the time to give up: the slider then slides, and without a slip past start-up only that second half counts.
+    /// `None` for an empty span.
+    pub fn averages(&self) -> Option<Averages> {
+        let (start, end) = match self.span.settled {
+            Some(settled) => {
+                let start_up_end = self.span.start_up_end.filter(|_| !self.slips.is_empty());
+                (start_up_end.unwrap_or(settled), self.sliding())
+            }
+            None => self.span.start_up_end.zip(self.span.last_slip_end)?,
+        };
+        let time = end.time - start.time;
+        (time > 0.0).then(|| Averages {
+            time,
+            friction: (end.impulse - start.impulse) / time,
+            attached_fraction: (end.attached_time - start.attached_time)
+                / (time * self.criteria.contacts as f64),
+            slip_share: (end.slipping - start.slipping) / time,
+        })
+    }
+
+    /// Time since the last onset, in s, of a job that gives up: what its interval is at least.
+    pub fn running_interval(&self) -> Option<f64> {
+        let last = self.last_onset.filter(|_| self.has_given_up)?;
+        Some(self.now.time - last)
+    }
+
+    /// Whether the last slip that was asked for is recorded.
+    fn is_complete(&self) -> bool {
+        let Some(last) = self.slips.last() else {
+            return false;
+        };
+        let Recording { slips, time, .. } = self.recording;
+        slips.is_some_and(|slips| self.slips.len() as u64 >= slips)
+            || time.is_some_and(|time| last.onset >= time)
+    }
+
+    /// The present instant with all that is counted, after sliding since the last slip; from the last event on at its rate.
+    fn sliding(&self) -> Instant {
+        Instant {
+            attached_time: self.at_event.attached_time
+                + self.attached as f64 * (self.now.time - self.at_event.time),
+            slipping: self.span.slipping + self.now.time
+                - self.span.last_slip_end.map_or(0.0, |end| end.time),
+            ..self.now
+        }
+    }
+
+    fn begin_or_extend(&mut self, event: &ContactEvent) {
+        if self
+            .rupture
+            .as_ref()
+            .is_some_and(|active| event.time - active.last.time > self.criteria.crossing_time)
+        {
+            self.finish_rupture();
+        }
+        let blocks = self.parameters.blocks;
+        let here = Instant {
+            time: event.time,
+            attached_time: event.attached_time,
+            mean_displacement: event.mean_displacement,
+            ..self.now
+        };
+        self.at_event = here;
+        self.attached = event.attached;
+        let active = if let Some(active) = &mut self.rupture {
+            active.rupture.include(event);
+            active
+        } else {
+            self.rupture.insert(Active {
+                rupture: Rupture::new(event, blocks),
+                onset: None,
+                precursor_onset: self.peaks.since_precursor,
+                least: self.now.force,
+                least_at_last_break: self.now.force,
+                first: here,
+                last: here,
+                onset_cut: false,
+            })
+        };
+        if event.block + 1 == blocks && active.onset.is_none() {
+            active.onset = Some(self.peaks.since_slip);
+            active.onset_cut = self.now.force >= self.peaks.since_slip.force;
+        }
+        active.least_at_last_break = active.least;
+        active.last = here;
+        self.peaks.since_break = Peak {
+            time: event.time,
+            force: self.now.force,
+        };
+    }
+
+    fn finish_rupture(&mut self) {
+        let Some(active) = self.rupture.take() else {
+            return;
+        };
+        self.ruptures += 1;
+        if !self.criteria.is_recorded(&active.rupture) {
+            return;
+        }
+        if active.rupture.is_slip(self.criteria.contacts) {
+            self.record_slip(&active);
+        } else {
+            self.record_precursor(&active);
+        }
+    }
+
+    fn record_slip(&mut self, active: &Active) {
+        let rupture = &active.rupture;
+        // A slip has reached the leading edge.
+        let onset = active.onset.unwrap_or(self.peaks.since_slip);
+        let first = active.first;
+        let last = active.last;
+        let discard = self.recording.discard;
+        self.drives.at_slip_onset.advance_to(onset.time);
+        if self.slips_seen >= discard {
+            let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
+            let drive = &self.drives.at_slip_onset;
+            let modulation = Modulation::of(drive);
+            let interval = self.last_onset.map(|last| onset.time - last);
+            let spent = self
+                .span
+                .last_slip_end
+                .map_or(Spent::default(), |end| end.spent);
+            let energies = self
+                .recording
+                .energies
+                .then(|| Energies::between(spent, last.spent));
+            self.slips.push(Slip {
+                number: self.slips_seen - discard,
+                onset: onset.time,
+                interval,
+                modulation,
+                periods: interval.and_then(|interval| modulation.periods(interval)),
+                phase: modulation
+                    .period
+                    .map(|period| phase(onset.time - drive.cycle_start, period, drive.eta)),
+                peak_force: onset.force,
+                drop: onset.force - active.least_at_last_break,
+                nucleation: first.time,
+                nucleation_block: rupture.first_block as u64 + 1,
+                duration: last.time - first.time,
+                size: rupture.size,
+                attached_before: rupture.attached_before as f64 / self.criteria.contacts as f64,
+                least_attached: rupture.least_attached as f64 / self.criteria.contacts as f64,
+                distance: last.mean_displacement - first.mean_displacement,
+                edge_distance,
+                onset_cut: active.onset_cut,
+                front_speed: rupture.front_speed(&self.parameters),
+                precursors: self.pending.count,
+                largest_precursor: self.pending.largest,
+                slow_front_speed: advance_speed(self.pending.advances.iter().copied()),
+                energies: energies.unwrap_or_default(),
+                drops: Drops::default(),
+            });
+        }
+        if self.drops.is_some() {
+            self.breaks_of_slips.push((first.time, last.time));
+        }
+        self.slips_seen += 1;
+        self.span.slipping += last.time - first.time;
+        let end = Instant {
+            slipping: self.span.slipping,
+            ..last
+        };
+        if self.slips_seen == discard.max(1) {
+            self.span.start_up_end = Some(end);
+        }
+        self.span.last_slip_end = Some(end);
+        self.span.settled = None;
+        self.last_onset = Some(onset.time);
+        self.peaks.since_slip = self.peaks.since_break;
+        self.peaks.since_precursor = self.peaks.since_break;
+        self.pending = Pending::default();
+    }
+
+    /// Displacement of the driven edge at a break of the last slip, from the force and the drive, in m.
+    fn edge_displacement(&mut self, at: Instant) -> f64 {
+        self.drives.at_break.advance_to(at.time);
+        self.drives.at_break.motion(at.time).0 - at.force / self.drives.at_break.stiffness
+    }
+
+    fn record_precursor(&mut self, active: &Active) {
+        let rupture = &active.rupture;
+        let first = active.first;
+        let last = active.last;
+        let onset = active.precursor_onset.time;
+        if self.recording.precursors && self.slips_seen >= self.recording.discard {
+            self.drives.at_precursor_onset.advance_to(onset);
+            self.precursors.push(Precursor {
+                slip: self.slips_seen - self.recording.discard,
+                precursor: self.pending.count,
+                onset,
+                interval: self.pending.last_onset.map(|last| onset - last),
+                modulation: Modulation::of(&self.drives.at_precursor_onset),
+                nucleation: first.time,
+                nucleation_block: rupture.first_block as u64 + 1,
+                duration: last.time - first.time,
+                size: rupture.size,
+                extent: rupture.extent() as u64,
+                length: rupture.extent() as f64 * self.parameters.slider_length
+                    / self.parameters.blocks as f64,
+                reach: rupture.reach as u64 + 1,
+                front_speed: rupture.front_speed(&self.parameters),
+            });
+        }
+        if self
+            .pending
+            .furthest
+            .is_none_or(|furthest| rupture.reach > furthest)
+        {
+            let position = (rupture.reach + 1) as f64 * self.parameters.slider_length
+                / self.parameters.blocks as f64;
+            self.pending.advances.push((first.time, position));
+            self.pending.furthest = Some(rupture.reach);
+        }
+        self.pending.count += 1;
+        self.pending.largest = self.pending.largest.max(rupture.size);
+        self.pending.last_onset = Some(onset);
+        self.peaks.since_precursor = self.peaks.since_break;
+    }
+}
+
+impl Observer for SlipObserver {
+    fn advance(&mut self, segment: &Segment<'_>) {
+        // Each stretch contains the later ones, so a force that raises none of these peaks raises no other. The peak since the
+        // last break counts only once its rupture ends, and if that is recorded.
+        let recordable = self
+            .rupture
+            .as_ref()
+            .is_some_and(|active| self.criteria.is_recorded(&active.rupture));
+        let floor = if recordable {
+            self.peaks.since_break.force
+        } else {
+            self.peaks.since_precursor.force
+        };
+        if let Some((time, force)) = segment.maximum_above(floor) {
+            let peak = Peak { time, force };
+            self.peaks.since_break = peak;
+            self.peaks.since_precursor.raise(peak);
+            self.peaks.since_slip.raise(peak);
+        }
+        if let Some(active) = &mut self.rupture
+            && let Some((_, force)) = segment.minimum_below(active.least)
+        {
+            active.least = force;
+        }
+        if let Some(drops) = &mut self.drops {
+            drops.advance(segment);
+        }
+        let impulse = self.now.impulse + segment.impulse();
+        self.now = Instant {
+            time: segment.end(),
+            force: segment.end_force(),
+            impulse,
+            ..self.now
+        };
+        if self
+            .rupture
+            .as_ref()
+            .is_some_and(|active| self.now.time - active.last.time > self.criteria.crossing_time)
+        {
+            self.finish_rupture();
+        }
+        let since_slip = self.now.time - self.span.last_slip_end.map_or(0.0, |end| end.time);
+        if self.span.settled.is_none() && since_slip >= 0.5 * self.criteria.give_up_time {
+            self.span.settled = Some(self.sliding());
+        }
+        self.has_given_up = since_slip >= self.criteria.give_up_time;
+    }
+
+    fn contact(&mut self, event: &ContactEvent) {
+        if event.change == Change::Break {
+            self.begin_or_extend(event);
+        }
+    }
+
+    fn spent(&mut self, spent: Spent) {
+        self.now.spent = spent;
+    }
+
+    fn follows_attachments(&self) -> bool {
+        false
+    }
+
+    fn follows_force(&self) -> bool {
+        self.drops.is_some()
+    }
+
+    fn is_satisfied(&self) -> bool {
+        self.is_complete() || self.has_given_up
+    }
+}
