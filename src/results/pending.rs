@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | directory | whether what is there may count at all: the same versions, model, recording | `directory.rs`, `extension_file.rs` | `another_model_recording_or_version_is_refused_with_the_difference_and_nothing_is_written` |
 //! | extensions | which extension has a job: the first that keeps it, else the last | `sweep/plan.rs` | `what_is_taken_out_of_the_sweep_is_kept_if_done_and_else_not_run` |
-//! | parts | a part is done if all its files are there | [`Results::done_parts`] | `a_part_without_its_slips_is_run_again` |
+//! | parts | a part is done if all its files are there | [`Results::done_parts`] | `a_missing_slips_file_ends_every_command_that_reads_it_with_code_4_and_run_makes_it_again` |
 //! | retries | of a part that is done, jobs that failed, that needed more memory than was allowed, or that a shorter `max_time` cut off | [`Pending::runs_again`] | `failing_and_panicking_jobs_become_rows_others_go_on_and_a_retry_mends_them`, `a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others` |
 //! | spill | of one that is not, all jobs but those that a stopped run has finished | [`Pending::spilled`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
 //!
