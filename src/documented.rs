@@ -5,7 +5,7 @@ use crate::model::{Description, Parameters, Symbol, Value};
 use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, TraceRow};
 use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, RoundOfSet, SetRow};
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
-use crate::table::columns::{Column, Kind, Table};
+use crate::table::columns::{Column, Kind, Row, Table};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -75,7 +75,7 @@ fn table(fields: &[(Description, Value)]) -> String {
 
 /// The section of a table in the documentation, in Markdown: a line for each column. Parameters of the model, described
 /// on a page of their own, share a line, and so do columns that an earlier table has, and a statistic and its interval.
-fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> String {
+pub(crate) fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> String {
     let is_parameter = |column: &Column| {
         Symbol::from_key(&column.name)
             .is_some_and(|symbol| symbol.description().meaning == column.meaning)
