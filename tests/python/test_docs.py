@@ -48,7 +48,9 @@ def test_every_field_of_json_output_is_documented(stickslip, results, tmp_path):
     text = (ROOT / "docs" / "commands.md").read_text()
     for command, arguments in outputs.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{command}` |"))
-        for field in json.loads(stickslip(*arguments, "--json").stdout):
+        fields = json.loads(stickslip(*arguments, "--json").stdout)
+        assert "Its `format` increases" in text and fields.pop("format") > 0, command
+        for field in fields:
             assert f"`{field}`" in row, f"{command} --json: {field}"
 
 
