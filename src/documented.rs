@@ -5,7 +5,7 @@ use crate::model::{Description, Parameters, Symbol, Value};
 use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, TraceRow};
 use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, RoundOfSet, SetRow};
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
-use crate::table::columns::{Column, Kind, Table};
+use crate::table::columns::{Column, Kind, Row, Table};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -73,30 +73,49 @@ fn table(fields: &[(Description, Value)]) -> String {
     text
 }
 
-/// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
-/// share a line, and so do a statistic and its interval; a unit with `?` is that of a column that may be null.
-pub(crate) fn markdown<T: Table>() -> String {
+/// The section of a table in the documentation, in Markdown: a line for each column. Parameters of the model, described
+/// on a page of their own, share a line, and so do columns that an earlier table has, and a statistic and its interval.
+pub(crate) fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> String {
     let is_parameter = |column: &Column| {
         Symbol::from_key(&column.name)
             .is_some_and(|symbol| symbol.description().meaning == column.meaning)
     };
+    let earlier_table = |column: &Column| {
+        let has_it = |(_, columns): &&(_, Vec<Column>)| columns.contains(column);
+        let table = earlier.iter().find(has_it).map(|(name, _)| *name);
+        table.filter(|_| !is_parameter(column))
+    };
     let share_a_line = |one: &Column, next: &Column| {
-        let is_interval =
-            next.meaning == INTERVAL && next.name.strip_suffix("_low") == Some(&*one.name);
+        let is_known = |column| earlier_table(column).is_some();
+        let is_interval = next.meaning.starts_with(INTERVAL)
+            && next.name.strip_suffix("_low") == Some(&*one.name);
         let is_pair = one
             .name
             .strip_suffix("_low")
             .is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
-        (is_parameter(one) && is_parameter(next))
+        (is_known(one) && is_known(next) && earlier_table(one) == earlier_table(next))
+            || (is_parameter(one) && is_parameter(next))
             || is_interval
-            || (is_pair && one.meaning.starts_with(LOWER_END))
+            || (is_pair && one.meaning.starts_with(INTERVAL))
     };
     let line = |columns: &[Column]| {
         let names: Vec<String> = columns
             .iter()
             .map(|column| format!("`{}`", column.name))
             .collect();
-        let names = names.join(" ");
+        let first = &names[0];
+        let last = &names[names.len() - 1];
+        if let Some(table) = earlier_table(&columns[0]) {
+            return format!("- {}: as in [{table}](#{table})\n", names.join(", "));
+        }
+        if is_parameter(&columns[0]) {
+            let names = if names.len() > 4 {
+                format!("{first} to {last}")
+            } else {
+                names.join(", ")
+            };
+            return format!("- {names}: [parameters](model.md#parameters)\n");
+        }
         let Column {
             unit,
             meaning,
@@ -104,34 +123,49 @@ pub(crate) fn markdown<T: Table>() -> String {
             nullable,
             ..
         } = &columns[0];
-        if is_parameter(&columns[0]) {
-            return format!("| {names} | | [parameters](model.md#parameters) |\n");
-        }
         let unit = match kind {
             Kind::Real if unit.is_empty() => "1",
             Kind::Real => unit,
             kind => kind.word(),
         };
         let nullable = if *nullable { "?" } else { "" };
-        let meaning = meaning
-            .replace(LOWER_END, "ends of")
-            .replace('|', "\\|")
-            .replace('<', "\\<");
-        format!("| {names} | {unit}{nullable} | {meaning} |\n")
+        let has_interval = if columns.len() == 3 { " ±" } else { "" };
+        let of_interval = columns
+            .get(1)
+            .and_then(|low| low.meaning.strip_prefix(INTERVAL))
+            .map(|more| more.trim_start_matches([',', ';', ' ']))
+            .filter(|more| !more.is_empty())
+            .map(|more| format!("; interval: {more}"));
+        let of_interval = of_interval.unwrap_or_default();
+        let meaning = meaning.replace('<', "\\<");
+        format!("- {first}{has_interval} ({unit}{nullable}): {meaning}{of_interval}\n")
     };
     let rows: String = T::columns().chunk_by(share_a_line).map(line).collect();
-    format!(
-        "## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}",
-        T::NAME,
-        T::MEANING
-    )
+    let wrapped = rows.lines().map(wrapped).collect::<String>();
+    format!("## {}\n\n{}.\n\n{wrapped}", T::NAME, T::MEANING)
 }
 
-/// The meaning of the lower end of an interval of which there is nothing else to say.
-const INTERVAL: &str = "lower end of its 95 % confidence interval";
+/// An item of a list on lines of at most 120 characters.
+fn wrapped(item: &str) -> String {
+    let mut text = String::new();
+    let mut length = 0;
+    for word in item.split(' ') {
+        let added = word.chars().count() + 1;
+        if length + added > 120 {
+            text.push_str("\n ");
+            length = 1;
+        }
+        if length > 0 {
+            text.push(' ');
+        }
+        text.push_str(word);
+        length += added;
+    }
+    text + "\n"
+}
 
-/// How the meaning of the lower end of any interval begins.
-const LOWER_END: &str = "lower end of";
+/// How the meaning of the lower end of an interval begins.
+const INTERVAL: &str = "lower end of its 95 % confidence interval";
 
 /// How the page of tables begins.
 const TABLES: &str = "\
@@ -140,29 +174,26 @@ const TABLES: &str = "\
 For readers of the data: the columns of every file, in order.
 [results.md](results.md) has the files and how to read them; units and meanings are also in the metadata of each.
 Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.
-A `?` marks columns that may be null.
-Names with `_low` and `_high` are the ends of a 95 % confidence interval.
+A `?` marks columns that may be null, and ± columns with a 95 % confidence interval in two columns more, whose names end
+in `_low` and `_high`.
 
 ";
 
 #[test]
 fn documented_tables_are_those_written() {
-    let tables = [
-        markdown::<SlipRow<'_>>(),
-        markdown::<PrecursorRow<'_>>(),
-        markdown::<JobRow>(),
-        markdown::<SetRow>(),
-        markdown::<RoundOfSet>(),
-        markdown::<EdgeRow>(),
-        markdown::<HistogramBin>(),
-        markdown::<BackboneBin>(),
-        markdown::<Point>(),
-        markdown::<TraceRow>(),
-        markdown::<MapRow>(),
-        markdown::<ProfileRow>(),
-        markdown::<ContactRow>(),
-    ];
-    assert_documented("tables.md", &format!("{TABLES}{}", tables.join("\n")));
+    let mut sections: Vec<String> = Vec::new();
+    let mut earlier: Vec<(&str, Vec<Column>)> = Vec::new();
+    macro_rules! document {
+        ($($row:ty)*) => {$(
+            sections.push(markdown::<$row>(&earlier));
+            earlier.push((<$row as Table>::NAME, <$row>::columns()));
+        )*};
+    }
+    document! {
+        SlipRow<'_> PrecursorRow<'_> JobRow SetRow RoundOfSet EdgeRow HistogramBin BackboneBin Point TraceRow MapRow
+        ProfileRow ContactRow
+    }
+    assert_documented("tables.md", &format!("{TABLES}{}", sections.join("\n")));
 }
 
 #[test]

@@ -106,7 +106,7 @@ def gallery():
         link = posixpath.relpath(name(picture), "results")
         if sweep := sweeps.get(link):
             file = f"sweeps/{sweep}.toml"
-            comment = re.match(r"(?:# (?!Drawn by).*\n)+", (ROOT / file).read_text())[0]
+            comment = re.match(r"(?:# .*\n)+", (ROOT / file).read_text())[0]
             about = comment.removeprefix("# ").replace("\n# ", " ").strip()
             command = f"`scripts/reproduce {sweep}` ([sweep](../{file}))"
         else:

@@ -45,14 +45,14 @@ def document(results: Path) -> str:
     parts = [
         "# Validation",
         paragraph(
-            "`scripts/reproduce` writes this page from measured results; no measured number is typed by hand.",
-            "Brackets hold 95 % intervals: the jackknife over seeds or parameter sets, or the bootstrap where a statistic"
-            " is not smooth; of shares Wilson's ([`statistics.py`](../python/stickslip/statistics.py)).",
-            "Where the paper gives no number, the criterion is a choice that the statement, taken as true, would meet.",
-            "*Undecided* is what an interval that holds the limit leaves open.",
-            "Of locking there are two questions: what is seen, and what of it lies beyond *the drive alone*, which is slips"
-            " at the loads of the unmodulated slider ([definition](model.md#phase-and-locking)).",
-            "*Random loads* are slips at independent loads: for η > 1 even these are bunched in φ.",
+            "For readers who ask which statements of the paper the model confirms.",
+            "`scripts/reproduce` writes this page from measured results.",
+            "Brackets have 95 % intervals: jackknife over seeds or parameter sets, bootstrap where a statistic is not smooth,"
+            " Wilson's of shares ([`statistics.py`](../python/stickslip/statistics.py)).",
+            "Where the paper gives no number, the criterion is a choice.",
+            "*Undecided*: the interval includes the limit.",
+            "*The drive alone*: slips at the loads of the unmodulated slider;"
+            " *random loads*: slips at independent loads ([definitions](model.md#phase-and-locking)).",
         ),
         table(summary),
         "## The paper's statements",

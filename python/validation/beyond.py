@@ -67,9 +67,8 @@ def locking_map(results: Path) -> Section:
             }
         )
     section.remark(
-        f"{len(sets)} parameter sets, {sets['intervals'].sum()} intervals.",
-        "The table has means. All sets have the same control of two seeds, so they err together, and two seeds give no"
-        " useful interval of a difference.",
+        f"Means over {len(sets)} parameter sets with {sets['intervals'].sum()} intervals. All sets have the same control of"
+        " two seeds, so they err together.",
     )
     return section
 
@@ -90,8 +89,8 @@ def median_periods(slips: pandas.DataFrame) -> tuple[pandas.Series, pandas.Serie
 
 def staircase(results: Path) -> Section:
     title = "Devil's staircase: intervals in periods against the period"
-    section = Section(title, "`sweeps/staircase.toml`", ("staircase",))
-    slips = Sweep(results / "staircase").slips().dropna(subset="interval")
+    section = Section(title, "`sweeps/locking-staircase.toml`", ("staircase",))
+    slips = Sweep(results / "locking-staircase").slips().dropna(subset="interval")
     shares = {}
     for amplitude, mine in slips.groupby("Delta"):
         medians, on_step = median_periods(mine)
@@ -110,12 +109,12 @@ def dependences(results: Path) -> Section:
     title = "Locking against blocks, contacts and disorder"
     section = Section(
         title,
-        "`sweeps/size.toml`, `sweeps/contacts.toml` and `sweeps/disorder.toml`, Δ = 1 µm",
+        "`sweeps/locking-size.toml`, `locking-contacts.toml` and `locking-disorder.toml`, Δ = 1 µm",
         ("size", "contacts", "disorder"),
     )
     bunched, beyond = [], []
     for sweep, column, symbol in (("size", "N", "N"), ("contacts", "Ns", "N_s"), ("disorder", "disorder", "Δf_s/f_s")):
-        sets = Sweep(results / sweep).sets()
+        sets = Sweep(results / f"locking-{sweep}").sets()
         sets = sets.assign(disorder=(sets["dfs"] / sets["fs"]).round(3))
         still, modulated = (select(sets, Delta=amplitude) for amplitude in (0.0, 1e-6))
         tau, spread = 1e3 * still["tau_mean"], still["tau_sd"] / still["tau_mean"]
@@ -131,14 +130,13 @@ def dependences(results: Path) -> Section:
         )
     section.remark(
         f"The resultant of φ lies above 0.5 with its interval in {sum(bunched)} of {len(bunched)} sets.",
-        "Less what the drive alone gives it is, in the mean over sets with an interval, and from the lowest to the highest"
-        f" end of the interval of any set, {'; '.join(beyond)}.",
+        f"Less what the drive alone gives, with ends as in Fig. 3, it is {'; '.join(beyond)}.",
     )
     return section
 
 
 def choices(results: Path) -> Section:
-    source = "`sweeps/choices.toml`, `sweeps/startup.toml`, `sweeps/fig3.toml`"
+    source = "`sweeps/choices.toml`, `sweeps/choices-startup.toml`, `sweeps/fig3.toml`"
     section = Section("What the model's choices change", source)
     sweep = Sweep(results / "choices")
     slips = sweep.slips()
@@ -155,8 +153,7 @@ def choices(results: Path) -> Section:
         same = (pairs["interval"] == pairs["interval_other"]).mean()
         changes.append(f"{change.text(3)} ms {name} ({100 * same:.0f} %)")
     section.item(
-        '`break_on = "tension"` changes mean τ, and leaves some intervals the same to the last bit:'
-        f" {'; '.join(changes)}."
+        f'`break_on = "tension"` changes mean τ by {"; ".join(changes)} (in brackets, intervals with the same bits).'
     )
     slips = slips[slips["break_on"] == "magnitude"]
     paper = slips[(slips["V0"] < 2e-4) & (slips["Delta"] < 2e-6)]
@@ -169,25 +166,25 @@ def choices(results: Path) -> Section:
     section.item(
         f"Cut of a slip (half of the attached contacts, a tenth of all): it rejects {whole.sum()} ruptures of extent N."
         f" Slips release at least {released[paper.index].min():.2f} of the attached contacts for Δ up to 1 µm at 1e-4 m/s,"
-        f" {released.min():.2f} in the whole sweep. Sliders of 5 to 10 blocks, where it matters, are not measured."
+        f" {released.min():.2f} in the whole sweep."
     )
     sizes = ", ".join(f"{(still['largest_drop_before'] >= size).mean():.2f} from {size} N" for size in (0.5, 1, 2, 5, 10))
     section.item(
-        f"`drop_size`: the least drop of a slip is {paper['drop_during'].min():.0f} N for Δ up to 1 µm at 1e-4 m/s, so that any"
-        f" size below finds them all. Without modulation, shares of the slips that follow another drop: {sizes}."
+        f"`drop_size`: the least drop of a slip is {paper['drop_during'].min():.0f} N for Δ up to 1 µm at 1e-4 m/s."
+        f" Without modulation, shares of the slips that follow another drop: {sizes}."
     )
     sliding = sweep.table("jobs").query("slips == 0 and Delta == 0")
     given_up = (sliding["V0"] * sliding["simulated_time"]).min()
     waits = (slips["V0"] * slips["interval"])[slips["Delta"] == 0].max()
     section.item(
-        f"Half of `give_up_after`: the longest wait for a slip is {waits / given_up:.2f} of it, from 1e-4 to 1e-3 m/s without"
-        " modulation, so that any part above this finds the same slips."
+        f"`give_up_after`: the longest wait for a slip is {waits / given_up:.2f} of it, from 1e-4 to 1e-3 m/s without"
+        " modulation."
     )
     shares = select(sweep.sets(), Delta=0.0, break_on="magnitude").sort_values("V0")
     levels = (0.4, 0.5, 0.6, 0.9, 0.95, 0.99)
     edges = 1e3 * numpy.interp(levels, shares["slip_share"], shares["V0"])
     section.item(
-        "Edges of the regimes, by the share of time within slips from which they begin:"
+        "Edges of the regimes, by their share of time within slips:"
         f" {', '.join(f'{edge:.2f} mm/s at {level:g}' for edge, level in zip(edges, levels, strict=True))}."
     )
     phases = Sweep(results / "fig3").slips()
@@ -200,10 +197,10 @@ def choices(results: Path) -> Section:
     low = phases[phases["eta"].between(0.28, 0.29) & (phases["Delta"] > 9e-7)]
     memory = numpy.exp(1j * load_phase(low)).groupby(low["slip"]).mean().abs()
     section.item(
-        "Start at a maximum of the modulation: at η = 0.285 and Δ = 1 µm in `fig3`, the resultant of the load phases is"
+        "Start at a maximum of the modulation: at η = 0.285 and Δ = 1 µm in `fig3`, load phases have a resultant of"
         f" {', '.join(f'{length:.2f}' for length in memory)} at successive slips of {low['job_id'].nunique()} jobs."
     )
-    slips = Sweep(results / "startup").slips()
+    slips = Sweep(results / "choices-startup").slips()
     p = startup(slips)
     needed = p.index[p < 0.05].max() + 1 if (p < 0.05).any() else 0
     section.item(

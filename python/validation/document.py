@@ -51,7 +51,7 @@ class Section:
         self.remarks.append(paragraph(*sentences))
 
     def item(self, *sentences: str) -> None:
-        self.remarks.append("- " + textwrap.indent(paragraph(*sentences, width=WIDTH - 2), "  ").lstrip())
+        self.remarks.append(item(*sentences))
 
     def number(self) -> str:
         """The number of the statement, as in "12. "."""
@@ -62,13 +62,25 @@ class Section:
 
 
 def figure(title: str, sections: list[Section]) -> str:
-    """Statements on the same figure: pictures, a table of all checks, further tables, remarks."""
+    """Statements on the same figure: pictures, a list of all checks, tables, remarks."""
     sources = "; ".join(dict.fromkeys(section.source for section in sections))
     parts = [f"### {title}", paragraph(f"From {sources}.")]
     parts += [f"![{picture}](../results/{picture}.png)" for section in sections for picture in section.pictures]
-    checks = [check for section in sections for check in section.checks]
-    parts += [table(rows) for rows in (checks, *(section.rows for section in sections)) if rows]
+    checks = [checked(check) for section in sections for check in section.checks]
+    parts += ["\n".join(checks)] if checks else []
+    parts += [table(section.rows) for section in sections if section.rows]
     return "\n\n".join([*parts, *(remark for section in sections for remark in section.remarks)])
+
+
+def checked(check: dict) -> str:
+    """A check as an item of a list, which must not begin as a numbered one."""
+    claim = re.sub(r"^(\d+)\. ", r"\1: ", check["claim: criterion"])
+    return item(f"{claim}. *{check['agrees'].strip('*')}:* {check['measured']}")
+
+
+def item(*sentences: str) -> str:
+    """An item of a list."""
+    return "- " + textwrap.indent(paragraph(*sentences, width=WIDTH - 2), "  ").lstrip()
 
 
 def paragraph(*sentences: str, width: int = WIDTH) -> str:

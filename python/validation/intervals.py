@@ -81,20 +81,18 @@ def stick_slip(results: Path) -> Section:
     numbers = {size: [of_slips(count, rows) for rows in of_modes] for size, count in counts.items()}
     section.check(
         "the peaks differ in their precursors",
-        f"different mean numbers of precursors, whether of at least {', '.join(map(str, SIZES))} breaks",
+        f"different mean numbers of precursors of at least {', '.join(map(str, SIZES))} breaks",
         "; ".join(", ".join(one.text(1) for one in found) for found in numbers.values()),
         *(before.high < after.low for found in numbers.values() for before, after in pairwise(found)),
     )
     drops = share(slips["drops_before"].isin([2, 3]), slips["seed"])
     two_or_three = (f"{count.isin([2, 3]).mean():.2f} from {size} breaks" for size, count in counts.items())
     section.remark(
-        "How many slips have two or three precursors, as the paper's mainly have, depends on what counts as one:"
-        f" {', '.join(two_or_three)}; {drops.text(2)} have two or three drops of the force of 0.5 N or more."
+        f"Slips with two or three precursors, as most in the paper: {', '.join(two_or_three)}; {drops.text(2)} by drops of the"
+        " force of 0.5 N or more."
     )
     parts = ", ".join(f"{len(rows) / len(slips):.0%}" for rows in of_modes)
-    section.why = (
-        f"τ has {len(modes)} modes, with {parts} of the slips; how many precursors there are depends on what counts as one"
-    )
+    section.why = f"τ has {len(modes)} modes, with {parts} of the slips"
     return section
 
 
@@ -139,7 +137,7 @@ def integer_multiples(results: Path) -> Section:
     )
     section.check(
         "more than the drive alone makes",
-        "locking index above that of slips at the loads of the unmodulated slider, with the interval of the difference",
+        "locking index above that of the drive alone",
         ", ".join(
             f"{row['locking_index_drive']:.3f} by the drive, excess {row['locking_index_excess']:.3f}"
             f" ({row['locking_index_excess_low']:.3f}–{row['locking_index_excess_high']:.3f}) at {frequency} Hz"
@@ -159,7 +157,6 @@ def integer_multiples(results: Path) -> Section:
             f"{at_frequencies(found)}; unmodulated {', '.join(f'{chance.value:.3f}' for chance in chances)}",
             *(index.low > max(chance.high, 0.5) for index, chance in zip(found, chances, strict=True)),
         )
-    section.remark("Shorter intervals between precursors belong to bursts of small ones, with or without modulation.")
     return section
 
 
@@ -190,7 +187,7 @@ def many_periods(results: Path) -> Section:
     whole, bunched = (share(rows["near"], rows["set_id"]) for rows in (slips, slips[slips["resultant_length"] > 0.5]))
     section.check("", "more than the 0.2 of chance within 0.1 T of nT, for η > 1", whole.text(), whole.lies(above=0.2))
     section.check("once locked", "more than 0.5 where the resultant of φ is above 0.5", bunched.text(), bunched.lies(above=0.5))
-    sets = Sweep(results / "drive-alone").sets()
+    sets = Sweep(results / "locking-drive-alone").sets()
     section.note = "; for slow drives the drive alone makes it so"
     section.why = f"the locking index is {bounds_text(sets[sets['eta'] > 1], 'locking_index')}"
     return section
@@ -219,12 +216,12 @@ def stress_drops(results: Path) -> Section:
         chances.append(jackknife(index, still))
     section.check(
         "",
-        "locking index of the drops, in units of what the force gains in T, above that of unmodulated ones",
+        "locking index of the drops, in units of what the force gains in T, above that without modulation",
         f"{at_frequencies(modulated)}; unmodulated {', '.join(one.text() for one in chances)}",
         *(one.low > chance.high for one, chance in zip(modulated, chances, strict=True)),
     )
     section.remark(
-        "Force grows at the rate K_d V0 between slips, so drops follow τ; the square of their correlation is"
+        "Drops follow τ, as the force grows at the rate K_d V0; the square of their correlation is"
         f" {', '.join(f'{found.text(3)} {where}' for where, found in of_tau.items())}.",
     )
     section.verdict = "restates statement 3"
@@ -255,7 +252,7 @@ def stochasticity(results: Path) -> Section:
     )
     section.check(
         "",
-        "interquartile range of τ over its median at least twice as large for any √(K_int/K_s) < N/8 as for any > N/2",
+        "interquartile range of τ over its median at least twice as large for √(K_int/K_s) < N/8 as for > N/2",
         f"{min(long):.3f} to {max(long):.3f}; {min(stiff):.3f} to {max(stiff):.3f};"
         f" between N/8 and N/2 {min(middle):.3f} to {max(middle):.3f}",
         min(long) > 2 * max(stiff),

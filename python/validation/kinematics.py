@@ -14,7 +14,7 @@ from stickslip.statistics import Estimate
 
 #: Drive velocity in m/s below which drives are called slow: between two values of the sweep, 1e-5 and 5e-5.
 SLOW = 3e-5
-SOURCE = "`sweeps/fig3.toml` and `sweeps/drive-alone.toml`"
+SOURCE = "`sweeps/fig3.toml` and `sweeps/locking-drive-alone.toml`"
 
 
 def in_words(velocity: float) -> str:

@@ -33,7 +33,7 @@ def phase(results: Path) -> Section:
     slips = slips.assign(first=nucleation_phase(slips))
     high = slips[slips["eta"] > 2]
     under = first_breaks(section, high)
-    sets = Sweep(results / "drive-alone").sets()
+    sets = Sweep(results / "locking-drive-alone").sets()
     above = sets[sets["eta"] > 1]
     seen = share(above["resultant_length_low"] > 0.5, above.index)
     section.check(
@@ -71,13 +71,11 @@ def phase(results: Path) -> Section:
     section.remark(
         "An onset is a largest load by definition, so only inertia can put it below φ_min:"
         f" a share of {under_minimum(high['phase'], high['eta'], 0.15).mean():.4f} lies more than 0.15 rad below.",
-        "That onsets reach down to it, and where first breaks lie, is measured.",
     )
     section.note = "; for slow drives the drive alone makes it so"
     section.why = (
-        "onsets lie above φ_min by definition, and reach down to it; of first breaks, which are free,"
-        f" a share of {under[0].value:.2f} lies below where T > τ_r, {under[1].value:.2f} where T < τ_r; R is"
-        f" {bounds_text(above, 'resultant')}"
+        f"of first breaks, a share of {under[0].value:.2f} lies below φ_min where T > τ_r, {under[1].value:.2f} where T < τ_r;"
+        f" R is {bounds_text(above, 'resultant')}"
     )
     return section
 
@@ -156,7 +154,7 @@ def influence(slips: pandas.DataFrame) -> dict[float, Estimate]:
 
 def below_one(results: Path) -> Section:
     section = Section("11. No phase-locking below η ≃ 1", SOURCE)
-    sweep = Sweep(results / "drive-alone")
+    sweep = Sweep(results / "locking-drive-alone")
     sets = sweep.sets()
     off = influence(sweep.table("slips"))
     texts = ", ".join(f"{one.text(2)} at {in_words(velocity)}" for velocity, one in off.items())
@@ -164,8 +162,7 @@ def below_one(results: Path) -> Section:
     absent = {velocity: False if one.low > 0 else one.lies(below=0.1) for velocity, one in off.items()}
     section.check(
         "oscillations have no influence",
-        "mean vector of the load phase less the drive's alone, root mean square over sets: the interval reaches 0 and stays"
-        " below 0.1",
+        "mean vector of the load phase less the drive's alone, root mean square over sets: interval from 0 to below 0.1",
         texts,
         *absent.values(),
     )
@@ -182,30 +179,27 @@ def below_one(results: Path) -> Section:
     low = slips[slips["eta"] < 0.7]
     phases = jackknife(lambda rows: resultant_length(rows["phase"]), low, unit="set_id")
     section.remark(
-        "The table has the mean over sets with an interval that allows for common errors of all sets; and, after the"
-        " semicolon, the lowest and the highest end of the interval of any set.",
-        "Below η = 1 not all phases can be equally probable if oscillations have no influence: those of random loads have"
-        f" a resultant of η/2 at −π/2. For η < 0.7 it is {phases.text()} at {direction(low['phase']):.2f} rad, where η/2 is"
+        "The table has means over sets, with intervals as if all sets erred alike; and, after the semicolon, the lowest and"
+        " the highest end of the interval of any set.",
+        "Below η = 1 phases of random loads have a resultant of η/2 at −π/2, so the criterion is on the load phase."
+        f" For η < 0.7 the resultant is {phases.text()} at {direction(low['phase']):.2f} rad, where η/2 is"
         f" {low['eta'].mean() / 2:.3f} in the mean.".replace(" -", " −"),
-        "So the criterion is on the [load phase](model.md#phase-and-locking).",
-        "Why fast drives lock although the load never falls was not investigated.",
     )
     if any(absent.values()):
         section.verdict = f"holds for V0 up to {in_words(max(v for v in absent if absent[v]))}"
-    section.why = f"the mean vector of the load phase is off the drive's by {texts}"
     return section
 
 
 def stiff_drive(results: Path) -> Section:
     section = Section(
         "The experiment's drive: K_d = 1e9 N/m",
-        "`sweeps/stiff-drive.toml`, K_d Δ = 20 to 100 N",
+        "`sweeps/locking-stiff-drive.toml`, K_d Δ = 20 to 100 N",
         ("stiff-drive-phase",),
     )
-    slips = Sweep(results / "stiff-drive").slips().dropna(subset="phase")
+    slips = Sweep(results / "locking-stiff-drive").slips().dropna(subset="phase")
     high = slips[slips["eta"] > 2]
     high = high.assign(first=nucleation_phase(high))
     under = first_breaks(section, high)
     section.check(*envelope(high))
-    section.why = f"the envelope of first breaks has the exponent; {under[1].text(2)} of them lie below φ_min where T < τ_r"
+    section.why = f"{under[1].text(2)} of the first breaks lie below φ_min where T < τ_r"
     return section

@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output;
-use super::sweep::{Preset, Variation, changes, vary};
+use super::sweep::{Preset, Variation, changes, preset_parser, vary};
 use crate::results::destination::{Destination, Kind};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
@@ -12,23 +12,28 @@ use std::path::{Path, PathBuf};
 
 /// Write a commented sweep file to start from
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(before_long_help = questions(), after_help = "\
 Examples:
   stickslip init mine.toml                       every key with its unit, meaning and default
   stickslip init mine.toml --question friction   a question, with a figure as its answer, in half a minute
-  stickslip init mine.toml --preset locking-map  from a sweep of the paper, or beyond it
+  stickslip init mine.toml --preset locking-map  from a sweep of this project
   stickslip init mine.toml --set N=140 --axis V0=log:1e-5:1e-3:9 --axis seed=count:8
   stickslip plan mine.toml                       next: what would run")]
 pub struct Arguments {
     /// File to write; its name becomes that of the sweep
     #[arg(value_name = "FILE", default_value = "sweep.toml")]
     file: PathBuf,
-    /// Start from a sweep of the paper, or beyond it
-    #[arg(long, value_name = "NAME")]
-    preset: Option<Preset>,
-    /// Start from a sweep that answers a question
-    #[arg(long, value_name = "NAME", conflicts_with = "preset")]
+    /// Start from a sweep that answers one of four questions in half a minute
+    #[arg(
+        long,
+        value_name = "NAME",
+        conflicts_with = "preset",
+        hide_possible_values = true
+    )]
     question: Option<Question>,
+    /// Start from a sweep of this project
+    #[arg(long, value_name = "NAME", value_parser = preset_parser())]
+    preset: Option<Preset>,
     #[command(flatten)]
     variation: Variation,
 }
@@ -50,17 +55,29 @@ impl Question {
     fn sweep(self) -> (&'static str, &'static [&'static str]) {
         match self {
             Self::Friction => ("friction", &[]),
-            Self::Interval => ("velocity", &[]),
+            Self::Interval => ("sliding-velocity", &[]),
             Self::Locking => (
                 "locking-map",
                 &["frequency=linear:10:70:31", "Delta=log:2e-7:4e-6:9"],
             ),
             Self::Sliding => (
-                "regimes",
+                "sliding-regimes",
                 &["V0=log:1e-5:1e-2:10", "tau_r=log:1e-4:1e-1:10"],
             ),
         }
     }
+}
+
+/// What the help begins with.
+fn questions() -> String {
+    let values = Question::value_variants()
+        .iter()
+        .filter_map(Question::to_possible_value);
+    let lines = values.map(|value| {
+        let help = value.get_help().cloned().unwrap_or_default();
+        format!("\n  --question {:10} {help}", value.get_name())
+    });
+    format!("Four to start from:{}", lines.collect::<String>())
 }
 
 /// A sweep that runs unchanged, with all other keys as comments.
@@ -72,10 +89,7 @@ const TEMPLATE: Preset = Preset {
 pub fn init(arguments: &Arguments) -> Result<Exit> {
     let file = &arguments.file;
     let (preset, axes) = match arguments.question.map(Question::sweep) {
-        Some((name, axes)) => (
-            Preset::from_str(name, false).map_err(anyhow::Error::msg)?,
-            axes,
-        ),
+        Some((name, axes)) => (Preset::named(name).map_err(anyhow::Error::msg)?, axes),
         None => (arguments.preset.unwrap_or(TEMPLATE), [].as_slice()),
     };
     let sweep = renamed(preset, file)?;

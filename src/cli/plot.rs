@@ -52,7 +52,7 @@ Examples:
   stickslip plot results/fig3                                          the standing figures, as SVG and PNG
   stickslip plot results/fig3 --format pdf --style print               for a paper
   stickslip plot --list                                                the columns that can be drawn
-  stickslip plot results/velocity --x V0 --y tau_mean --log xy
+  stickslip plot results/sliding-velocity --x V0 --y tau_mean --log xy
   stickslip plot results/fig3 --x eta --y phase_mean --colour V0 --panels Delta --log x -o phase.pdf
   stickslip plot results/friction --x Delta --y mean_friction --colour T --xlim 0:4e-6 \\
     --size 86mmx60mm --style print --format pdf";

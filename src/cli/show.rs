@@ -54,7 +54,7 @@ const EXAMPLES: &str = "\
 Examples:
   stickslip show results/fig3
   stickslip show results/fig3 --where 'V0 > 1e-4 and resultant_length > 0.5' --sort -resultant_excess
-  stickslip show results/velocity --where 'slip_share >= 0.95'   the sets that slide
+  stickslip show results/sliding-velocity --where 'slip_share >= 0.95'   the sets that slide
   stickslip show results/soft results/stiff                   what another Kd changes, say
   stickslip show results/fig3 --columns V0,eta,tau_mean,tau_sd/tau_mean --csv > fig3.csv
 

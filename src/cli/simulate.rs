@@ -186,7 +186,7 @@ Examples:
   stickslip simulate --slips 20
   stickslip simulate --set Delta=1e-6 --set frequency=58 --time 2 --plot slips.png
   stickslip simulate --set dfs=0 --slips 1 --record discard=0 --contacts contacts.parquet
-  stickslip simulate --preset fig1d --panel force --from 0.6 --plot fig1d.svg --plot fig1d.png
+  stickslip simulate --slips 9 --panel force --from 0.6 --until 1.4 --plot fig1d.svg --plot fig1d.png
   stickslip simulate sweeps/fig3.toml --set V0=1e-4 --set Delta=1e-6 --set eta=2 --set seed=0
 
 Keys of --set, in SI units; and eta or frequency (Hz) in place of T:

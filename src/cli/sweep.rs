@@ -11,8 +11,8 @@ use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use arrow_schema::FieldRef;
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::Path;
 
 /// A sweep file that the program holds.
@@ -28,37 +28,77 @@ macro_rules! presets {
     };
 }
 
-const PRESETS: [Preset; 31] = presets! {
-    "choices" "contacts" "disorder" "drag" "drag-strong" "drive-alone" "energies" "eq1" "excess" "fig1d" "fig2" "fig3"
-    "fig3-full" "fig3-precise" "fig4b" "fig4d" "friction" "friction-drives" "friction-precise" "fronts" "locking-edge"
-    "locking-map" "regimes" "size" "sliding-edge" "staircase" "startup" "stiff-drive" "stochasticity" "tongue-4"
-    "velocity"
+/// By question, as their names sort.
+const PRESETS: [Preset; 24] = presets! {
+    "choices" "choices-startup" "drag" "drag-strong" "energies" "fig2" "fig3" "fig3-precise" "fig4" "friction"
+    "friction-drives" "locking-contacts" "locking-disorder" "locking-drive-alone" "locking-edge" "locking-map"
+    "locking-size" "locking-staircase" "locking-stiff-drive" "locking-tongue" "sliding-edge" "sliding-regimes"
+    "sliding-velocity" "stochasticity"
 };
 
+/// Former names of presets, and what stands in their place.
+const FORMER: [(&str, &str); 18] = [
+    ("contacts", "--preset locking-contacts"),
+    ("disorder", "--preset locking-disorder"),
+    ("drive-alone", "--preset locking-drive-alone"),
+    ("eq1", "stickslip simulate --set dfs=0 --set max_time=0.063"),
+    ("excess", "--preset locking-drive-alone"),
+    ("fig1d", "stickslip simulate --slips 9"),
+    (
+        "fig3-full",
+        "--preset fig3 --axis V0=log:1e-6:2e-4:13 --axis eta=log:0.2:1000:49 --axis seed=count:10 --set slips=20",
+    ),
+    ("fig4b", "stickslip simulate --slips 2"),
+    (
+        "fig4d",
+        "stickslip simulate --set Delta=1e-6 --set frequency=58 --slips 16",
+    ),
+    (
+        "friction-precise",
+        "--preset friction --set of=mean_friction --set absolute=3 --set 'seeds={from=24,to=128}'",
+    ),
+    ("fronts", "--preset fig4"),
+    ("regimes", "--preset sliding-regimes"),
+    ("size", "--preset locking-size"),
+    ("staircase", "--preset locking-staircase"),
+    ("startup", "--preset choices-startup"),
+    ("stiff-drive", "--preset locking-stiff-drive"),
+    ("tongue-4", "--preset locking-tongue"),
+    ("velocity", "--preset sliding-velocity"),
+];
+
+/// The names that `--preset` takes; former names are rejected with what stands in their place.
+pub fn preset_parser() -> impl TypedValueParser<Value = Preset> {
+    let current = PRESETS
+        .iter()
+        .map(|preset| PossibleValue::new(preset.name).help(preset.question()));
+    let former = FORMER
+        .iter()
+        .map(|(name, _)| PossibleValue::new(*name).hide(true));
+    PossibleValuesParser::new(current.chain(former)).try_map(|name| Preset::named(&name))
+}
+
 impl Preset {
-    /// What the first line of the file says, without a sentence that continues in the next line.
-    fn about(self) -> &'static str {
+    /// The preset of a name that [`preset_parser`] knows.
+    pub fn named(name: &str) -> Result<Self, String> {
+        if let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) {
+            return Ok(*preset);
+        }
+        let former = FORMER.iter().find(|(former, _)| *former == name);
+        Err(match former {
+            Some((_, now)) => format!("it is now `{now}`"),
+            None => "there is no such preset".to_owned(),
+        })
+    }
+
+    /// The first line of the file.
+    fn question(self) -> &'static str {
         let line = self.text.lines().next().unwrap_or_default();
-        let line = line.trim_start_matches(['#', ' ']);
-        let whole = match line.rsplit_once([':', '.', ',']) {
-            Some((whole, _)) if !line.ends_with('.') => whole,
-            _ => line,
-        };
-        whole.trim_end_matches(['.', ',', ':'])
+        line.trim_start_matches("# ")
     }
 
     pub fn sweep(self) -> Result<Sweep, SweepError> {
         Sweep::parse(self.text, Path::new(self.name))
-    }
-}
-
-impl ValueEnum for Preset {
-    fn value_variants<'a>() -> &'a [Self] {
-        &PRESETS
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name).help(self.about()))
     }
 }
 
@@ -69,6 +109,7 @@ pub struct PresetFlag {
     #[arg(
         long,
         value_name = "NAME",
+        value_parser = preset_parser(),
         conflicts_with = "sweep",
         hide_possible_values = true
     )]
@@ -189,24 +230,28 @@ mod tests {
         assert_eq!(presets, files.collect());
         for preset in PRESETS {
             assert_eq!(preset.sweep().unwrap().name(), preset.name);
+            let mut lines = preset.text.lines();
+            let question = lines.next().unwrap();
+            let figure = lines.next().unwrap();
             assert!(
-                (10..130).contains(&preset.about().len()),
-                "{}: {}",
-                preset.name,
-                preset.about()
+                question.starts_with("# ") && question.ends_with('?'),
+                "{question}"
             );
+            assert!(figure.starts_with("# Figure"), "{figure}");
         }
-        let about = |name: &str| {
-            PRESETS
-                .iter()
-                .find(|preset| preset.name == name)
-                .unwrap()
-                .about()
-        };
-        assert_eq!(about("size"), "Locking against the number of blocks N");
-        assert!(
-            about("friction-drives").ends_with("eight frequencies"),
-            "the next line says how far"
-        );
+        assert!(PRESETS.is_sorted_by_key(|preset| preset.name));
+    }
+
+    #[test]
+    fn a_former_name_is_rejected_with_what_stands_in_its_place() {
+        for (name, now) in FORMER {
+            let command = clap::Command::new("run")
+                .arg(clap::arg!(--preset <NAME>).value_parser(preset_parser()));
+            let error = command.try_get_matches_from(["run", "--preset", name]);
+            assert!(error.unwrap_err().to_string().contains(now), "{name}");
+            if let Some(name) = now.strip_prefix("--preset ") {
+                Preset::named(name.split(' ').next().unwrap()).unwrap();
+            }
+        }
     }
 }

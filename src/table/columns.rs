@@ -121,13 +121,20 @@ pub(crate) mod tests {
 
     #[test]
     fn the_documentation_has_a_line_for_each_column() {
-        let text = markdown::<Readings>();
+        let text = markdown::<Readings>(&[]);
         assert!(
             text.starts_with("## readings\n\nOne row per reading.\n"),
             "{text}"
         );
         assert!(
-            text.contains("| `phase` | rad? | phase of the onset |\n"),
+            text.contains("- `phase` (rad?): phase of the onset\n"),
+            "{text}"
+        );
+        let text = markdown::<Readings>(&[("earlier", Reading::columns())]);
+        assert!(
+            text.contains(
+                "- `force`, `phase`, `number`, `name`, `high`, `rule`: as in [earlier](#earlier)\n"
+            ),
             "{text}"
         );
     }

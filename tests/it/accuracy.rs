@@ -154,7 +154,7 @@ fn what_cannot_be_studied_is_refused() {
         ("--set Foo=3", "unknown key"),
         ("--set V0", "must be KEY=VALUE"),
         (
-            "--preset fig4b -o many.toml",
+            "--preset fig2 -o many.toml",
             "--out many.toml: must be a folder",
         ),
     ] {

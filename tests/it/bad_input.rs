@@ -627,7 +627,7 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
             ],
         ),
         (
-            "simulate good.toml --preset fig4b",
+            "simulate good.toml --preset fig2",
             &["'[SWEEP.toml]'", "--preset"],
         ),
         (
@@ -677,7 +677,7 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
             &["frequency in [axes.zip]: fixes the period, as does eta; keep one"],
         ),
         (
-            "plan --preset velocity --set of=tau_mean --set relative=0.02",
+            "plan --preset sliding-velocity --set of=tau_mean --set relative=0.02",
             &["flags: seeds is missing in [precision]"],
         ),
         (

@@ -384,7 +384,7 @@ fn panels_are_full(folder: &Folder, directory: &str, sweep: &str) -> usize {
 
 /// With a slider of five blocks, four slips and two seeds of each set of a sweep in rounds.
 #[test]
-fn the_sweeps_of_this_project_have_figures_if_anything_slips() {
+fn the_sweeps_of_this_project_have_figures() {
     let folder = Folder::new();
     for file in fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/sweeps")).unwrap() {
         let path = file.unwrap().path();
@@ -412,10 +412,6 @@ fn the_sweeps_of_this_project_have_figures_if_anything_slips() {
             0,
             &format!("run sweep.toml {} --out {name}", settings.join(" ")),
         );
-        assert_eq!(
-            panels_are_full(&folder, &name, &name) == 0,
-            name == "eq1",
-            "{name}"
-        );
+        assert!(panels_are_full(&folder, &name, &name) > 0, "{name}");
     }
 }

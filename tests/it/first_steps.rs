@@ -30,16 +30,27 @@ fn a_sweep_of_the_paper_runs_without_a_file_and_can_be_changed() {
     let folder = Folder::new();
     assert!(
         folder
-            .ends(0, "plan --preset fig3-full")
+            .ends(0, "plan --preset fig3 --axis seed=count:3")
             .stdout
-            .contains("14360 after conditions")
+            .contains("1521 after conditions")
     );
-    folder.ends(0, "run --preset eq1 --no-reduce");
-    assert_eq!(folder.table("results/eq1", "jobs").cells.len(), 1);
+    folder.ends(
+        0,
+        "run --preset fig4 --set Delta=0 --set seed=0 --set slips=2 --no-reduce",
+    );
+    assert_eq!(folder.table("results/fig4", "jobs").cells.len(), 1);
     folder.ends(0, "init my-map.toml --preset locking-map");
     assert!(folder.ends(0, "plan my-map.toml").stdout.contains("my-map"));
     let unknown = folder.ends(2, "run --preset fig33");
     assert!(unknown.stderr.contains("fig3"), "{}", unknown.stderr);
+    let former = folder.ends(2, "run --preset velocity");
+    assert!(
+        former
+            .stderr
+            .contains("it is now `--preset sliding-velocity`"),
+        "{}",
+        former.stderr
+    );
     let both = folder.ends(2, "plan my-map.toml --preset fig3");
     assert!(
         both.stderr.contains("cannot be used with"),
@@ -86,9 +97,16 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
         [1e-4, 2e-4]
     );
     // Where there is no directory yet, none can be extended by mistake.
-    folder.ends(0, "run --preset eq1 --set N=3 --set Ns=4 --no-reduce");
-    assert_eq!(folder.table("results/eq1", "jobs").counts("N"), [3]);
-    folder.ends(0, &format!("init other.toml --preset velocity {flags}"));
+    folder.ends(
+        0,
+        "run --preset sliding-velocity --set V0=1e-4 --set seed=0 --set N=3 --set Ns=4 --no-reduce",
+    );
+    let jobs = folder.table("results/sliding-velocity", "jobs");
+    assert_eq!(jobs.counts("N"), [3]);
+    folder.ends(
+        0,
+        &format!("init other.toml --preset sliding-velocity {flags}"),
+    );
     assert!(
         folder
             .ends(0, "plan other.toml")

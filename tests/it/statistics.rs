@@ -78,7 +78,7 @@ impl Intervals {
             / self.0.len() as f64
     }
 
-    /// |<exp(2πi τ/T)>|: 1 if every interval is a whole number of periods.
+    /// |<exp(2πi τ/T)>|: 1 if all intervals leave the same remainder modulo T.
     fn locking_index(&self, period: f64) -> f64 {
         let mean = |part: fn(f64) -> f64| {
             self.0

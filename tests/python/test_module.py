@@ -439,7 +439,7 @@ def test_a_wheel_holds_the_package_alone(wheel):
 def test_two_commands_lead_from_a_wheel_to_a_figure_without_rust(wheel, tmp_path):
     subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)
     environment = {"PATH": f"{tmp_path}/venv/bin:/usr/bin:/bin", "HOME": str(tmp_path)}
-    for command in (["pip", "install", "--no-index", wheel], ["stickslip", "run", "--preset", "velocity", "--set", "N=9", "-o", "r"]):
+    for command in (["pip", "install", "--no-index", wheel], ["stickslip", "run", "--preset", "sliding-velocity", "--set", "N=9", "-o", "r"]):
         done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "r" / "figures" / "overview.png").stat().st_size > 10_000 and "⟨τ⟩" in done.stdout

@@ -1,8 +1,7 @@
-"""The script in docs/clusters.md puts directories together in which shards of one sweep ran: with the bytes of a run of its
-own, also if it was killed at any step before, and never from another sweep."""
+"""scripts/gather puts directories together in which shards of one sweep ran: with the bytes of a single run, also if it was
+killed at any step before, and never from another sweep."""
 
 import os
-import re
 import shutil
 import subprocess
 
@@ -39,9 +38,6 @@ def shards(stickslip, tmp_path_factory):
 @pytest.fixture
 def gather(tmp_path):
     """Runs the script; it is killed at a call of a program, if it is given its number."""
-    text = (ROOT / "docs" / "clusters.md").read_text()
-    (script,) = re.findall(r"^```sh\n(#!/bin/sh\n# sh gather\.sh.*?)^```", text, re.M | re.S)
-    (tmp_path / "gather.sh").write_text(script)
     (tmp_path / "bin").mkdir()
     for name in ("cmp", "mkdir", "cp", "mv", "rm"):
         (tmp_path / "bin" / name).write_text(DEADLY.format(name=name, program=shutil.which(name)))
@@ -50,7 +46,7 @@ def gather(tmp_path):
     def run(*directories, deadly=0):
         (tmp_path / "calls").write_text("")
         environment = {"PATH": f"{tmp_path}/bin:{os.environ['PATH']}", "CALLS": f"{tmp_path}/calls", "DEADLY": str(deadly)}
-        command = ["sh", tmp_path / "gather.sh", *directories]
+        command = [ROOT / "scripts" / "gather", *directories]
         return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
 
     return run
