@@ -31,11 +31,11 @@ columns! {
         parameters: Selected<AllButSeed>;
         frequency: Option<f64> = "Hz", "1/T; null without modulation", "1/T" "Modulation frequency";
         eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation", "η" "η = 2πΔ / (T V₀)";
-        finished_jobs as "jobs": u64 = "", "jobs run to an end, one per seed";
+        finished_jobs as "jobs": u64 = "", "jobs run to an end (finished), one per seed";
         failed_jobs: u64 = "", "jobs that failed";
-        is_control as "control": bool = "", "whether its jobs were run as a control alone (`control = true`), and not for themselves";
-        jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
-        jobs_cut: Option<u64> = "", "of the jobs run to an end, those that `max_time` ended: of their last interval nothing counts; null in reduced data of earlier versions";
+        is_control as "control": bool = "", "whether its jobs are controls alone (`control = true`)";
+        jobs_without_slips: u64 = "", "finished jobs that gave up as no slip came";
+        jobs_cut: Option<u64> = "", "finished jobs whose last interval `max_time` cut; null in reduced data of earlier versions";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ", "regime";
         slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs", "slip share" "Share of time within slips";
         slip_share_interval as "slip_share": Option<Interval> = "", "lower end of its 95 % confidence interval, of jobs as units";
@@ -44,9 +44,9 @@ columns! {
         tau_mean: Option<f64> = "s", "mean interval", "⟨τ⟩";
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_bound as "tau_mean_bound": Option<f64> = "s",
-            "what tau_mean is at least, if it is null since a job gave up; the time since its last slip counts as an interval", "⟨τ⟩, at least" "Least mean interval";
+            "lower bound of tau_mean, if it is null as a job gave up", "⟨τ⟩, at least" "Least mean interval";
         tau_off as "tau_mean_off": Option<f64> = "",
-            "about how much of tau_mean is missing where `max_time` cut intervals: -(tau_sd/tau_mean)^2 over the intervals of such a job; null if it cut none", "tau mean off";
+            "relative bias of tau_mean where `max_time` cut intervals; null if it cut none", "tau mean off";
         tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals", "σ(τ)" "S.d. of the intervals";
         tau_deviation_interval as "tau_sd": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_05: Option<f64> = "s", "5 % quantile of the intervals", "τ(5 %)";
@@ -56,20 +56,20 @@ columns! {
         tau_75: Option<f64> = "s", "75 % quantile of the intervals", "τ(75 %)";
         tau_95: Option<f64> = "s", "95 % quantile", "τ(95 %)" "95 % quantile of the intervals";
         periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded", "n" "Periods per slip";
-        locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods; null where `periods` is 0", "locking" "Locking index of τ";
+        locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if all intervals leave the same remainder modulo T; for tau < T a narrow tau suffices, so compare with the drive alone; null where `periods` is 0", "locking" "Locking index of τ";
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
         locking_index_drive: Option<f64> = "",
-            "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control", "locking, drive" "Locking index by the drive alone";
+            "the same by the drive alone: slips at the loads of the control; null without a control", "locking, drive" "Locking index by the drive alone";
         locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: what the slider adds", "locking, excess" "Locking index beyond the drive's";
         locking_excess_interval as "locking_index_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         phase_mean: Option<f64> = "rad", "circular mean of the phase; if T is tau_mean or more, over whole cycles from the first onset of each job, and null below two of them a job", "⟨φ⟩" "Mean phase";
         phase_interval as "phase_mean": Option<Interval> = "rad",
             "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
-        has_phase: bool = "", "whether directions are excluded: the interval of phase_mean is known, and narrower than 3/2 pi", "has phase";
+        has_phase: bool = "", "whether the interval of phase_mean is narrower than 3/2 pi", "has phase";
         resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase", "R" "Resultant length of the phase";
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
         resultant_drive: Option<f64> = "",
-            "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control", "R, drive" "Resultant length by the drive alone";
+            "the same by the drive alone: slips at the loads of the control; null without a control", "R, drive" "Resultant length by the drive alone";
         resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds", "R, excess" "Resultant length beyond the drive's";
         resultant_excess_interval as "resultant_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         drop_mean: Option<f64> = "N", "mean stress drop", "⟨ΔF⟩";
