@@ -73,7 +73,7 @@ fn table(fields: &[(Description, Value)]) -> String {
     text
 }
 
-/// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
+/// The section of a table in the documentation, in Markdown. Parameters of the model, described on another page,
 /// share a line, and so do a statistic and its interval; a unit with `?` is that of a column that may be null.
 pub(crate) fn markdown<T: Table>() -> String {
     let is_parameter = |column: &Column| {
