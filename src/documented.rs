@@ -74,7 +74,7 @@ fn table(fields: &[(Description, Value)]) -> String {
 }
 
 /// The section of a table in the documentation, in Markdown: a line for each column. Parameters of the model, described
-/// on a page of their own, share a line, and so do columns that an earlier table has, and a statistic and its interval.
+/// on another page, share a line, and so do columns that an earlier table has, and a statistic and its interval.
 pub(crate) fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> String {
     let is_parameter = |column: &Column| {
         Symbol::from_key(&column.name)

@@ -33,7 +33,7 @@
 //! | outline | a part without its jobs: where they lie, and their sums |
 //! | worker | a process that works on a results directory, beside others |
 //! | claim | which worker runs a part |
-//! | shard | a share of the parts, run into a directory of its own |
+//! | shard | a share of the parts, run into a separate directory |
 
 pub mod accuracy;
 pub mod cli;

@@ -295,7 +295,7 @@ impl Combination {
 /// A line through the samples of sets.
 struct Fit {
     slope: f64,
-    /// Where it crosses zero, and the ends of the interval of that: none if the slope may be zero.
+    /// Where it crosses zero, and the ends of its interval; `None` if the slope may be zero.
     crossing: f64,
     interval: Option<[f64; 2]>,
 }

@@ -173,7 +173,7 @@ impl Cycles {
         is_slow.then_some(Self { period })
     }
 
-    /// The slips of each job within whole cycles from its first one on; none if these are too few.
+    /// The slips of each job within whole cycles from its first one on; empty if these are too few.
     pub(super) fn within<'a, T>(self, jobs: &[&'a [T]], onset: impl Fn(&T) -> f64) -> Vec<&'a [T]> {
         let mut total = 0.0;
         let mut of_job = |slips: &&'a [T]| -> &'a [T] {

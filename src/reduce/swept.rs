@@ -1,12 +1,10 @@
 //! What was swept, inferred from the sets: the columns in which they differ. The first makes the axis of a figure, the second
 //! its colours, the third its panels.
 
-use super::values::Values;
+use super::values::{Values, ascending, is_same};
 use crate::model::Symbol;
 use crate::sets::{FREQUENCY, SetRow};
 
-/// Numbers that differ by less than this share count as equal: they were computed from numbers with twelve digits.
-const SAME: f64 = 1e-10;
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
 const EVEN: f64 = 0.02;
 /// Ratio from which two values lie on a logarithmic axis.
@@ -102,18 +100,6 @@ pub fn swept(rows: &[SetRow]) -> Vec<Swept> {
         }
     }
     kept
-}
-
-/// Each value once, in their order.
-pub fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup_by(|next, value| is_same(*next, *value));
-    values
-}
-
-pub fn is_same(value: f64, other: f64) -> bool {
-    (value - other).abs() <= SAME * value.abs()
 }
 
 /// Whether values that ascend are > 0 and so far apart that a logarithmic axis shows them.

@@ -1,12 +1,14 @@
 //! Columns of the sets by name, or formulas of them, as numbers: for figures, and for tables that people read.
 
-use super::swept::ascending;
 use crate::model::Symbol;
 use crate::sets::{Digits, FREQUENCY, Label, SetRow, label};
 use crate::sweep::{Expression, nearest};
 use crate::table::columns::{Column, Kind, Row, Value};
 use crate::table::value::floored;
 use std::collections::BTreeSet;
+
+/// Numbers that differ by less than this share count as equal: they were computed from numbers with twelve digits.
+const SAME: f64 = 1e-10;
 
 /// A column of the sets, or a formula of such.
 #[derive(Clone, Debug)]
@@ -192,6 +194,18 @@ fn unknown(name: &str, columns: &[Column]) -> String {
     };
     let hint = meant.map_or_else(String::new, |meant| format!(" did you mean {meant}?"));
     format!("no such column;{hint} `stickslip plot --list` shows all")
+}
+
+/// Each value once, in their order.
+pub fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup_by(|next, value| is_same(*next, *value));
+    values
+}
+
+pub fn is_same(value: f64, other: f64) -> bool {
+    (value - other).abs() <= SAME * value.abs()
 }
 
 #[cfg(test)]

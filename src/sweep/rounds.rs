@@ -62,7 +62,7 @@ pub struct Refinement {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Round {
-    /// The points, in order; none: the rounds are over.
+    /// The points, in order; empty if the rounds are over.
     #[serde(serialize_with = "write_ranges", deserialize_with = "read_ranges")]
     pub points: Vec<RangeInclusive<u64>>,
     pub standing: Standing,

@@ -342,7 +342,7 @@ impl<'a> Dataset<'a> {
         self.read(names.iter().cloned().map(Cow::Owned).collect())
     }
 
-    /// Of columns with these names; of all if there are none.
+    /// Reads the columns with these names; all columns if the list is empty.
     fn read(
         self,
         columns: Vec<Cow<'static, str>>,

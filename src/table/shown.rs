@@ -1,4 +1,4 @@
-//! Names and texts of files in messages: what could steer a terminal, or pass for a line of its own, is escaped.
+//! Names and texts of files in messages: what could steer a terminal, or look like another line, is escaped.
 
 use std::fmt;
 use std::path::Path;

@@ -80,7 +80,7 @@ pub trait Storage: Sync {
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError>;
     /// Returns when the names in a folder are on the disk.
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError>;
-    /// Names in a folder, sorted; none if there is no such folder.
+    /// Names in a folder, sorted; empty if there is no such folder.
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError>;
     /// Opens a regular file for reading. Of anything else that has its name, the error [is no file](StorageError::is_no_file).
     fn open(&self, file: &Path) -> Result<File, StorageError>;

@@ -281,7 +281,7 @@ fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
             .map(|part| part.jobs.len())
             .collect()
     };
-    // Two parts at least, then 5 s each; dear jobs alone; more than 5 s where parts would be too many.
+    // Two parts at least, then 5 s each; expensive jobs alone; more than 5 s where parts would be too many.
     assert_eq!(sizes(10, 0.6), [5, 5]);
     assert_eq!(sizes(20, 0.6), [8, 8, 4]);
     assert_eq!(sizes(20, 6.0), [1; 20]);

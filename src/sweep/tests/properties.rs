@@ -8,7 +8,7 @@ use proptest::collection::btree_set;
 use proptest::prelude::*;
 use std::collections::HashSet;
 
-/// A random axis as a file writes it: its lines below `[axes]`, or a table of its own.
+/// A random axis as a file writes it: its lines below `[axes]`, or a separate table.
 fn list(
     key: &'static str,
     values: impl Strategy<Value = Vec<f64>>,
@@ -51,7 +51,7 @@ fn range(key: &'static str) -> impl Strategy<Value = String> {
         })
 }
 
-/// What fixes the period, with amplitudes that include 0: an axis of its own, in a zip or in a sample.
+/// What fixes the period, with amplitudes that include 0: a separate axis, in a zip or in a sample.
 fn modulation() -> impl Strategy<Value = String> {
     let key = || prop_oneof![Just("T"), Just("eta"), Just("frequency")];
     let amplitudes = prop_oneof![Just("[0, 3e-7, 1e-6]"), Just("[2e-7, 0]"), Just("[1e-6]")];
