@@ -60,29 +60,26 @@ pub fn read(
     let layout = Layout::new(&Disk, &directory);
     let results = py.detach(|| Results::read(&layout)).map_err(Error::from)?;
     let columns = columns.as_deref();
-    let found = match TABLES.into_iter().find(|known| *known == table) {
-        Some(table) => {
-            let columns = columns_of_table(&results, table, columns, join)?;
-            watched::<_, ()>(
-                py,
-                |stop, _| read_table(&results, table, columns, stop),
-                |()| (),
-                |_| Ok(()),
-            )
-        }
-        None => {
-            let (table, all) = reduced_columns(&results, table)?;
-            let columns = match columns {
-                Some(names) => named(table, &all, names)?,
-                None => all.to_vec(),
-            };
-            watched::<_, ()>(
-                py,
-                |_, _| read_reduced(&results, table, columns),
-                |()| (),
-                |_| Ok(()),
-            )
-        }
+    let found = if let Some(table) = TABLES.into_iter().find(|known| *known == table) {
+        let columns = columns_of_table(&results, table, columns, join)?;
+        watched::<_, ()>(
+            py,
+            |stop, _| read_table(&results, table, &columns, stop),
+            |()| (),
+            |_| Ok(()),
+        )
+    } else {
+        let (table, all) = reduced_columns(&results, table)?;
+        let columns = match columns {
+            Some(names) => named(table, &all, names)?,
+            None => all.to_vec(),
+        };
+        watched::<_, ()>(
+            py,
+            |_, _| read_reduced(&results, table, columns),
+            |()| (),
+            |_| Ok(()),
+        )
     };
     Ok(found?)
 }
@@ -127,14 +124,14 @@ fn columns_of_table(
 fn read_table(
     results: &Results<'_>,
     table: &'static str,
-    columns: Vec<FieldRef>,
+    columns: &[FieldRef],
     stop: &AtomicBool,
 ) -> Result<Table, Error> {
     if !results.tables().any(|recorded| recorded == table) {
         let problem = "has no precursors; set precursors = true under [record]";
         return Err(ResultsError::refused(results.layout().root(), problem).into());
     }
-    let joined = JoinedTable::new(results, table, &columns);
+    let joined = JoinedTable::new(results, table, columns);
     let mut batches = Vec::new();
     for part in joined.parts()? {
         if stop.load(Ordering::Relaxed) {
