@@ -398,8 +398,9 @@ fn nice_step(step: f64) -> f64 {
 fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = f64> {
     let slack = 1e-6;
     #[expect(clippy::cast_possible_truncation, reason = "a few dozen multiples")]
-    let first = (low / step - slack).ceil() as i64;
-    let last = (high / step + slack).floor() as i64;
+    let whole = |multiple: f64| multiple as i64;
+    let first = whole((low / step - slack).ceil());
+    let last = whole((high / step + slack).floor());
     (first..=last)
         .take(MAX_MULTIPLES)
         .map(move |multiple| multiple as f64 * step)

@@ -49,7 +49,7 @@ impl ColourBar {
         let boxes = self.colours.iter().enumerate().map(|(step, colour)| {
             let top = bottom - (step + 1) as f64 * height;
             let overlap = if step == 0 { 0.0 } else { OVERLAP };
-            ([left, top, WIDTH, height + overlap], colour.clone())
+            ([left, top, WIDTH, height + overlap], *colour)
         });
         sheet.clipped([left, top, WIDTH, frame.height], |sheet| {
             sheet.rectangles(boxes);

@@ -23,7 +23,7 @@ const MAX_MULTIPLES: f64 = 40.0;
 /// Space in a panel for the numbers of the multiples.
 const NUMBERS: f64 = 24.0;
 const BAR: Fill = Fill {
-    ink: Ink::new(0x9db4d6),
+    ink: Ink::new(0x9d_b4_d6),
     opacity: 1.0,
 };
 const OUTLINE: Stroke = Stroke::solid(BLACK, 1.3);

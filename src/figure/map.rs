@@ -27,7 +27,7 @@ const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 const CASING: Stroke = Stroke::solid(WHITE, 4.4);
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
 /// Sets without a phase.
-const FREE: Ink = Ink::new(0xf2f2f0);
+const FREE: Ink = Ink::new(0xf2_f2_f0);
 
 /// A column and a row of a map.
 type Position = (usize, usize);
@@ -96,12 +96,8 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         if is_of_periods {
             mark_periods(&mut bar, &scale, ends().unwrap_or_default());
         }
-        let none = is_of_periods.then(|| FREE);
-        let cells = map.coloured(|set| {
-            number(set)
-                .map(|n| colour(scale.place(n)))
-                .or_else(|| none.clone())
-        });
+        let none = is_of_periods.then_some(FREE);
+        let cells = map.coloured(|set| number(set).map(|n| colour(scale.place(n))).or(none));
         let layers = std::iter::once(cells).chain(lines());
         let height = if is_locking { 280.0 } else { 220.0 };
         Some(Panel {

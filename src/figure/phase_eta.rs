@@ -181,10 +181,10 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
         };
         return cells.map(clipped).collect();
     }
-    let place = |eta: f64| libm::log10(eta) * COLUMNS_PER_DECADE;
     #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
-    let first = place(values[0]).floor() as i32;
-    let last = place(values[values.len() - 1]).floor() as i32;
+    let column = |eta: f64| (libm::log10(eta) * COLUMNS_PER_DECADE).floor() as i32;
+    let first = column(values[0]);
+    let last = column(values[values.len() - 1]);
     let edge = |column: i32| libm::exp10(f64::from(column) / COLUMNS_PER_DECADE);
     (first..=last)
         .map(|column| (edge(column), edge(column + 1)))

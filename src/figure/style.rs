@@ -115,36 +115,36 @@ pub(super) const NOTE_TEXT: u32 = 12;
 pub(super) const HALF_DIGIT: f64 = 0.36;
 
 /// Black for axes and text.
-pub(super) const BLACK: Ink = Ink::new(0x000000);
-pub(super) const DARK_GREY: Ink = Ink::new(0x555555);
+pub(super) const BLACK: Ink = Ink::new(0x00_00_00);
+pub(super) const DARK_GREY: Ink = Ink::new(0x55_55_55);
 /// For data in the background.
-pub(super) const GREY: Ink = Ink::new(0x8c8c8c);
-pub(super) const LIGHT_GREY: Ink = Ink::new(0xb8b8b8);
-pub(super) const WHITE: Ink = Ink::new(0xffffff);
-pub(super) const RED: Ink = Ink::new(0xd62020);
-pub(super) const BLUE: Ink = Ink::new(0x1f55c4);
+pub(super) const GREY: Ink = Ink::new(0x8c_8c_8c);
+pub(super) const LIGHT_GREY: Ink = Ink::new(0xb8_b8_b8);
+pub(super) const WHITE: Ink = Ink::new(0xff_ff_ff);
+pub(super) const RED: Ink = Ink::new(0xd6_20_20);
+pub(super) const BLUE: Ink = Ink::new(0x1f_55_c4);
 /// For lines side by side: colours that colour-blind readers can distinguish (Okabe and Ito).
 pub const INKS: [Ink; 6] = [
-    Ink::new(0x0072b2),
-    Ink::new(0xd55e00),
-    Ink::new(0x009e73),
-    Ink::new(0xcc79a7),
-    Ink::new(0xe69f00),
-    Ink::new(0x56b4e9),
+    Ink::new(0x00_72_b2),
+    Ink::new(0xd5_5e_00),
+    Ink::new(0x00_9e_73),
+    Ink::new(0xcc_79_a7),
+    Ink::new(0xe6_9f_00),
+    Ink::new(0x56_b4_e9),
 ];
 
 /// For dots on a scale: the darker of the shades, which are seen on white.
 pub const SCALE: [Ink; 10] = [
-    Ink::new(0xabd4ce),
-    Ink::new(0x8fc7c7),
-    Ink::new(0x74b9c1),
-    Ink::new(0x5ba9ba),
-    Ink::new(0x4598b2),
-    Ink::new(0x3586a8),
-    Ink::new(0x2a749c),
-    Ink::new(0x22618e),
-    Ink::new(0x1e4e7c),
-    Ink::new(0x1b3a68),
+    Ink::new(0xab_d4_ce),
+    Ink::new(0x8f_c7_c7),
+    Ink::new(0x74_b9_c1),
+    Ink::new(0x5b_a9_ba),
+    Ink::new(0x45_98_b2),
+    Ink::new(0x35_86_a8),
+    Ink::new(0x2a_74_9c),
+    Ink::new(0x22_61_8e),
+    Ink::new(0x1e_4e_7c),
+    Ink::new(0x1b_3a_68),
 ];
 
 /// Border and ticks of a frame.

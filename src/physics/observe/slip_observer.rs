@@ -47,12 +47,12 @@ struct Instant {
     spent: Spent,
 }
 
-/// Largest shear forces since the last slip's end, since the last rupture of precursor size, and since the last break.
+/// Largest shear forces since the last slip's end, the last rupture of precursor size, and the last break.
 #[derive(Clone, Debug)]
-struct Peaks {
-    since_slip: Peak,
-    since_precursor: Peak,
-    since_break: Peak,
+struct PeaksSince {
+    slip: Peak,
+    precursor: Peak,
+    last_break: Peak,
 }
 
 /// Precursors of the slip to come.
@@ -81,11 +81,11 @@ struct Span {
 
 /// The drive in its cycle at an instant of a slip or precursor.
 #[derive(Clone, Debug)]
-struct Drives {
-    at_slip_onset: Drive,
-    at_precursor_onset: Drive,
-    /// At the first or last break of the last slip.
-    at_break: Drive,
+struct DriveAt {
+    slip_onset: Drive,
+    precursor_onset: Drive,
+    /// The first or last break of the last slip.
+    slip_break: Drive,
 }
 
 /// What makes a rupture a slip or a precursor, and when it and the job end.
@@ -110,13 +110,13 @@ pub struct SlipObserver {
     parameters: Parameters,
     recording: Recording,
     criteria: Criteria,
-    drives: Drives,
+    drive_at: DriveAt,
     /// The end of the last segment, but for what is counted at events.
     now: Instant,
     /// The last event, and the contacts attached after it.
     at_event: Instant,
     attached: u64,
-    peaks: Peaks,
+    peaks_since: PeaksSince,
     rupture: Option<Active>,
     slips_seen: u64,
     last_onset: Option<f64>,
@@ -170,18 +170,18 @@ impl SlipObserver {
             parameters: parameters.clone(),
             recording: *recording,
             criteria,
-            drives: Drives {
-                at_slip_onset: drive,
-                at_precursor_onset: drive,
-                at_break: drive,
+            drive_at: DriveAt {
+                slip_onset: drive,
+                precursor_onset: drive,
+                slip_break: drive,
             },
             now: Instant::default(),
             at_event: Instant::default(),
             attached: contacts,
-            peaks: Peaks {
-                since_slip: start,
-                since_precursor: start,
-                since_break: start,
+            peaks_since: PeaksSince {
+                slip: start,
+                precursor: start,
+                last_break: start,
             },
             rupture: None,
             slips_seen: 0,
@@ -288,7 +288,7 @@ impl SlipObserver {
             self.rupture.insert(Active {
                 rupture: Rupture::new(event, blocks),
                 onset: None,
-                precursor_onset: self.peaks.since_precursor,
+                precursor_onset: self.peaks_since.precursor,
                 least: self.now.force,
                 least_at_last_break: self.now.force,
                 first: here,
@@ -297,12 +297,12 @@ impl SlipObserver {
             })
         };
         if event.block + 1 == blocks && active.onset.is_none() {
-            active.onset = Some(self.peaks.since_slip);
-            active.onset_cut = self.now.force >= self.peaks.since_slip.force;
+            active.onset = Some(self.peaks_since.slip);
+            active.onset_cut = self.now.force >= self.peaks_since.slip.force;
         }
         active.least_at_last_break = active.least;
         active.last = here;
-        self.peaks.since_break = Peak {
+        self.peaks_since.last_break = Peak {
             time: event.time,
             force: self.now.force,
         };
@@ -326,14 +326,14 @@ impl SlipObserver {
     fn record_slip(&mut self, active: &Active) {
         let rupture = &active.rupture;
         // A slip has reached the leading edge.
-        let onset = active.onset.unwrap_or(self.peaks.since_slip);
+        let onset = active.onset.unwrap_or(self.peaks_since.slip);
         let first = active.first;
         let last = active.last;
         let discard = self.recording.discard;
-        self.drives.at_slip_onset.advance_to(onset.time);
+        self.drive_at.slip_onset.advance_to(onset.time);
         if self.slips_seen >= discard {
             let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
-            let drive = &self.drives.at_slip_onset;
+            let drive = &self.drive_at.slip_onset;
             let modulation = Modulation::of(drive);
             let interval = self.last_onset.map(|last| onset.time - last);
             let spent = self
@@ -387,15 +387,15 @@ impl SlipObserver {
         self.span.last_slip_end = Some(end);
         self.span.settled = None;
         self.last_onset = Some(onset.time);
-        self.peaks.since_slip = self.peaks.since_break;
-        self.peaks.since_precursor = self.peaks.since_break;
+        self.peaks_since.slip = self.peaks_since.last_break;
+        self.peaks_since.precursor = self.peaks_since.last_break;
         self.pending = Pending::default();
     }
 
     /// Displacement of the driven edge at a break of the last slip, from the force and the drive, in m.
     fn edge_displacement(&mut self, at: Instant) -> f64 {
-        self.drives.at_break.advance_to(at.time);
-        self.drives.at_break.motion(at.time).0 - at.force / self.drives.at_break.stiffness
+        self.drive_at.slip_break.advance_to(at.time);
+        self.drive_at.slip_break.motion(at.time).0 - at.force / self.drive_at.slip_break.stiffness
     }
 
     fn record_precursor(&mut self, active: &Active) {
@@ -404,13 +404,13 @@ impl SlipObserver {
         let last = active.last;
         let onset = active.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
-            self.drives.at_precursor_onset.advance_to(onset);
+            self.drive_at.precursor_onset.advance_to(onset);
             self.precursors.push(Precursor {
                 slip: self.slips_seen - self.recording.discard,
                 precursor: self.pending.count,
                 onset,
                 interval: self.pending.last_onset.map(|last| onset - last),
-                modulation: Modulation::of(&self.drives.at_precursor_onset),
+                modulation: Modulation::of(&self.drive_at.precursor_onset),
                 nucleation: first.time,
                 nucleation_block: rupture.first_block as u64 + 1,
                 duration: last.time - first.time,
@@ -435,7 +435,7 @@ impl SlipObserver {
         self.pending.count += 1;
         self.pending.largest = self.pending.largest.max(rupture.size);
         self.pending.last_onset = Some(onset);
-        self.peaks.since_precursor = self.peaks.since_break;
+        self.peaks_since.precursor = self.peaks_since.last_break;
     }
 }
 
@@ -448,15 +448,15 @@ impl Observer for SlipObserver {
             .as_ref()
             .is_some_and(|active| self.criteria.is_recorded(&active.rupture));
         let floor = if recordable {
-            self.peaks.since_break.force
+            self.peaks_since.last_break.force
         } else {
-            self.peaks.since_precursor.force
+            self.peaks_since.precursor.force
         };
         if let Some((time, force)) = segment.maximum_above(floor) {
             let peak = Peak { time, force };
-            self.peaks.since_break = peak;
-            self.peaks.since_precursor.raise(peak);
-            self.peaks.since_slip.raise(peak);
+            self.peaks_since.last_break = peak;
+            self.peaks_since.precursor.raise(peak);
+            self.peaks_since.slip.raise(peak);
         }
         if let Some(active) = &mut self.rupture
             && let Some((_, force)) = segment.minimum_below(active.least)

@@ -49,6 +49,14 @@ impl Motion {
         a[0] *= inverse_mass;
     }
 
+    fn final_state(&self, driven: f64) -> FinalState<'_> {
+        FinalState {
+            displacement: &self.displacement,
+            velocity: &self.velocity,
+            driven,
+        }
+    }
+
     /// Whether any block is at or past a break position.
     #[inline(always)]
     #[expect(
@@ -214,11 +222,7 @@ fn integrate(
         });
     }
     if let Some(audit) = audit {
-        let end = FinalState {
-            displacement: &motion.displacement,
-            velocity: &motion.velocity,
-            driven: drive.motion(summary.end_time).0,
-        };
+        let end = motion.final_state(drive.motion(summary.end_time).0);
         audit.record_final_energy(end, &interface, mass, coupling, drive.stiffness);
     }
     observer.end(summary.end_time, &motion.displacement);
