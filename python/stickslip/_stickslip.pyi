@@ -35,7 +35,7 @@ VERSION: str
 """Version of the program and of the module."""
 
 class SweepError(ValueError):
-    """A sweep, or a key of a simulation, that says nothing that can run."""
+    """A mistake in a sweep, or in the keys of a simulation."""
 
 class ResultsError(RuntimeError):
     """A results directory that cannot be used, read or written."""
