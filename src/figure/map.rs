@@ -183,9 +183,8 @@ fn legend(is_locking: bool) -> Vec<Entry> {
         ]
     } else {
         let [mixed, sliding] = Regime::MIN_SHARES;
-        let text = format!(
-            "borders of the regimes: mixed from a share of {mixed}, sliding from {sliding}; no slips where white"
-        );
+        let text =
+            format!("stick-slip, mixed (share of {mixed} or more), sliding ({sliding} or more)");
         vec![entry(Mark::Line(BORDER), text)]
     }
 }
