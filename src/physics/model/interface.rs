@@ -302,7 +302,7 @@ impl Interface {
     }
 
     /// Breaks and counts every contact of a block whose threshold is reached at this displacement, in the order of contacts.
-    /// Passes each to `log`, with what [`Self::count`] gives.
+    /// Passes each to `log`, with what `count` gives.
     #[inline(always)]
     pub fn break_reached(
         &mut self,
