@@ -190,7 +190,7 @@ impl<'a> Forecast<'a> {
 }
 
 impl DirectoryState {
-    /// `None` if there is none yet.
+    /// `None` if the directory does not exist yet.
     fn of(sweep: &Sweep, root: PathBuf) -> Result<Option<Self>> {
         if !Disk.exists(&root)? {
             return Ok(None);

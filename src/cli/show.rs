@@ -96,7 +96,7 @@ impl Arguments {
         !self.json && !self.csv
     }
 
-    /// Prints columns of so many sets as is asked, as JSON with the edges; `rows` are the sets, if they are of one directory.
+    /// Prints the chosen columns of the chosen sets, as JSON with the edges. `rows` are the sets of a single directory.
     fn print(
         &self,
         columns: &[Values],

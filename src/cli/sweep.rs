@@ -157,7 +157,8 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
     Ok(changes)
 }
 
-/// Reads a sweep file or the sweep of a results directory, or takes a preset, as varied; without either, a sweep with one point, of what is set.
+/// Reads a sweep file or the sweep of a results directory, or takes a preset, with the changes. Without either, it is a
+/// sweep of the single point that the changes give.
 pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result<Sweep> {
     let sweep = match (file, flag.preset) {
         // A results directory: its current sweep.

@@ -1,4 +1,5 @@
-//! Maps: sets on a grid of two quantities, each a cell with the colour of what was found. The locking map lies over period and amplitude of the modulation, a regime map over two other parameters.
+//! Maps: sets on a grid of two quantities, each a cell whose colour shows a statistic. The locking map lies over period and
+//! amplitude of the modulation, a regime map over two other parameters.
 
 use super::axis::{Axis, bounds, is_wide};
 use super::colour_bar::ColourBar;

@@ -35,7 +35,7 @@ const LOOKS: f64 = 1.2;
 const MOVES: usize = 3;
 
 words! {
-    /// Why an edge is as precise as it is.
+    /// What ended the search for an edge.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Ended {
         Width = "width",
@@ -262,7 +262,7 @@ impl<'a> Edge<'a> {
         self.wanted_row.is_none() && (self.is_bracketed || (self.error <= 1.0 && fewest == most))
     }
 
-    /// Why it is as precise as it is, if sets have this many seeds at most.
+    /// What ended the search, if a set has at most `max_seeds` seeds.
     fn ended(&self, max_seeds: u64, is_over: bool) -> Ended {
         if self.is_done() {
             Ended::Width

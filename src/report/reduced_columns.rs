@@ -134,7 +134,7 @@ impl Census {
         Ok(census)
     }
 
-    /// Every so many sets, one is shown.
+    /// One of this many sets is shown.
     pub(super) fn spacing(&self) -> u64 {
         self.sets.div_ceil(MAX_SETS).max(1)
     }

@@ -31,7 +31,7 @@ const COLUMNS: [(&str, &str); 14] = [
 /// What the page says of its slips.
 #[derive(Debug, Serialize)]
 pub(super) struct Slips {
-    /// Every so many slips one is shown.
+    /// One of this many slips is shown.
     every: u64,
     #[serde(flatten)]
     columns: Columns,

@@ -48,7 +48,7 @@ pub struct Worker {
     system: String,
     /// When it began, in the ticks of its system: a later process may have the same id.
     process_start: Option<u64>,
-    /// Its results directory, if its host tells directories apart.
+    /// The identity of its results directory, where the host has one.
     #[serde(default)]
     directory: Option<Directory>,
     /// Checksum of its sweep file.

@@ -165,7 +165,7 @@ impl<'a> Work<'a> {
         self.jobs.push_front(job);
     }
 
-    /// The next job; `None` if there is none now for this worker. With `is_busy`, other jobs run; with `is_ahead`, the job
+    /// The next job; `None` while this worker has no job to run. With `is_busy`, other jobs run; with `is_ahead`, the job
     /// would wait for a thread.
     pub fn next(&mut self, is_busy: bool, is_ahead: bool) -> Result<Option<PartJob>, ResultsError> {
         if self.jobs.is_empty() && !self.has_ended {

@@ -372,7 +372,8 @@ impl Interface {
         }
     }
 
-    /// Breaks one contact, at a break position in m. Returns the change, and when the contact reattaches, in s. The block's sums and nearest break positions are left as they are: see [`Self::gather`].
+    /// Breaks one contact, at a break position in m. Returns the change, and when the contact reattaches, in s. Leaves the
+    /// block's sums and nearest break positions unchanged: see [`Self::gather`].
     #[inline(always)]
     pub(crate) fn break_contact<S: Simd>(
         &mut self,

@@ -68,7 +68,8 @@ impl GridDrive {
     pub fn advance(&mut self) {
         self.ramp[0] += self.ramp[1];
         if self.angle != 0.0 {
-            let ([sine, cosine], [along, across]) = (self.turn, self.swing);
+            let [sine, cosine] = self.turn;
+            let [along, across] = self.swing;
             // Δ cos(θ + ωh) and -Δ sin(θ + ωh).
             self.swing = [
                 along * cosine + across * sine,

@@ -2,8 +2,9 @@
 //!
 //! Within a step, s from 0 to 1, a block moves as X(s) = x + s q + ((r³ - r) a0 + (s³ - s) a1)/6 with r = 1 - s, where
 //! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes the force on its block and so its motion by
-//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see [`taylor`](crate::solver::event_driven::taylor), where
-//! the same terms are derived. Added at s = 1 they correct the displacement, and at s = 0, backwards, the increment.
+//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see
+//! [`taylor`](crate::solver::event_driven::taylor), where the same terms are derived. Added at s = 1 they correct the
+//! displacement, and at s = 0, backwards, the increment.
 
 use super::Grid;
 use super::step::{Correction, GridStep, Place};
