@@ -135,7 +135,7 @@ fn whole(number: f64) -> Json {
     }
 }
 
-/// A name for a definition of what a value can be: `number_above_0`, `integer_from_1_to_100000`.
+/// A name for a definition of what a value can be: `number_above_0`.
 fn name(value: &Json) -> String {
     if let Some(words) = value["enum"].as_array() {
         let words: Vec<&str> = words.iter().filter_map(Json::as_str).collect();
