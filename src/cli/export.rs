@@ -1,13 +1,9 @@
 //! `stickslip export`: the tables of a results directory as a few large files, for other tools.
 
-use super::exit::Exit;
-use super::output;
-use super::signals;
+use super::{Exit, catch_signals, layout, output};
 use crate::results::Results;
-use crate::results::layout::Layout;
 use crate::table::formats::Format;
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
@@ -59,13 +55,13 @@ impl ValueEnum for Format {
 const JSON_FORMAT: u32 = 2;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
-    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let results = Results::read(&layout(&arguments.directory))?;
     // Shown on a terminal only.
     let bar = ProgressBar::new(0);
     bar.set_style(ProgressStyle::with_template(
         "{wide_bar} {percent} % of the parts, {eta} left",
     )?);
-    let stop = signals::catch()?;
+    let stop = catch_signals()?;
     let out = &arguments.out;
     let exported = results.export(out, arguments.format, stop, &mut |done, total| {
         bar.set_length(total);

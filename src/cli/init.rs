@@ -1,8 +1,7 @@
 //! `stickslip init`: a commented sweep file to start from.
 
-use super::exit::Exit;
-use super::output;
 use super::sweep::{Preset, Variation, changes, preset_parser, vary};
+use super::{Exit, output};
 use crate::results::destination::{Destination, Kind};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;

@@ -1,6 +1,6 @@
 //! Text for people and JSON for programs.
 
-use super::signals;
+use super::catch_signals;
 use crate::results::Results;
 use crate::results::destination::Destination;
 use crate::results::next_round::RoundsSoFar;
@@ -44,7 +44,7 @@ pub fn warn(warnings: &[String]) {
 
 /// Writes bytes to a file.
 pub fn write(file: &Destination, bytes: &[u8]) -> Result<()> {
-    file.write(signals::catch, |mut file| Ok(file.write(bytes)?))
+    file.write(catch_signals, |mut file| Ok(file.write(bytes)?))
 }
 
 /// Prints a value as JSON, with the version of its form.

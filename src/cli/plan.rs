@@ -1,8 +1,7 @@
 //! `stickslip plan`: what would run. Nothing is written.
 
-use super::exit::Exit;
-use super::output;
 use super::sweep::{self, PresetFlag, Variation};
+use super::{Exit, output};
 use crate::results::layout::Layout;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};

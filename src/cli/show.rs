@@ -1,21 +1,19 @@
 //! `stickslip show`: the result of a sweep, a line for each set. `run` ends with its first lines.
 
-use super::exit::{Exit, UsageError};
 use super::output::{self, TextTable};
+use super::{Exit, UsageError, layout};
 use crate::model::Symbol;
 use crate::reduce::{
     EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing, read_reduced,
     renew, sets_where,
 };
 use crate::results::Results;
-use crate::results::layout::Layout;
 use crate::sets::{Digits, label};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Table};
 use crate::table::file::Dataset;
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
 use crate::table::value::floored;
 use anyhow::Result;
 use clap::Args;
@@ -82,8 +80,7 @@ const FOUND: [&str; 9] = [
 ];
 
 pub fn show(arguments: &Arguments) -> Result<Exit> {
-    let layout = Layout::new(&Disk, &arguments.directory);
-    let results = Results::read(&layout)?;
+    let results = Results::read(&layout(&arguments.directory))?;
     match &arguments.other {
         Some(other) => show_differences(arguments, &results, other)?,
         None => show_sets(arguments, &*renew(&results)?)?,
@@ -122,7 +119,7 @@ impl Arguments {
 
 /// Shows in what the sets of two directories differ.
 fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) -> Result<()> {
-    let others = Results::read(&Layout::new(&Disk, other))?;
+    let others = Results::read(&layout(other))?;
     let columns = compare(results, &others)?;
     let count = columns.first().map_or(0, |values| values.numbers.len());
     if count == 0 {

@@ -3,11 +3,10 @@
 //! The job is the only one of a sweep: of a file, or of the text that flags make. So values, messages and the id of the job
 //! are those of a sweep.
 
-use super::exit::{Exit, UsageError};
 use super::output::{self, TextTable};
 use super::plot::picture_file;
-use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
+use super::{Exit, UsageError, catch_signals};
 use crate::figure::simulation;
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
@@ -260,7 +259,7 @@ impl Tables<'_> {
     /// Writes a table, if there is a file for it.
     fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
-        Destination::new(path, Kind::PARQUET)?.write(signals::catch, |file| {
+        Destination::new(path, Kind::PARQUET)?.write(catch_signals, |file| {
             let mut writer = TableWriter::without(self.left_out, file, self.footer)?;
             for row in rows {
                 writer.push(&row)?;

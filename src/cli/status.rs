@@ -1,12 +1,9 @@
 //! `stickslip status`: how far a results directory is.
 
-use super::exit::Exit;
-use super::output;
+use super::{Exit, layout, output};
 use crate::results::Results;
-use crate::results::layout::Layout;
 use crate::run::{Present, Status};
 use crate::table::shown::shown_text;
-use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -32,7 +29,7 @@ pub struct Arguments {
 const JSON_FORMAT: u32 = 3;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
-    let results = Results::read_plan(&Layout::new(&Disk, &arguments.directory))?;
+    let results = Results::read_plan(&layout(&arguments.directory))?;
     let status = crate::run::status(&results)?;
     let overview = status.overview;
     if arguments.json {

@@ -5,11 +5,14 @@ use super::BadOption;
 use super::axis::Axis;
 use super::frame::{Ends, LEFT, Layout, Place};
 use super::hues::Hues;
-use super::ink::{Dot, Ink, Stroke};
+use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Quantity, parameter, without_value};
-use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, drive_alone};
+use super::style::{
+    BAR_WIDTH, BLACK, Dot, GREY, INKS, Ink, Look, RADIUS, REFERENCE, STRIPE, Stroke, WHITE, dot,
+    drive_alone,
+};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetRow, Swept, Values, ascending, is_same};
@@ -32,9 +35,9 @@ const MAX_LINES: usize = 24;
 pub(super) const LINE_WIDTH: f64 = 1.0;
 /// Sets up to which dots and bars have their full size.
 const FEW_SETS: usize = 200;
-pub(super) const SMALL_RADIUS: f64 = 2.5;
+const SMALL_RADIUS: f64 = 2.5;
 /// By how much the hole in the dot of a set that slides is smaller.
-pub(super) const HOLE: f64 = 1.6;
+const HOLE: f64 = 1.6;
 
 /// Sets against a column: a panel for each quantity and each value of another column.
 pub(super) struct Chart<'a> {
@@ -47,11 +50,11 @@ pub(super) struct Chart<'a> {
 }
 
 /// How the sets of a chart are drawn.
-pub(super) struct Dots {
-    pub(super) hues: Option<Hues>,
+struct Dots {
+    hues: Option<Hues>,
     radius: f64,
     /// Sets that are joined, line by line.
-    pub(super) lines: Vec<Vec<usize>>,
+    lines: Vec<Vec<usize>>,
 }
 
 impl<'a> Chart<'a> {
@@ -308,12 +311,12 @@ impl<'a> Chart<'a> {
         }
     }
 
-    pub(super) fn slides(&self, set: usize) -> bool {
+    fn slides(&self, set: usize) -> bool {
         self.rows[set].regime == Some(Regime::Sliding)
     }
 
     /// Amplitudes at which the paper finds a significant reduction of the friction to begin, on the x axis.
-    pub(super) fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
+    fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
         let is_fixed = |symbol| {
             self.swept
                 .iter()
@@ -327,6 +330,94 @@ impl<'a> Chart<'a> {
         let free = free.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
         Some((REDUCTION.0 * unit, REDUCTION.1 * unit))
+    }
+}
+
+/// What the marks mean: the legend and the small print.
+impl Chart<'_> {
+    /// What each mark means that is drawn.
+    fn legend(&self, inside: &[usize], free: &[usize], dots: &Dots) -> Vec<Entry> {
+        let mut entries = Vec::new();
+        if let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) {
+            let numbers: Vec<Option<f64>> = inside.iter().map(|&set| colour.number(set)).collect();
+            entries.extend(hues.entries(RADIUS, |value| numbers.contains(&Some(value))));
+            if numbers.contains(&None) {
+                let text = without_value(&colour.column.values);
+                entries.push(entry(Mark::Dot(dot(GREY)), text));
+            }
+        }
+        if !free.is_empty() {
+            entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
+        }
+        if inside.iter().any(|&set| self.slides(set)) {
+            entries.push(entry(Mark::Ring(BLACK, RADIUS, RADIUS - HOLE), "sliding"));
+        }
+        if self.ys.iter().any(|y| y.name() == "slip_share") {
+            let [mixed, sliding] = Regime::MIN_SHARES;
+            let text = format!("mixed above {mixed}, sliding above {sliding}");
+            entries.push(entry(Mark::Line(REFERENCE), text));
+        }
+        if self.ys.iter().any(|y| y.drive.is_some()) {
+            let mark = if dots.lines.is_empty() {
+                Mark::Dot(Dot::solid(GREY, SMALL_RADIUS))
+            } else {
+                Mark::Line(drive_alone(BLACK))
+            };
+            entries.push(entry(mark, "by the drive alone"));
+        }
+        if self.ys.iter().any(|y| self.reduction(y).is_some()) {
+            let text = "K_d Δ = 0.2 to 0.3 of the peak force: friction falls, says the paper";
+            entries.push(entry(Mark::Patch(STRIPE), text));
+        }
+        entries
+    }
+
+    /// Swept parameters that nothing shows.
+    fn pooled(&self) -> Option<String> {
+        let asked = [Some(&self.x), self.colour.as_ref()]
+            .into_iter()
+            .flatten()
+            .chain(&self.ys)
+            .map(Quantity::name);
+        let names = asked.chain(self.panels.as_ref().map(|panels| &*panels.column.name));
+        let words = names
+            .flat_map(|name| name.split(|letter: char| !letter.is_alphanumeric() && letter != '_'));
+        let shown: Vec<Option<Symbol>> = words.map(parameter).collect();
+        let pooled = self
+            .swept
+            .iter()
+            .filter(|swept| !shown.contains(&parameter(swept.name())));
+        let symbols: Vec<String> = pooled.map(|swept| swept.values.label().symbol).collect();
+        (!symbols.is_empty())
+            .then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))
+    }
+
+    /// What bars are, and what is not there.
+    fn note(&self, inside: &[usize], levels: usize) -> String {
+        let mut notes = Vec::new();
+        let has_bars = |y: &Quantity<'_>| inside.iter().any(|&set| y.interval(set).is_some());
+        if self.ys.iter().any(has_bars) {
+            notes.push("bars: 95 %".to_owned());
+        }
+        let count = self.rows.len();
+        let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));
+        let is_still = |set: &usize| {
+            shows_intervals && self.slides(*set) && self.rows[*set].tau_mean.is_none()
+        };
+        let still: Vec<usize> = (0..count).filter(is_still).collect();
+        if !still.is_empty() {
+            let slide = still.len();
+            notes.push(format!("{slide} of {count} sets slide: no intervals"));
+        }
+        let still_outside = still.iter().filter(|set| !inside.contains(set)).count();
+        let left_out = count - inside.len() - levels - still_outside;
+        if left_out > 0 {
+            notes.push(format!(
+                "not shown: {left_out} of {count} sets, without a value or outside the axes"
+            ));
+        }
+        notes.extend(self.pooled());
+        notes.join("; ")
     }
 }
 

@@ -2,12 +2,11 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::frame::{Ends, Layout};
-use super::ink::{Dot, Ink, Stroke};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Anchor, Picture};
-use super::sets::axis_of;
-use super::style::{GRID, INKS, LEGEND_TEXT, Look};
+use super::quantity::axis_of;
+use super::style::{Dot, GRID, INKS, Ink, LEGEND_TEXT, Look, Stroke};
 use crate::reduce::{Point, RampStage, quantile};
 use crate::sets::label;
 

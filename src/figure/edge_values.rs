@@ -2,13 +2,11 @@
 
 use super::axis::Axis;
 use super::frame::Layout;
-use super::ink::{Dot, Stroke};
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::MAX_TICKS;
-use super::sets::axis_of;
-use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
+use super::quantity::{MAX_TICKS, axis_of};
+use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, Stroke, dot};
 use crate::model::Symbol;
 use crate::reduce::{EdgeRow, FREQUENCY, ascending};
 

@@ -2,10 +2,11 @@
 //! small print under them.
 
 use super::axis::Axis;
-use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
 use super::picture::{Anchor, Picture, snapped};
-use super::style::{AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT};
+use super::style::{
+    AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT, text_width,
+};
 
 /// A point of data.
 pub(super) type Place = (f64, f64);
@@ -145,7 +146,7 @@ fn wrapped(text: &str, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ').filter(|word| !word.is_empty()) {
         match lines.last_mut() {
-            Some(line) if font::width(&format!("{line} {word}"), NOTE_TEXT) <= width => {
+            Some(line) if text_width(&format!("{line} {word}"), NOTE_TEXT) <= width => {
                 line.push(' ');
                 line.push_str(word);
             }
@@ -302,7 +303,7 @@ impl Frame {
         let mut free = EDGE;
         for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
             let x = self.x_of(*value);
-            let half = 0.5 * font::width(number, TICK_TEXT);
+            let half = 0.5 * text_width(number, TICK_TEXT);
             if x - half >= free && x + half <= sheet.scene.width - EDGE {
                 sheet.text(
                     (x, bottom + 1.3 * height),
@@ -325,7 +326,7 @@ impl Frame {
         if self.is_lowest {
             let (start, end) = self.room;
             let (label, size) = fitted_label("", &self.x, end - start);
-            let half = 0.5 * font::width(&label, size);
+            let half = 0.5 * text_width(&label, size);
             let middle = (self.left + 0.5 * self.width)
                 .min(end - half)
                 .max(start + half);
@@ -351,7 +352,7 @@ impl Frame {
     /// Where the label of the y axis ends.
     pub(super) fn y_label_end(&self) -> f64 {
         let (label, size) = self.y_label();
-        self.room.0 + font::width(&label, size)
+        self.room.0 + text_width(&label, size)
     }
 
     /// What the frame shows, above it, after its letter.
@@ -374,7 +375,7 @@ impl Frame {
 pub(super) fn fitting(text: &str, size: u32, room: f64) -> Option<u32> {
     (NOTE_TEXT..=size)
         .rev()
-        .find(|&size| font::width(text, size) <= room)
+        .find(|&size| text_width(text, size) <= room)
 }
 
 /// A text and its size, up to one: smaller where there is little room, and cut at worst.
@@ -383,14 +384,14 @@ fn fitted(text: &str, size: u32, room: f64) -> (String, u32) {
         return (text.to_owned(), size);
     }
     let mut cut = text.to_owned();
-    while cut.pop().is_some() && font::width(&format!("{cut}…"), NOTE_TEXT) > room {}
+    while cut.pop().is_some() && text_width(&format!("{cut}…"), NOTE_TEXT) > room {}
     (format!("{}…", cut.trim_end()), NOTE_TEXT)
 }
 
 /// The label of an axis after a letter, in short where there is little room, and its size.
 fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
     let [long, short] = [&axis.label, axis.short_label()].map(|label| format!("{letter}{label}"));
-    let label = if font::width(&long, LABEL_TEXT) <= room {
+    let label = if text_width(&long, LABEL_TEXT) <= room {
         long
     } else {
         short
@@ -521,7 +522,7 @@ mod tests {
     fn small_print_is_wrapped_at_spaces_and_complete() {
         let lines = wrapped(
             "alpha beta  gamma\u{a0}delta epsilon",
-            font::width("alpha beta g", NOTE_TEXT),
+            text_width("alpha beta g", NOTE_TEXT),
         );
         assert_eq!(lines, ["alpha beta", "gamma delta", "epsilon"]);
         assert_eq!(wrapped("longerthanaline", 10.0), ["longerthanaline"]);

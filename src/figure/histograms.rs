@@ -1,13 +1,11 @@
 //! Histograms of τ (Fig. 2d-f): one panel per set, one under the other on a common axis.
 
 use super::axis::{Axis, bounds, widened};
-use super::font;
 use super::frame::{Frame, Layout, OVERLAP, Place};
-use super::ink::{Fill, Ink, Stroke};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer};
 use super::picture::{Anchor, Picture};
-use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
+use super::style::{BLACK, Fill, Ink, LEGEND_TEXT, Look, RED, REFERENCE, Stroke, text_width};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{FREQUENCY, HistogramBin, SetRow, Values, differing};
 use crate::sets::label;
@@ -208,10 +206,10 @@ fn draw_multiples(sheet: &mut Picture, frame: &Frame, multiples: Vec<f64>, perio
     for multiple in multiples {
         let x = frame.x_of(multiple);
         let n = format!("{}", (multiple / period).round());
-        let half = 0.5 * font::width(&n, LEGEND_TEXT);
+        let half = 0.5 * text_width(&n, LEGEND_TEXT);
         // Before the first number, where there is room.
         let is_led = free == f64::NEG_INFINITY
-            && x - half - font::width("n = ", LEGEND_TEXT) > frame.left + 4.0;
+            && x - half - text_width("n = ", LEGEND_TEXT) > frame.left + 4.0;
         let lead = if is_led { "n = " } else { "" };
         let mut top = frame.top;
         if x - half > free.max(frame.left + 4.0) && x + half < frame.right() - 4.0 {

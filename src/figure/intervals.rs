@@ -3,12 +3,11 @@
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Layout, Place};
 use super::hues::Hues;
-use super::ink::Dot;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::sets::axis_of;
-use super::style::{GREY, GRID, LIGHT_GREY, Look};
+use super::quantity::axis_of;
+use super::style::{Dot, GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::{Point, ascending};
 use crate::sets::{Digits, label};
 

@@ -1,9 +1,7 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
-use super::font;
-use super::ink::{Dot, Fill, Ink, Stroke};
 use super::picture::{Anchor, Picture};
-use super::style::{LEGEND_TEXT, WHITE};
+use super::style::{Dot, Fill, Ink, LEGEND_TEXT, Stroke, WHITE, text_width};
 
 /// Width of a line or a patch, and of a dot.
 const MARK: f64 = 26.0;
@@ -34,7 +32,7 @@ pub(super) fn entry(mark: Mark, text: impl Into<String>) -> Entry {
 }
 
 fn width((mark, text): &Entry) -> f64 {
-    mark_width(*mark) + GAP + font::width(text, LEGEND_TEXT)
+    mark_width(*mark) + GAP + text_width(text, LEGEND_TEXT)
 }
 
 const fn mark_width(mark: Mark) -> f64 {

@@ -2,18 +2,16 @@
 //! amplitude of the modulation, a regime map over two other parameters.
 
 use super::axis::{Axis, bounds, is_wide};
-use super::colour_bar::ColourBar;
 use super::frame::{Cell, Layout, OVERLAP, Place};
-use super::ink::{Fill, Ink, Stroke};
+use super::hues::ColourBar;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::Quantity;
-use super::sets::{Grid, period_column};
-use super::style::{BLACK, Look, WHITE, diverging, shade};
+use super::quantity::{Grid, Quantity};
+use super::style::{BLACK, Fill, Ink, Look, Stroke, WHITE, diverging, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, differing};
+use crate::reduce::{FREQUENCY, SetRow, Swept, differing, has_even_steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -124,6 +122,17 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         &legend(is_locking),
         panels,
     ))
+}
+
+/// T, or 1/T if its steps are even and those of T are not.
+fn period_column(sets: &[SetRow]) -> &'static str {
+    let is_even =
+        |column| Swept::of(sets, column).is_ok_and(|swept| has_even_steps(&swept.distinct));
+    if !is_even("T") && is_even(FREQUENCY) {
+        FREQUENCY
+    } else {
+        "T"
+    }
 }
 
 /// The scale of the colours of a column, whose values lie between these ends.
@@ -267,7 +276,7 @@ impl Map {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sets::tests::set;
+    use super::super::quantity::tests::set;
     use super::*;
     use crate::model::Parameters;
     use crate::model::selected::Selected;
@@ -413,5 +422,15 @@ mod tests {
             map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(),
             "two rows"
         );
+    }
+
+    #[test]
+    fn what_was_swept_in_even_steps_becomes_the_axis() {
+        let sets = |periods: [f64; 4]| periods.map(|period| set(1e-6, period, 4.0));
+        assert_eq!(
+            period_column(&sets([0.1, 0.05, 1.0 / 30.0, 0.025])),
+            FREQUENCY
+        );
+        assert_eq!(period_column(&sets([0.1, 0.2, 0.4, 0.8])), "T");
     }
 }

@@ -70,7 +70,7 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sets::tests::set;
+    use super::super::quantity::tests::set;
     use super::super::style::REFERENCE;
     use super::*;
 

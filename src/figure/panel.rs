@@ -1,12 +1,11 @@
 //! Panels as data: axes and what lies between them, layer by layer. One engine draws the panels of every figure.
 
 use super::axis::Axis;
-use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::frame::{Cell, Ends, Frame, Layout, Place};
-use super::ink::{Dot, Fill, Ink, Stroke};
+use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::Entry;
 use super::picture::Picture;
-use super::style::Look;
+use super::style::{Dot, Fill, Ink, Look, Stroke};
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 

@@ -1,8 +1,8 @@
 //! A scene as a PDF of one page: vectors, and text in the letters of one embedded font, so that it can be searched and
 //! looks the same everywhere. The same scene gives the same bytes on every machine.
 
-use super::font;
-use super::ink::parts;
+use super::style::font_file;
+use kuva::render::color::Color;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 use pdf_writer::types::{
     CidFontType, FontFlags, LineCapStyle, LineJoinStyle, SystemInfo, UnicodeCmap,
@@ -26,7 +26,7 @@ const COMPRESSION: u8 = 8;
 
 /// The scene, with this many points per unit.
 pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
-    let font = font::file();
+    let font = font_file();
     let face = Face::parse(font, 0).map_err(|error| error.to_string())?;
     let mut page = Page {
         content: Content::new(),
@@ -53,6 +53,14 @@ pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
 )]
 const fn single(value: f64) -> f32 {
     value as f32
+}
+
+/// Red, green and blue from 0 to 1.
+fn parts(color: &Color) -> [f32; 3] {
+    match color {
+        Color::Rgb(red, green, blue) => [*red, *green, *blue].map(|part| f32::from(part) / 255.0),
+        _ => [0.0; 3],
+    }
 }
 
 struct Page<'a> {

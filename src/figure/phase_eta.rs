@@ -1,14 +1,13 @@
 //! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and averages over sets that have a phase.
 
 use super::axis::{Axis, angle_bounds, bounds};
-use super::colour_bar::ColourBar;
 use super::frame::{Cell, Ends, Layout, OVERLAP, Place};
-use super::ink::{Dot, Stroke};
+use super::hues::ColourBar;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::sets::Grid;
-use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
+use super::quantity::Grid;
+use super::style::{BAR_WIDTH, BLUE, Dot, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point, SetRow};
 use crate::sets::label;
@@ -193,7 +192,7 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sets::tests::set;
+    use super::super::quantity::tests::set;
     use super::*;
 
     #[test]

@@ -1,15 +1,14 @@
 //! Pictures: what is drawn, as SVG, PNG and PDF. The same data give the same bytes.
 
 use super::BadOption;
-use super::font;
-use super::ink::{Dot, Fill, Ink, Stroke, color};
 use super::pdf::pdf;
-use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
+use super::style::{BLACK, Dot, Fill, HALF_DIGIT, Ink, Look, Size, Stroke, Style, text_width};
 use crate::table::shown::shown_text;
 use crate::table::value::words;
 use anyhow::{Result, anyhow};
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
+use kuva::render::color::Color;
 pub(super) use kuva::render::render::TextAnchor as Anchor;
 use kuva::render::render::{Primitive, Scene};
 
@@ -164,7 +163,7 @@ impl Picture {
             else {
                 return None;
             };
-            let width = font::width(content, *size);
+            let width = text_width(content, *size);
             let start = match anchor {
                 Anchor::Start => *x,
                 Anchor::Middle => x - 0.5 * width,
@@ -262,7 +261,7 @@ impl Picture {
         ];
         let width: f64 = parts
             .iter()
-            .map(|(part, size, _)| font::width(part, *size))
+            .map(|(part, size, _)| text_width(part, *size))
             .sum();
         let mut start = match anchor {
             Anchor::Start => x,
@@ -271,7 +270,7 @@ impl Picture {
         };
         for (part, size, y) in parts {
             self.coloured_text((start, y), part, size, Anchor::Start, ink);
-            start += font::width(part, size);
+            start += text_width(part, size);
         }
     }
 
@@ -307,6 +306,11 @@ impl Picture {
         draw(self);
         self.scene.add(Primitive::ClipEnd);
     }
+}
+
+fn color(ink: Ink) -> Color {
+    let Ink([red, green, blue]) = ink;
+    Color::Rgb(red, green, blue)
 }
 
 /// What stands before the first symbol with a subscript such as `K_d`, that subscript, and what follows it.

@@ -1,4 +1,4 @@
-//! A column of the table of sets as a quantity that a figure shows: on an axis, or as colours.
+//! Quantities that figures show: a column of the table of sets on an axis or as colours, and the grid of its values.
 
 use super::BadOption;
 use super::axis::{Axis, bounds, is_wide, logarithmic_bounds, widened};
@@ -6,8 +6,8 @@ use super::frame::Ends;
 use super::hues::Hues;
 use super::style::INKS;
 use crate::model::Symbol;
-use crate::reduce::{FREQUENCY, SetRow, Swept, Values};
-use crate::sets::Label;
+use crate::reduce::{FREQUENCY, SetRow, Swept, Values, has_even_steps, is_spread};
+use crate::sets::{Label, label};
 
 /// Values of a parameter up to which each has its tick.
 pub(super) const MAX_TICKS: usize = 6;
@@ -251,5 +251,175 @@ pub(super) fn without_value(values: &Values) -> String {
         "Δ = 0".to_owned()
     } else {
         format!("no {}", values.label().symbol)
+    }
+}
+
+/// Of a column with these values: the label of its axis, and the factor to its unit.
+pub(super) fn axis_of(column: &str, values: impl Iterator<Item = f64>) -> (String, f64) {
+    let label = label(column);
+    let (factor, unit) = label.scale(values.fold(0.0, f64::max));
+    (label.axis(unit), factor)
+}
+
+/// Values of a swept quantity and how they are spaced.
+pub(super) struct Grid {
+    /// Ascending.
+    values: Vec<f64>,
+    is_linear: bool,
+}
+
+impl Grid {
+    /// Linear if the steps are even, or a value is not > 0, or all are close, else logarithmic. `values` ascend.
+    pub(super) fn of(values: Vec<f64>) -> Self {
+        let is_linear = has_even_steps(&values) || !is_spread(&values);
+        Self { values, is_linear }
+    }
+
+    /// The cells around `values` > 0 that ascend, spaced logarithmically.
+    pub(super) fn logarithmic_cells(values: Vec<f64>) -> Vec<(f64, f64)> {
+        let grid = Self {
+            values,
+            is_linear: false,
+        };
+        (0..grid.values.len())
+            .map(|index| grid.cell(index))
+            .collect()
+    }
+
+    /// An axis for cells: it ends half a step beyond the values.
+    pub(super) fn axis(&self, label: &str) -> Axis {
+        let low = self.cell(0).0;
+        let high = self.cell(self.values.len() - 1).1;
+        if self.is_linear {
+            Axis::linear(label, low, high)
+        } else {
+            Axis::logarithmic(label, low, high)
+        }
+    }
+
+    /// The ends of the cell around the value with this index: halfway to its neighbours.
+    pub(super) fn cell(&self, index: usize) -> (f64, f64) {
+        let at = |index: usize| {
+            if self.is_linear {
+                self.values[index]
+            } else {
+                libm::log(self.values[index])
+            }
+        };
+        let last = self.values.len() - 1;
+        let alone = if last == 0 { 1.0 } else { 0.0 };
+        let below = if index > 0 {
+            at(index) - at(index - 1)
+        } else {
+            at(1.min(last)) - at(0) + alone
+        };
+        let above = if index < last {
+            at(index + 1) - at(index)
+        } else {
+            below
+        };
+        let low = at(index) - 0.5 * below;
+        let high = at(index) + 0.5 * above;
+        if self.is_linear {
+            (low, high)
+        } else {
+            (libm::exp(low), libm::exp(high))
+        }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.values.len()
+    }
+
+    /// The index of a value of the grid.
+    pub(super) fn index_of(&self, value: f64) -> usize {
+        self.values
+            .partition_point(|&other| other < value)
+            .min(self.values.len() - 1)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::model::Parameters;
+    use crate::model::selected::Selected;
+    use crate::observe::Regime;
+    use crate::reduce::Interval;
+
+    /// A set at Δ in m and T in s that locks to `periods` of T.
+    pub(in crate::figure) fn set(amplitude: f64, period: f64, periods: f64) -> SetRow {
+        let tau = periods * period;
+        let interval = |value: f64| {
+            Some(Interval {
+                low: 0.9 * value,
+                high: 1.1 * value,
+            })
+        };
+        let of_modulated = |value: f64| (amplitude > 0.0).then_some(value);
+        let locking_index = of_modulated(0.8);
+        let resultant_length = of_modulated(0.7);
+        let mean_friction = 280.0 - 1e7 * amplitude;
+        let parameters = Parameters {
+            modulation_amplitude: amplitude,
+            modulation_period: Some(period),
+            ..Parameters::default()
+        };
+        SetRow {
+            set_id: format!("{amplitude:e} {period:e}"),
+            frequency: of_modulated(1.0 / period),
+            eta: if amplitude > 0.0 {
+                parameters.eta()
+            } else {
+                0.0
+            },
+            parameters: Selected::new(parameters.validated().unwrap()),
+            tau_mean: Some(tau),
+            tau_interval: interval(tau),
+            tau_deviation: Some(0.1 * tau),
+            tau_25: Some(0.98 * tau),
+            tau_50: Some(tau),
+            tau_75: Some(1.02 * tau),
+            periods: (0..100_u32)
+                .find(|&n| (f64::from(n) - periods).abs() <= 0.5)
+                .map(u64::from),
+            has_phase: amplitude > 0.0,
+            locking_index,
+            locking_interval: locking_index.and_then(interval),
+            resultant_length,
+            length_interval: resultant_length.and_then(interval),
+            peak_force_mean: Some(480.0),
+            mean_friction: Some(mean_friction),
+            mean_friction_interval: interval(mean_friction),
+            regime: Some(Regime::StickSlip),
+            slip_share: Some(0.05),
+            ..SetRow::default()
+        }
+    }
+
+    #[test]
+    fn cells_meet_and_lie_around_their_values() {
+        for values in [
+            vec![1.0, 2.0, 3.0, 4.0],
+            vec![0.1, 0.2, 0.4, 3.0],
+            vec![0.0, 1.0, 5.0],
+        ] {
+            let grid = Grid::of(values.clone());
+            for index in 0..values.len() {
+                let (low, high) = grid.cell(index);
+                assert!(low < values[index] && values[index] < high, "{values:?}");
+                assert_eq!(grid.index_of(values[index]), index);
+                if index > 0 {
+                    assert!(
+                        (grid.cell(index - 1).1 / low - 1.0).abs() < 1e-12,
+                        "{values:?}"
+                    );
+                }
+            }
+        }
+        assert!(
+            Grid::of(vec![7.0]).axis("").ticks.len() < 9,
+            "a single value"
+        );
     }
 }

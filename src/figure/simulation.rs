@@ -2,14 +2,13 @@
 //! contacts (Fig. 4b, d) with the onsets of slips.
 
 use super::axis::{Axis, bounds, widened};
-use super::colour_bar::ColourBar;
+use super::common;
 use super::frame::{Cell, Layout, OVERLAP, Place};
-use super::ink::{Ink, Stroke};
+use super::hues::ColourBar;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::sets::common;
-use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
+use super::style::{BLACK, BLUE, GRID, Ink, Look, RED, REFERENCE, Stroke, shade};
 use crate::model::Parameters;
 use crate::observe::MapRow;
 use crate::sets::label;

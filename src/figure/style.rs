@@ -1,8 +1,10 @@
-//! The look of all figures: paper, sizes of text, strokes, colours. Lengths on a sheet are units, of which a style says how
+//! The look of all figures: paper, font, sizes of text, strokes, dots, colours. Lengths on a sheet are units, of which a style says how
 //! long they are: text has the same size in every figure, whatever the size of the sheet.
 
-use super::ink::{Dot, Fill, Ink, Stroke};
 use crate::table::value::{floored, words};
+use std::fmt;
+use std::sync::LazyLock;
+use ttf_parser::{Face, GlyphId};
 
 words! {
     /// What a figure is for.
@@ -113,6 +115,98 @@ pub(super) const LEGEND_TEXT: u32 = 15;
 pub(super) const NOTE_TEXT: u32 = 12;
 /// The digits' middle over their base line, over the size of the text.
 pub(super) const HALF_DIGIT: f64 = 0.36;
+
+/// The font of all figures.
+pub(super) fn font_file() -> &'static [u8] {
+    dejavu::sans::regular()
+}
+
+static FACE: LazyLock<Option<Face<'static>>> = LazyLock::new(|| Face::parse(font_file(), 0).ok());
+/// Width of a letter over the size of the text, if the font cannot be read.
+const LETTER: f64 = 0.6;
+
+/// Width of a text of this size.
+pub(super) fn text_width(text: &str, size: u32) -> f64 {
+    let letter = |letter: char| {
+        let face = FACE.as_ref()?;
+        let glyph = face.glyph_index(letter).unwrap_or(GlyphId(0));
+        Some(f64::from(face.glyph_hor_advance(glyph)?) / f64::from(face.units_per_em()))
+    };
+    f64::from(size)
+        * text
+            .chars()
+            .map(|character| letter(character).unwrap_or(LETTER))
+            .sum::<f64>()
+}
+
+/// An opaque colour: red, green and blue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ink(pub [u8; 3]);
+
+impl Ink {
+    /// From `0xrrggbb`.
+    pub(super) const fn new(code: u32) -> Self {
+        let [_, red, green, blue] = code.to_be_bytes();
+        Self([red, green, blue])
+    }
+}
+
+/// `#rrggbb`.
+impl fmt::Display for Ink {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [red, green, blue] = self.0;
+        write!(f, "#{red:02x}{green:02x}{blue:02x}")
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stroke {
+    pub(super) ink: Ink,
+    pub(super) width: f64,
+    /// Lengths of dash and gap.
+    pub(super) dashes: Option<(f64, f64)>,
+}
+
+impl Stroke {
+    pub(super) const fn solid(ink: Ink, width: f64) -> Self {
+        Self {
+            ink,
+            width,
+            dashes: None,
+        }
+    }
+
+    pub(super) const fn dashed(ink: Ink, width: f64, dashes: (f64, f64)) -> Self {
+        Self {
+            ink,
+            width,
+            dashes: Some(dashes),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Dot {
+    pub(super) ink: Ink,
+    pub(super) radius: f64,
+    pub(super) opacity: f64,
+}
+
+impl Dot {
+    pub(super) const fn solid(ink: Ink, radius: f64) -> Self {
+        Self {
+            ink,
+            radius,
+            opacity: 1.0,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fill {
+    pub(super) ink: Ink,
+    pub(super) opacity: f64,
+}
 
 /// Black for axes and text.
 pub(super) const BLACK: Ink = Ink::new(0x00_00_00);
@@ -250,5 +344,12 @@ mod tests {
     fn print_is_one_or_two_columns_wide() {
         let width = |natural| Style::Print.millimetres(Style::Print.width(natural));
         assert!((width(660.0) - 86.0).abs() < 1e-9 && (width(1000.0) - 178.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn widths_are_those_of_the_letters() {
+        assert!((text_width("nn", 10) - 2.0 * text_width("n", 10)).abs() < 1e-12);
+        assert!(text_width("m", 10) > 2.0 * text_width("i", 10) && text_width("", 10) == 0.0);
+        assert!(text_width("φₘᵢₙ", 10) < text_width("φmin", 10));
     }
 }

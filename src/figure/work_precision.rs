@@ -3,11 +3,10 @@
 
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Ends, Layout};
-use super::ink::{Dot, Ink, Stroke};
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::style::{INKS, Look, RADIUS, STRIPE, WHITE};
+use super::style::{Dot, INKS, Ink, Look, RADIUS, STRIPE, Stroke, WHITE};
 use anyhow::{Result, anyhow};
 
 const NAME: &str = "work-precision";
