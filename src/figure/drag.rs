@@ -10,6 +10,8 @@ use super::style::{Dot, GRID, INKS, Ink, LEGEND_TEXT, Look, Stroke};
 use crate::reduce::{Point, RampStage, quantile};
 use crate::sets::label;
 
+pub(super) const NAME: &str = "drag";
+
 /// Space right of the frames for the numbers of lines.
 const NUMBERS: f64 = 66.0;
 /// Middle of the numbers of lines that leave through the top, below it.
@@ -141,7 +143,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let levels = multiples().map(|n| Layer::Level(n, GRID));
     let lower = Panel::inside(210.0, x, ratio, levels.chain(medians_of(&slips, ends)));
     Some(panel::draw(
-        "drag",
+        NAME,
         look,
         LAYOUT,
         &entries,

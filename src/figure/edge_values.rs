@@ -10,6 +10,8 @@ use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, Stroke, dot};
 use crate::model::Symbol;
 use crate::reduce::{EdgeRow, FREQUENCY, ascending};
 
+pub(super) const NAME: &str = "edges";
+
 /// A parameter of a row, or the frequency.
 fn value(key: &str, edge: &EdgeRow) -> Option<f64> {
     match Symbol::from_key(key) {
@@ -81,7 +83,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
         ));
     }
     Some(panel::draw(
-        "edges",
+        NAME,
         look,
         Layout::column(490.0),
         &legend,

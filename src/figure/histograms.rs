@@ -10,6 +10,8 @@ use crate::model::{Parameters, Symbol};
 use crate::reduce::{FREQUENCY, HistogramBin, SetRow, Values, differing};
 use crate::sets::label;
 
+pub(super) const NAME: &str = "tau-histograms";
+
 /// Panels that fit a page.
 const MAX_PANELS: usize = 4;
 /// Sets that may fit: each panel can hold a second one, of identical contacts.
@@ -123,13 +125,7 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
         ..Layout::column(WIDTH)
     };
     let drawn = panels.iter().enumerate().map(panel).collect();
-    Some(panel::draw(
-        "tau-histograms",
-        look,
-        layout,
-        &legend(&panels),
-        drawn,
-    ))
+    Some(panel::draw(NAME, look, layout, &legend(&panels), drawn))
 }
 
 /// A panel per set by rising frequency, as in Fig. 2. One of identical contacts goes onto the panel of the set that it

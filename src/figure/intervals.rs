@@ -11,6 +11,8 @@ use super::style::{Dot, GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::{Point, ascending};
 use crate::sets::{Digits, label};
 
+pub(super) const NAME: &str = "tau-T";
+
 const RADIUS: f64 = 1.8;
 const OTHER: Dot = Dot {
     ink: LIGHT_GREY,
@@ -97,7 +99,7 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         }
     });
     Some(panel::draw(
-        "tau-T",
+        NAME,
         look,
         Layout::column(560.0),
         &entries,

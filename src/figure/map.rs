@@ -15,6 +15,8 @@ use crate::reduce::{FREQUENCY, SetRow, Swept, differing, has_even_steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+pub(super) const LOCKING: &str = "locking-map";
+pub(super) const REGIMES: &str = "regime-map";
 /// Numbers of periods that have a colour each; larger numbers share one.
 const MAX_PERIODS: f64 = 12.0;
 /// Share of the scale at the least number of periods, which is not to be taken for the ground.
@@ -111,9 +113,9 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     };
     let panels = columns.into_iter().filter_map(panel).collect();
     let (name, width) = if is_locking {
-        ("locking-map", 560.0)
+        (LOCKING, 560.0)
     } else {
-        ("regime-map", 490.0)
+        (REGIMES, 490.0)
     };
     Some(panel::draw(
         name,

@@ -59,6 +59,18 @@ impl BadOption {
     }
 }
 
+/// The standing figures, which [`draw_all`] draws, in the order of the report.
+pub const STANDING: [&str; 8] = [
+    overview::NAME,
+    map::LOCKING,
+    map::REGIMES,
+    edge_values::NAME,
+    drag::NAME,
+    phase_eta::NAME,
+    intervals::NAME,
+    histograms::NAME,
+];
+
 /// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
 const MAX_SETS: usize = 100_000;
 const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
@@ -261,6 +273,11 @@ mod tests {
         assert_eq!(
             names,
             ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"]
+        );
+        let stems = names.iter().filter_map(|name| name.split('.').next());
+        assert!(
+            stems.into_iter().all(|stem| STANDING.contains(&stem)),
+            "the report shows them"
         );
         let bytes = || {
             files

@@ -6,6 +6,8 @@ use super::{Look, Picture};
 use crate::observe::Regime;
 use crate::reduce::{SetRow, swept};
 
+pub(super) const NAME: &str = "overview";
+
 /// What is shown: intervals, friction, time within slips, phases.
 const QUANTITIES: [&str; 5] = [
     "tau_mean",
@@ -64,7 +66,7 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
         colour,
         panels,
     }
-    .draw("overview", look)
+    .draw(NAME, look)
     .ok()
 }
 

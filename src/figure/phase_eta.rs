@@ -14,6 +14,8 @@ use crate::sets::label;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+pub(super) const NAME: &str = "phi-eta";
+
 const WIDTH: f64 = 580.0;
 const HEIGHT: f64 = 390.0;
 const AVERAGE: Dot = dot(BLUE);
@@ -89,7 +91,7 @@ pub(super) fn phase_eta(
         ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers)
     };
     Some(panel::draw(
-        "phi-eta",
+        NAME,
         look,
         Layout::column(WIDTH),
         &entries,

@@ -76,24 +76,14 @@ impl Picture {
 
     pub fn svg(&self) -> String {
         let svg = SvgBackend::new().render_scene(&self.scene);
-        // XML has no way to write these.
-        let is_not_xml = |c| matches!(c, '\0'..='\x08' | '\x0b'..='\x0c' | '\x0e'..='\x1f' | '\u{fffe}'..='\u{ffff}');
-        let svg = svg.replace(is_not_xml, "\u{fffd}");
         if self.style == Style::Screen {
             return svg;
         }
-        // The library gives sizes in pixels only.
+        // The library gives sizes in pixels only, so a picture of this size holds it.
         let Size { width, height } = self.size();
-        let sides = format!(
-            r#"width="{width:.2}mm" height="{height:.2}mm" viewBox="0 0 {:.2} {:.2}""#,
-            self.scene.width, self.scene.height
-        );
-        match (svg.find("width="), svg.find(" font-family=")) {
-            (Some(start), Some(end)) if start < end => {
-                format!("{}{sides}{}", &svg[..start], &svg[end..])
-            }
-            _ => svg,
-        }
+        let sides = format!(r#"width="{width:.2}mm" height="{height:.2}mm""#);
+        let units = format!("0 0 {:.2} {:.2}", self.scene.width, self.scene.height);
+        format!(r#"<svg xmlns="http://www.w3.org/2000/svg" {sides} viewBox="{units}">{svg}</svg>"#)
     }
 
     /// The figure as a PDF file of one page.
@@ -238,8 +228,9 @@ impl Picture {
         anchor: Anchor,
         ink: Option<Ink>,
     ) {
-        // An SVG may hold no control characters.
+        // XML has no way to write control characters, nor these two.
         let content = shown_text(text).to_string();
+        let content = content.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
         let Some((before, (lower, after))) = subscript(&content) else {
             self.scene.add(Primitive::Text {
                 x,

@@ -228,18 +228,8 @@ pub const INKS: [Ink; 6] = [
 ];
 
 /// For dots on a scale: the darker of the shades, which are seen on white.
-pub const SCALE: [Ink; 10] = [
-    Ink::new(0xab_d4_ce),
-    Ink::new(0x8f_c7_c7),
-    Ink::new(0x74_b9_c1),
-    Ink::new(0x5b_a9_ba),
-    Ink::new(0x45_98_b2),
-    Ink::new(0x35_86_a8),
-    Ink::new(0x2a_74_9c),
-    Ink::new(0x22_61_8e),
-    Ink::new(0x1e_4e_7c),
-    Ink::new(0x1b_3a_68),
-];
+pub static SCALE: LazyLock<[Ink; 10]> =
+    LazyLock::new(|| std::array::from_fn(|step| shade(0.3 + 0.7 * step as f64 / 9.0)));
 
 /// Border and ticks of a frame.
 pub(super) const AXIS: Stroke = Stroke::solid(BLACK, 1.2);

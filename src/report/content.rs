@@ -1,9 +1,8 @@
 //! The data of a page.
 
 use super::ADVICE;
-use super::reduced_columns::{Census, Sets, backbone};
-use super::slips::Slips;
-use crate::figure::{INKS, SCALE};
+use super::page_columns::{Census, Sets, Slips, backbone};
+use crate::figure::{INKS, SCALE, STANDING};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::model::{MODEL_VERSION, RNG_SCHEME, Symbol};
 use crate::reduce::advise;
@@ -24,16 +23,6 @@ const MAX_FAILURES: u64 = 200;
 const MAX_PARTS: usize = 4_000;
 /// Runs that are listed: the last ones.
 const MAX_RUNS: usize = 50;
-/// Names of figures that are shown, in order.
-const STANDING: [&str; 7] = [
-    "overview",
-    "locking-map",
-    "regime-map",
-    "edges",
-    "phi-eta",
-    "tau-T",
-    "tau-histograms",
-];
 /// η of the curves of the back-bone: from 1, in steps of 1/30 of a decade, over five decades.
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
