@@ -28,6 +28,7 @@ use crate::solver::SimulationError;
 use crate::sweep::SweepError;
 use crate::table::storage::Disk;
 use anyhow::{Context, Result};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 use signal_hook::consts::signal::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
 use signal_hook::flag::{register, register_conditional_shutdown};
@@ -99,6 +100,20 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Exit::of(&error)
     });
     exit as u8
+}
+
+/// Reads one of some values by its word; the help describes them.
+fn choice<T: Copy + Send + Sync + 'static>(
+    all: &'static [T],
+    word: fn(T) -> &'static str,
+    description: fn(T) -> Option<&'static str>,
+) -> impl TypedValueParser<Value = T> {
+    let described = |&value| PossibleValue::new(word(value)).help(description(value));
+    let words = PossibleValuesParser::new(all.iter().map(described));
+    words.try_map(move |given| {
+        let mut values = all.iter().copied();
+        values.find(|value| word(*value) == given).ok_or(given)
+    })
 }
 
 /// The layout of a results directory on the disk.

@@ -1,7 +1,7 @@
 //! `stickslip plot`: reduced data to figures, the standing ones or a custom one.
 
 use super::output::{self, TextTable};
-use super::{Exit, UsageError, layout};
+use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
     CustomFigure, Format, Limits, Look, Size, Style, draw_all, draw_custom, write_custom,
 };
@@ -10,8 +10,7 @@ use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
 use crate::table::shown::shown;
 use anyhow::Result;
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::{Path, PathBuf};
 
 /// Draw the figures of a results directory, or a custom figure; first makes reduced data again that are out of date
@@ -25,13 +24,13 @@ pub struct Arguments {
     #[arg(long)]
     list: bool,
     /// Formats, separated by commas [default: svg,png]
-    #[arg(long, value_enum, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', value_parser = choice(&Format::ALL, Format::word, Format::description))]
     format: Vec<Format>,
     /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: what the data need; in print one or two columns wide]
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     size: Option<Size>,
     /// Style
-    #[arg(long, value_enum, default_value_t = Style::Screen)]
+    #[arg(long, default_value = "screen", value_parser = choice(&Style::ALL, Style::word, Style::description))]
     style: Style,
     #[command(flatten)]
     custom: CustomFlags,
@@ -228,36 +227,6 @@ fn length(text: &str) -> Option<f64> {
     };
     let number: f64 = number.parse().ok()?;
     Some(number * millimetres).filter(|side| *side > 0.0 && *side <= LONGEST)
-}
-
-impl ValueEnum for Format {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let value = PossibleValue::new(self.word());
-        Some(match self {
-            Self::Svg => value.help("Vectors, for the browser and for changes by hand"),
-            Self::Png | Self::Pdf => value,
-        })
-    }
-}
-
-impl ValueEnum for Style {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self {
-            Self::Screen => "Pages and slides: 192 pixels per inch, as large as the data need",
-            Self::Print => {
-                "Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch; no small print"
-            }
-        };
-        Some(PossibleValue::new(self.word()).help(help))
-    }
 }
 
 #[cfg(test)]

@@ -5,8 +5,7 @@ use crate::run::threads::Threads;
 use crate::run::{MAX_FAILURES, Reasons, RunEvent, Tally};
 use crate::table::shown::shown_bytes;
 use crate::table::value::floored;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use indicatif::{ProgressBar, ProgressStyle};
 use std::time::{Duration, Instant};
 
 /// Time between two plain lines.
@@ -17,8 +16,8 @@ const RESOLUTION: u32 = 1000;
 const GUESS: f64 = 0.05;
 
 pub struct Progress {
+    /// Hidden unless standard error is a terminal.
     bar: ProgressBar,
-    is_terminal: bool,
     begin: Instant,
     last_line: Instant,
     tally: Tally,
@@ -36,7 +35,6 @@ impl Progress {
         let now = Instant::now();
         Self {
             bar: ProgressBar::hidden(),
-            is_terminal: std::io::stderr().is_terminal(),
             begin: now,
             last_line: now,
             tally: Tally::default(),
@@ -137,21 +135,14 @@ impl Progress {
         self.say(&format!(
             "running {jobs}, {jobs_there} there already; predicted: {time} on {place}"
         ));
-        if self.is_terminal {
-            let target = ProgressDrawTarget::stderr();
-            self.bar = ProgressBar::with_draw_target(Some(u64::from(RESOLUTION)), target);
-        }
+        self.bar = ProgressBar::new(u64::from(RESOLUTION));
         if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
             self.bar.set_style(style.progress_chars("=> "));
         }
     }
 
     fn say(&self, line: &str) {
-        if self.is_terminal {
-            self.bar.suspend(|| output::report(line));
-        } else {
-            output::report(line);
-        }
+        self.bar.suspend(|| output::report(line));
     }
 
     /// Draws the bar, which counts the jobs of all workers since this one began, or prints a line if the last is long ago.
@@ -179,7 +170,7 @@ impl Progress {
         let position = floored(f64::from(RESOLUTION) * share) as u64;
         self.bar.set_position(position);
         self.bar.set_message(text.clone());
-        if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
+        if self.bar.is_hidden() && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();
             let elapsed = output::duration(elapsed);
             output::report(&format!("{elapsed}, {:.0} %: {text}", 100.0 * share));

@@ -5,14 +5,13 @@ use super::{Exit, UsageError, layout};
 use crate::model::Symbol;
 use crate::reduce::{
     EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing, read_reduced,
-    renew, sets_where,
+    read_sets, renew, sets_where,
 };
 use crate::results::Results;
 use crate::sets::{Digits, label};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
-use crate::table::columns::{Kind, Table};
-use crate::table::file::Dataset;
+use crate::table::columns::Kind;
 use crate::table::shown::shown;
 use crate::table::value::floored;
 use anyhow::Result;
@@ -199,22 +198,10 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     Ok(text)
 }
 
-/// The first of the reduced sets, controls left out.
+/// The first of the reduced sets.
 fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
-    let file = results.layout().reduced_file(SetRow::NAME);
-    let mut sets = Vec::new();
-    for batch in Dataset::new(results.layout().storage, vec![file]).rows::<SetRow>() {
-        sets.extend(
-            batch?
-                .into_iter()
-                .filter(|row| !row.is_control)
-                .take(most - sets.len()),
-        );
-        if sets.len() == most {
-            break;
-        }
-    }
-    Ok(sets)
+    let sets = read_sets(results.layout()).take(most);
+    Ok(sets.collect::<Result<_, _>>()?)
 }
 
 /// The column that shows a parameter: of the period, the frequency.

@@ -41,6 +41,7 @@ pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
+use crate::results::ResultsError;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::sets::{Digits, label, symbol_of};
@@ -81,7 +82,7 @@ const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
     let _alone = exclusive_lock(layout, WRITER)?;
     let points = read(layout)?;
-    let sets = read_sets(layout, MAX_SETS).map_err(advise(ADVICE))?;
+    let sets = sets_with_results(layout).map_err(advise(ADVICE))?;
     let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
     pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, &sets, look));
@@ -115,8 +116,8 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 
 /// Draws a custom figure from the sets of a results directory; writes nothing.
 pub fn draw_custom(layout: &Layout<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
-    let mut rows: Vec<SetRow> = read(layout)?;
-    rows.retain(|row| !row.is_control);
+    let rows = read_sets(layout).collect::<Result<Vec<_>, _>>();
+    let rows = rows.map_err(advise(ADVICE))?;
     let look = &look.with_note(&common(rows.iter().map(|row| &*row.parameters)));
     let picture = custom::custom(&rows, figure, look)?;
     check_size(&picture, look)?;
@@ -132,6 +133,21 @@ pub fn write_custom(
 ) -> Result<Vec<PathBuf>> {
     let _alone = exclusive_lock(layout, WRITER)?;
     write(layout, &[picture], look, formats)
+}
+
+/// The sets with at least one interval or a regime; none if these are too many.
+fn sets_with_results(layout: &Layout<'_>) -> Result<Vec<SetRow>, ResultsError> {
+    let mut sets = Vec::new();
+    for set in read_sets(layout) {
+        let set = set?;
+        if set.intervals > 0 || set.regime.is_some() {
+            sets.push(set);
+        }
+        if sets.len() > MAX_SETS {
+            return Ok(Vec::new());
+        }
+    }
+    Ok(sets)
 }
 
 fn read<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>> {

@@ -35,7 +35,6 @@ pub struct Picture {
 words! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Format {
-        /// Vectors, for the browser and for changes by hand.
         Svg = "svg",
         Png = "png",
         Pdf = "pdf",
@@ -45,6 +44,14 @@ words! {
 impl Format {
     /// Those that figures get if none is asked for.
     pub const DEFAULT: [Self; 2] = [Self::Svg, Self::Png];
+
+    /// What the help says of it.
+    pub const fn description(self) -> Option<&'static str> {
+        match self {
+            Self::Svg => Some("Vectors, for the browser and for changes by hand"),
+            Self::Png | Self::Pdf => None,
+        }
+    }
 }
 
 impl Picture {

@@ -10,10 +10,8 @@ words! {
     /// What a figure is for.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Style {
-        /// Pages and slides: 192 pixels per inch, as large as the data need.
         #[default]
         Screen = "screen",
-        /// Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch; no small print.
         Print = "print",
     }
 }
@@ -26,6 +24,16 @@ const COLUMNS: [f64; 2] = [86.0, 178.0];
 const MAX_ONE_COLUMN: f64 = 800.0;
 
 impl Style {
+    /// What the help says of it.
+    pub const fn description(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Screen => "Pages and slides: 192 pixels per inch, as large as the data need",
+            Self::Print => {
+                "Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch; no small print"
+            }
+        })
+    }
+
     pub(super) const fn points(self) -> f64 {
         match self {
             Self::Screen => 0.75,

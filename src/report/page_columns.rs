@@ -1,7 +1,7 @@
 //! Tables of the page, column by column: a reader of the page needs each column as a whole, and columns compress best.
 
 use crate::observe::{Regime, Slip};
-use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, swept};
+use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, read_sets, swept};
 use crate::results::layout::Layout;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
@@ -121,7 +121,8 @@ impl Census {
             regimes,
             ..Self::default()
         };
-        for batch in sets_file(layout).rows::<Counted>() {
+        let file = layout.reduced_file(SetRow::NAME);
+        for batch in Dataset::new(layout.storage, vec![file]).rows::<Counted>() {
             for set in batch?.into_iter().filter(|set| !set.is_control) {
                 census.sets += 1;
                 census.slips += set.slips;
@@ -139,10 +140,6 @@ impl Census {
     pub(super) fn spacing(&self) -> u64 {
         self.sets.div_ceil(MAX_SETS).max(1)
     }
-}
-
-fn sets_file<'a>(layout: &Layout<'a>) -> Dataset<'a> {
-    Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)])
 }
 
 /// The sets that are shown.
@@ -179,14 +176,13 @@ impl Sets {
         };
         let mut number = 0_u64;
         let mut shown = Vec::new();
-        for batch in sets_file(layout).rows::<SetRow>() {
-            for row in batch?.into_iter().filter(|row| !row.is_control) {
-                if number.is_multiple_of(spacing) {
-                    sets.push(sweep, &row);
-                    shown.push(row);
-                }
-                number += 1;
+        for row in read_sets(layout) {
+            let row = row?;
+            if number.is_multiple_of(spacing) {
+                sets.push(sweep, &row);
+                shown.push(row);
             }
+            number += 1;
         }
         sets.columns.label(|column| label(&column.name));
         for swept in &swept(&shown) {
