@@ -54,7 +54,29 @@ impl Progress {
     pub fn show(&mut self, event: &RunEvent) {
         self.tally.note(event);
         match event {
-            RunEvent::Started { .. } => self.begin(event),
+            RunEvent::Started {
+                jobs,
+                predicted_cost,
+                jobs_there,
+                threads,
+                others,
+                ..
+            } => {
+                self.has_results |= *jobs_there > 0;
+                let jobs = output::count(*jobs, "job") + self.of_round;
+                let time = output::duration(predicted_cost / *threads as f64);
+                let mut place = output::count(*threads as u64, "thread");
+                if let Some(variable) = self.threads.variable {
+                    place = format!("{place} ({variable})");
+                }
+                if *others > 0 {
+                    let others = output::count(*others as u64, "worker");
+                    place = format!("{place}, shared with {others}");
+                }
+                self.begin(&format!(
+                    "running {jobs}, {jobs_there} there already; predicted: {time} on {place}"
+                ));
+            }
             RunEvent::PartCommitted { .. } => self.has_results = true,
             RunEvent::RoundBegun { jobs, rounds, .. } => {
                 let jobs = output::count(*jobs, "job");
@@ -106,35 +128,9 @@ impl Progress {
     }
 
     /// Says what is to be done, and begins the bar.
-    fn begin(&mut self, event: &RunEvent) {
-        let &RunEvent::Started {
-            jobs,
-            predicted_cost,
-            jobs_there,
-            threads,
-            others,
-            ..
-        } = event
-        else {
-            return;
-        };
+    fn begin(&mut self, line: &str) {
+        self.say(line);
         self.begin = Instant::now();
-        self.has_results |= jobs_there > 0;
-        let jobs = output::count(jobs, "job") + self.of_round;
-        let time = output::duration(predicted_cost / threads as f64);
-        let mut place = output::count(threads as u64, "thread");
-        if let Some(variable) = self.threads.variable {
-            place = format!("{place} ({variable})");
-        }
-        if others > 0 {
-            place = format!(
-                "{place}, shared with {}",
-                output::count(others as u64, "worker")
-            );
-        }
-        self.say(&format!(
-            "running {jobs}, {jobs_there} there already; predicted: {time} on {place}"
-        ));
         self.bar = ProgressBar::new(u64::from(RESOLUTION));
         if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
             self.bar.set_style(style.progress_chars("=> "));

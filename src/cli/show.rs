@@ -433,14 +433,17 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     notes.into_iter().flatten().collect()
 }
 
+/// The jobs of some kind, and of how many sets they are; `None` if there are none.
+fn jobs_of_sets(rows: &[SetRow], jobs: impl Fn(&SetRow) -> u64) -> Option<String> {
+    let counts: Vec<u64> = rows.iter().map(jobs).filter(|jobs| *jobs > 0).collect();
+    let jobs = output::count(counts.iter().sum(), "job");
+    let sets = output::count(counts.len() as u64, "set");
+    (!counts.is_empty()).then(|| format!("{jobs} of {sets}"))
+}
+
 fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
+    let jobs = jobs_of_sets(rows, |row| row.jobs_without_slips)?;
     let without = rows.iter().filter(|row| row.jobs_without_slips > 0);
-    let jobs: u64 = without.clone().map(|row| row.jobs_without_slips).sum();
-    if jobs == 0 {
-        return None;
-    }
-    let jobs = output::count(jobs, "job");
-    let sets = output::count(without.clone().count() as u64, "set");
     let mut places = without.filter_map(|row| sweep.set_with(&row.parameters.parameters));
     let job = places
         .next()
@@ -449,24 +452,19 @@ fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
         format!("; a job of one such set: {}", sweep.command(&job))
     });
     Some(format!(
-        "{jobs} of {sets} ended because no further slip came: the slider slides, or give_up_after is too short{command}"
+        "{jobs} ended because no further slip came: the slider slides, or give_up_after is too short{command}"
     ))
 }
 
 fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
+    let jobs = jobs_of_sets(rows, |row| row.jobs_cut.unwrap_or(0))?;
     let cut = rows.iter().filter(|row| row.jobs_cut > Some(0));
-    let jobs: u64 = cut.clone().filter_map(|row| row.jobs_cut).sum();
-    if jobs == 0 {
-        return None;
-    }
-    let jobs = output::count(jobs, "job");
-    let sets = output::count(cut.clone().count() as u64, "set");
     let off = cut.filter_map(|row| row.tau_off).reduce(f64::min);
     let off = off.map_or_else(String::new, |off| {
         format!(", by up to about {:.1} %", -100.0 * off)
     });
     Some(format!(
-        "{jobs} of {sets} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` \
+        "{jobs} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` \
          in place of max_time ends jobs with a slip"
     ))
 }

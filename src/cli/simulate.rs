@@ -129,20 +129,13 @@ struct PlotFlags {
 
 impl Arguments {
     fn request(&self) -> Request {
-        let TableFlags {
-            sample,
-            trace,
-            map,
-            profile,
-            contacts,
-            ..
-        } = &self.tables;
+        let tables = &self.tables;
         Request {
-            sample: *sample,
-            trace: trace.is_some() || self.plot.draws(Panel::Force),
-            map: map.is_some() || self.plot.draws(Panel::Map),
-            profile: profile.is_some(),
-            contacts: contacts.is_some(),
+            sample: tables.sample,
+            trace: tables.trace.is_some() || self.plot.draws(Panel::Force),
+            map: tables.map.is_some() || self.plot.draws(Panel::Map),
+            profile: tables.profile.is_some(),
+            contacts: tables.contacts.is_some(),
         }
     }
 }
@@ -397,28 +390,24 @@ struct Report<'a> {
 
 impl<'a> Report<'a> {
     fn new(job_id: &'a str, measured: &Measurements, wall_seconds: f64) -> Self {
-        let Measurements {
-            slips,
-            summary,
-            averages,
-            ruptures,
-            ..
-        } = measured;
-        let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
+        let summary = &measured.summary;
+        let averages = &measured.averages;
+        let slips = measured.slips.iter();
+        let intervals: Vec<f64> = slips.filter_map(|slip| slip.interval).collect();
         let mean = intervals.iter().sum::<f64>() / intervals.len() as f64;
         Self {
             job_id,
             simulated_seconds: summary.end_time,
-            slips: slips.len(),
+            slips: measured.slips.len(),
             mean_interval_seconds: Some(mean).filter(|mean| mean.is_finite()),
             outcome: JobOutcome::of(measured).word(),
             regime: measured.regime().map(Regime::word),
-            mean_friction_newtons: averages.map(|averages| averages.friction),
-            attached_fraction: averages.map(|averages| averages.attached_fraction),
-            slip_share: averages.map(|averages| averages.slip_share),
+            mean_friction_newtons: averages.as_ref().map(|averages| averages.friction),
+            attached_fraction: averages.as_ref().map(|averages| averages.attached_fraction),
+            slip_share: averages.as_ref().map(|averages| averages.slip_share),
             breaks: summary.breaks,
             reattachments: summary.reattachments,
-            ruptures: *ruptures,
+            ruptures: measured.ruptures,
             steps: summary.steps,
             leaps: summary.leaps,
             wall_seconds,

@@ -109,12 +109,8 @@ impl Report<'_> {
             return "nothing".to_owned();
         }
         let count = output::count(parts.len() as u64, "part");
-        let Verification {
-            jobs_missing,
-            jobs_spilled,
-            ..
-        } = *self.verification;
-        let jobs = output::missing(jobs_missing, jobs_spilled);
+        let verification = self.verification;
+        let jobs = output::missing(verification.jobs_missing, verification.jobs_spilled);
         format!("{count}, {jobs}: {}", first_of(parts))
     }
 

@@ -51,10 +51,13 @@ pub(super) struct Chart<'a> {
 
 /// How the sets of a chart are drawn.
 struct Dots {
+    x_axis: Axis,
     hues: Option<Hues>,
     radius: f64,
     /// Sets that are joined, line by line.
     lines: Vec<Vec<usize>>,
+    /// Sets without modulation that are levels.
+    free: Vec<usize>,
 }
 
 impl<'a> Chart<'a> {
@@ -98,14 +101,16 @@ impl<'a> Chart<'a> {
                 RADIUS
             },
             lines: self.lines(&sets),
+            x_axis,
+            free,
         };
         let groups = groups(self.panels.as_ref(), &sets)?;
         let (layout, height) = layout(ys.len(), groups.len());
         let mut panels: Vec<Panel<'_>> = Vec::new();
         for (y, axis) in ys.iter().zip(y_axes) {
             for (title, members) in &groups {
-                let layers = self.layers(y, &x_axis, &dots, members, &free);
-                let mut panel = Panel::new(height, x_axis.clone(), axis.clone(), layers);
+                let layers = self.layers(y, &dots, members);
+                let mut panel = Panel::new(height, dots.x_axis.clone(), axis.clone(), layers);
                 if groups.len() > 1 {
                     if !panels.len().is_multiple_of(layout.columns) {
                         panel.y.label.clear();
@@ -118,8 +123,8 @@ impl<'a> Chart<'a> {
                 panels.push(panel);
             }
         }
-        let look = look.with_note(&self.note(&inside, free.len()));
-        let legend = self.legend(&inside, &free, &dots);
+        let look = look.with_note(&self.note(&inside, dots.free.len()));
+        let legend = self.legend(&inside, &dots);
         Ok(panel::draw(name, &look, layout, &legend, panels))
     }
 
@@ -200,16 +205,10 @@ impl<'a> Chart<'a> {
     }
 
     /// Sets as dots, joined, with their intervals along both axes, over those without modulation and the drive's part.
-    fn layers(
-        &self,
-        y: &Quantity<'_>,
-        x_axis: &Axis,
-        dots: &Dots,
-        members: &[usize],
-        free: &[usize],
-    ) -> Vec<Layer<'a>> {
+    fn layers(&self, y: &Quantity<'_>, dots: &Dots, members: &[usize]) -> Vec<Layer<'a>> {
         let level = |set: &usize| {
-            let ink = if dots.hues.is_some() {
+            let has_colour = dots.hues.is_some();
+            let ink = if has_colour {
                 self.ink(dots, *set)
             } else {
                 GREY
@@ -221,7 +220,7 @@ impl<'a> Chart<'a> {
         if y.name() == "slip_share" {
             layers.extend(Regime::MIN_SHARES.map(|share| Layer::Level(share, REFERENCE)));
         }
-        layers.extend(free.iter().filter_map(level));
+        layers.extend(dots.free.iter().filter_map(level));
         for line in &dots.lines {
             let line: Vec<usize> = line
                 .iter()
@@ -236,7 +235,7 @@ impl<'a> Chart<'a> {
             layers.push(Layer::Dots(alone.collect(), dot));
         }
         for &set in members {
-            self.add_bars(&mut layers, y, x_axis, dots, set);
+            self.add_bars(&mut layers, y, dots, set);
         }
         let mut all = vec![Layer::Inside(layers)];
         for &set in members {
@@ -281,14 +280,7 @@ impl<'a> Chart<'a> {
     }
 
     /// The intervals of a set along both axes.
-    fn add_bars(
-        &self,
-        layers: &mut Vec<Layer<'a>>,
-        y: &Quantity<'_>,
-        x_axis: &Axis,
-        dots: &Dots,
-        set: usize,
-    ) {
+    fn add_bars(&self, layers: &mut Vec<Layer<'a>>, y: &Quantity<'_>, dots: &Dots, set: usize) {
         let Some((at_x, at_y)) = self.place(y, set) else {
             return;
         };
@@ -302,11 +294,8 @@ impl<'a> Chart<'a> {
             layers.push(Layer::Bars(vec![(at_x, ends)], stroke));
         }
         if let Some((low, high)) = self.x.interval(set) {
-            let left = if x_axis.place(low).is_finite() {
-                low
-            } else {
-                x_axis.low
-            };
+            let is_finite = dots.x_axis.place(low).is_finite();
+            let left = if is_finite { low } else { dots.x_axis.low };
             layers.push(Layer::Curve(vec![(left, at_y), (high, at_y)], stroke));
         }
     }
@@ -336,7 +325,7 @@ impl<'a> Chart<'a> {
 /// What the marks mean: the legend and the small print.
 impl Chart<'_> {
     /// What each mark means that is drawn.
-    fn legend(&self, inside: &[usize], free: &[usize], dots: &Dots) -> Vec<Entry> {
+    fn legend(&self, inside: &[usize], dots: &Dots) -> Vec<Entry> {
         let mut entries = Vec::new();
         if let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) {
             let numbers: Vec<Option<f64>> = inside.iter().map(|&set| colour.number(set)).collect();
@@ -346,7 +335,7 @@ impl Chart<'_> {
                 entries.push(entry(Mark::Dot(dot(GREY)), text));
             }
         }
-        if !free.is_empty() {
+        if !dots.free.is_empty() {
             entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
         }
         if inside.iter().any(|&set| self.slides(set)) {

@@ -172,22 +172,19 @@ pub(super) struct Page {
 impl Page {
     /// The frame in a row and a column, both from 0. One of several has a letter.
     pub(super) fn frame(&self, row: usize, column: usize, x: Axis, y: Axis) -> Frame {
-        let Layout {
-            columns,
-            width,
-            column_gap,
-            row_gap: gap,
-            ..
-        } = self.layout;
+        let Self {
+            layout, heading, ..
+        } = *self;
+        let columns = layout.columns;
         let above: f64 = self.heights[..row]
             .iter()
-            .map(|height| height + gap + self.heading)
+            .map(|height| height + layout.row_gap + heading)
             .sum();
         let is_alone = columns * self.heights.len() == 1;
         let letter = u8::try_from(row * columns + column)
             .ok()
             .and_then(|index| b'a'.checked_add(index));
-        let start = |column: usize| MARGIN + column as f64 * (width + column_gap);
+        let start = |column: usize| MARGIN + column as f64 * (layout.width + layout.column_gap);
         // The same in all columns, so that they are labelled alike.
         let end = if columns > 1 {
             self.end.min(start(column + 1) - LABEL_GAP)
@@ -198,13 +195,13 @@ impl Page {
             left: start(column) - MARGIN + LEFT,
             room: (start(column), end),
             // Over headings there is one for a row.
-            y_label_end: if self.heading > 0.0 { self.end } else { end },
-            top: self.top + above + self.heading,
-            width,
+            y_label_end: if heading > 0.0 { self.end } else { end },
+            top: self.top + above + heading,
+            width: layout.width,
             height: self.heights[row],
             x,
             y,
-            heading: self.heading,
+            heading,
             letter: letter.filter(|_| !is_alone).map(char::from),
             is_lowest: row + 1 == self.heights.len(),
         }
@@ -260,16 +257,16 @@ impl Frame {
     pub(super) fn axes(&self, sheet: &mut Picture) {
         let right = self.right();
         let bottom = self.bottom();
-        let [x_axis, y_axis] =
-            [(&self.x, self.width), (&self.y, self.height)].map(|(axis, length)| {
-                match sheet.style {
-                    Style::Screen => axis.clone(),
-                    Style::Print => axis
-                        .clone()
-                        .with_enough_numbers()
-                        .without_dense_ticks(length),
-                }
-            });
+        let for_style = |axis: &Axis, length| {
+            let mut axis = axis.clone();
+            if sheet.style == Style::Print {
+                axis = axis.with_enough_numbers();
+                axis.thin_out(length);
+            }
+            axis
+        };
+        let x_axis = for_style(&self.x, self.width);
+        let y_axis = for_style(&self.y, self.height);
         for (value, length) in ticks(&x_axis) {
             let x = self.x_of(value);
             sheet.line(vec![(x, bottom), (x, bottom - length)], AXIS);
@@ -477,7 +474,8 @@ mod tests {
     fn labels_and_numbers_of_small_figures_are_neither_cut_nor_overlap() {
         let long = "Standard deviation of the intervals between slips, tau_sd (s)";
         let x = Axis::linear(long, 0.0, 1000.0);
-        let y = Axis::logarithmic(long, 3e-9, 8e-9).with_short_label(Some("tau_sd (s)".to_owned()));
+        let mut y = Axis::logarithmic(long, 3e-9, 8e-9);
+        y.short_label = Some("tau_sd (s)".to_owned());
         for size in [(60.0, 40.0), (86.0, 60.0), (178.0, 60.0)] {
             let (width, texts) = texts(Style::Print, size, &x, &y);
             assert!(

@@ -132,27 +132,22 @@ impl Quantity<'_> {
             .is_none()
             .then(|| self.typeset().short(self.unit));
         if self.column.values.is_worded() {
-            let axis = self.axis_of_words(&label)?;
-            return Ok(axis.with_short_label(short_label));
+            let mut axis = self.axis_of_words(&label)?;
+            axis.short_label = short_label;
+            return Ok(axis);
         }
         let (low, high) = self.ends(sets)?;
-        let axis = |label: &str| {
-            if self.is_log {
-                Axis::logarithmic(label, low, high)
-            } else {
-                Axis::linear(label, low, high)
-            }
-        };
+        let axis = |label: &str| Axis::of_scale(self.is_log, label, low, high);
         let has_few = (2..=MAX_TICKS).contains(&self.column.distinct.len());
         if self.symbol.is_some() && self.limits == (None, None) && has_few {
             let values: Vec<f64> = self.distinct().collect();
-            let axis = axis(&label).with_ticks_at(&label, &values);
-            return Ok(axis.with_short_label(short_label));
+            let mut axis = axis(&label).with_ticks_at(&label, &values);
+            axis.short_label = short_label;
+            return Ok(axis);
         }
-        let short_label = short_label.map(|label| axis(&label).label);
-        Ok(axis(&label)
-            .with_short_label(short_label)
-            .with_enough_numbers())
+        let mut shown = axis(&label).with_enough_numbers();
+        shown.short_label = short_label.map(|label| axis(&label).label);
+        Ok(shown)
     }
 
     fn axis_of_words(&self, label: &str) -> Result<Axis, BadOption> {
@@ -172,8 +167,7 @@ impl Quantity<'_> {
             );
             return Err(self.refuse(&problem));
         }
-        let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        Ok(Axis::categories(label, &words))
+        Ok(Axis::categories(label, words))
     }
 
     /// Where the axis ends: at the limits, else a little beyond the data.
@@ -290,11 +284,7 @@ impl Grid {
     pub(super) fn axis(&self, label: &str) -> Axis {
         let low = self.cell(0).0;
         let high = self.cell(self.values.len() - 1).1;
-        if self.is_linear {
-            Axis::linear(label, low, high)
-        } else {
-            Axis::logarithmic(label, low, high)
-        }
+        Axis::of_scale(!self.is_linear, label, low, high)
     }
 
     /// The ends of the cell around the value with this index: halfway to its neighbours.

@@ -102,13 +102,10 @@ impl Look {
 
     /// The same look with more small print.
     pub fn with_note(&self, more: &str) -> Self {
-        let between = if self.note.is_empty() || more.is_empty() {
-            ""
-        } else {
-            "; "
-        };
+        let notes = [&*self.note, more].into_iter();
+        let notes: Vec<&str> = notes.filter(|note| !note.is_empty()).collect();
         Self {
-            note: format!("{}{between}{more}", self.note),
+            note: notes.join("; "),
             ..self.clone()
         }
     }
