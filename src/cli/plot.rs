@@ -5,9 +5,10 @@ use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
     CustomFigure, Format, Limits, Look, Size, Style, draw_all, draw_custom, write_custom,
 };
-use crate::reduce::{renew, set_columns};
+use crate::reduce::{SetRow, renew};
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
+use crate::table::columns::Row;
 use crate::table::shown::shown;
 use anyhow::Result;
 use clap::Args;
@@ -121,7 +122,7 @@ pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
 
 /// The columns of the table of sets.
 fn list() -> String {
-    let described = set_columns();
+    let described = SetRow::columns();
     let mut columns = TextTable::default();
     columns.words("", &described, |column| column.name.to_string());
     columns.words("", &described, |column| column.unit.to_owned());

@@ -15,7 +15,7 @@ use super::style::{
 };
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, Swept, Values, ascending, is_same};
+use crate::reduce::{SetRow, Values, ascending, is_same};
 use std::collections::BTreeMap;
 
 /// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
@@ -42,7 +42,7 @@ const HOLE: f64 = 1.6;
 /// Sets against a column: a panel for each quantity and each value of another column.
 pub(super) struct Chart<'a> {
     pub(super) rows: &'a [SetRow],
-    pub(super) swept: &'a [Swept],
+    pub(super) swept: &'a [Values],
     pub(super) x: Quantity<'a>,
     pub(super) ys: Vec<Quantity<'a>>,
     pub(super) colour: Option<Quantity<'a>>,
@@ -175,7 +175,7 @@ impl<'a> Chart<'a> {
             .swept
             .iter()
             .filter(|other| parameter(other.name()) != Some(symbol))
-            .map(Swept::places)
+            .map(Values::places)
             .collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
         for &set in sets {
@@ -331,7 +331,7 @@ impl Chart<'_> {
             let numbers: Vec<Option<f64>> = inside.iter().map(|&set| colour.number(set)).collect();
             entries.extend(hues.entries(RADIUS, |value| numbers.contains(&Some(value))));
             if numbers.contains(&None) {
-                let text = without_value(&colour.column.values);
+                let text = without_value(&colour.column);
                 entries.push(entry(Mark::Dot(dot(GREY)), text));
             }
         }
@@ -376,7 +376,7 @@ impl Chart<'_> {
             .swept
             .iter()
             .filter(|swept| !shown.contains(&parameter(swept.name())));
-        let symbols: Vec<String> = pooled.map(|swept| swept.values.label().symbol).collect();
+        let symbols: Vec<String> = pooled.map(|swept| swept.label().symbol).collect();
         (!symbols.is_empty())
             .then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))
     }

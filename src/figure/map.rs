@@ -11,7 +11,7 @@ use super::quantity::{Grid, Quantity};
 use super::style::{BLACK, Fill, Ink, Look, Stroke, WHITE, diverging, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{FREQUENCY, SetRow, Swept, differing, has_even_steps};
+use crate::reduce::{FREQUENCY, SetRow, Values, differing, has_even_steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -129,7 +129,7 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
 /// T, or 1/T if its steps are even and those of T are not.
 fn period_column(sets: &[SetRow]) -> &'static str {
     let is_even =
-        |column| Swept::of(sets, column).is_ok_and(|swept| has_even_steps(&swept.distinct));
+        |column| Values::of(sets, column).is_ok_and(|swept| has_even_steps(&swept.distinct));
     if !is_even("T") && is_even(FREQUENCY) {
         FREQUENCY
     } else {
@@ -218,7 +218,7 @@ impl Map {
                 rows.index_of(y.number(set)?),
             ))
         };
-        let sets: Vec<(usize, Position)> = (0..x.column.values.numbers.len())
+        let sets: Vec<(usize, Position)> = (0..x.column.numbers.len())
             .filter_map(|set| Some((set, position(set)?)))
             .collect();
         let counts = [columns.count(), rows.count()];

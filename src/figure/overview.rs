@@ -57,7 +57,7 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
         None
     };
     let colour = quantity(if panels == Some(1) { 2 } else { 1 }, "colour");
-    let panels = panels.map(|place| swept[place].values.clone());
+    let panels = panels.map(|place| swept[place].clone());
     Chart {
         rows,
         swept: &swept,

@@ -6,7 +6,7 @@ use super::frame::Ends;
 use super::hues::Hues;
 use super::style::INKS;
 use crate::model::Symbol;
-use crate::reduce::{FREQUENCY, SetRow, Swept, Values, has_even_steps, is_spread};
+use crate::reduce::{FREQUENCY, SetRow, Values, has_even_steps, is_spread};
 use crate::sets::{Label, label};
 
 /// Values of a parameter up to which each has its tick.
@@ -21,7 +21,7 @@ pub type Limits = (Option<f64>, Option<f64>);
 pub(super) struct Quantity<'a> {
     /// The option that named it.
     option: &'static str,
-    pub(super) column: Swept,
+    pub(super) column: Values,
     /// The parameter that it shows, if it shows one.
     pub(super) symbol: Option<Symbol>,
     /// What the drive alone explains of it.
@@ -46,14 +46,14 @@ pub(super) fn parameter(column: &str) -> Option<Symbol> {
 impl Quantity<'_> {
     pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, BadOption> {
         let column =
-            Swept::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
+            Values::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
         let drive = match name {
             "resultant_length" => Values::of(rows, "resultant_drive").ok(),
             "locking_index" => Values::of(rows, "locking_index_drive").ok(),
             _ => None,
         };
         let drive = drive.filter(|drive| drive.numbers.iter().any(Option::is_some));
-        let (factor, unit) = column.values.scale();
+        let (factor, unit) = column.scale();
         let symbol = parameter(name);
         let is_log = if symbol.is_some() {
             column.is_logarithmic()
@@ -78,7 +78,7 @@ impl Quantity<'_> {
     }
 
     pub(super) fn typeset(&self) -> Label {
-        self.column.values.label()
+        self.column.label()
     }
 
     pub(super) fn axis_label(&self) -> String {
@@ -101,11 +101,11 @@ impl Quantity<'_> {
     }
 
     pub(super) fn number(&self, set: usize) -> Option<f64> {
-        self.column.values.numbers[set].map(|number| self.factor * number)
+        self.column.numbers[set].map(|number| self.factor * number)
     }
 
     pub(super) fn interval(&self, set: usize) -> Option<Ends> {
-        self.column.values.intervals[set].map(|(low, high)| (self.factor * low, self.factor * high))
+        self.column.intervals[set].map(|(low, high)| (self.factor * low, self.factor * high))
     }
 
     pub(super) fn refuse(&self, problem: &str) -> BadOption {
@@ -121,7 +121,7 @@ impl Quantity<'_> {
     /// Whether a set has a place on the axis.
     pub(super) fn has(&self, set: usize) -> bool {
         self.number(set)
-            .is_some_and(|value| !self.is_log || self.column.values.is_worded() || value > 0.0)
+            .is_some_and(|value| !self.is_log || self.column.is_worded() || value > 0.0)
     }
 
     /// The axis, from one limit or end of the data to the other.
@@ -131,7 +131,7 @@ impl Quantity<'_> {
             .label
             .is_none()
             .then(|| self.typeset().short(self.unit));
-        if self.column.values.is_worded() {
+        if self.column.is_worded() {
             let mut axis = self.axis_of_words(&label)?;
             axis.short_label = short_label;
             return Ok(axis);
@@ -152,7 +152,7 @@ impl Quantity<'_> {
 
     fn axis_of_words(&self, label: &str) -> Result<Axis, BadOption> {
         let name = self.name();
-        let words = &self.column.values.words;
+        let words = &self.column.words;
         if self.is_log {
             let problem = format!("{name} holds words; a logarithmic axis takes numbers");
             return Err(BadOption::new("log", self.option, &problem));
@@ -206,7 +206,7 @@ impl Quantity<'_> {
 
     /// Its values as colours.
     pub(super) fn hues(&self) -> Result<Hues, BadOption> {
-        let values = &self.column.values;
+        let values = &self.column;
         let words = values.words.len();
         let inks = INKS.len();
         if words > inks {
@@ -225,17 +225,17 @@ impl Quantity<'_> {
 }
 
 /// Whether the values of a statistic are seen on a logarithmic axis only.
-fn lies_decades_apart(column: &Swept) -> bool {
+fn lies_decades_apart(column: &Values) -> bool {
     let [least, .., _] = column.distinct[..] else {
         return false;
     };
     let values = &column.distinct;
-    let intervals = column.values.intervals.iter().flatten();
+    let intervals = column.intervals.iter().flatten();
     let low = intervals.map(|(low, _)| *low).fold(least, f64::min);
     // A single set, such as the only one that slides, changes no scale.
     let alone = usize::from(values.len() >= FEW_VALUES);
     let ends = (values[alone], values[values.len() - 1 - alone]);
-    !column.values.is_worded() && low > 0.0 && is_wide(ends)
+    !column.is_worded() && low > 0.0 && is_wide(ends)
 }
 
 /// What sets without a value of a column are called: of a period, that they have no modulation.
