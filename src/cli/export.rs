@@ -27,7 +27,11 @@ pub struct Arguments {
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
     /// Format of the files
-    #[arg(long, default_value = "parquet", value_parser = choice(&Format::ALL, Format::word, Format::description))]
+    #[arg(
+        long,
+        default_value = "parquet",
+        value_parser = choice(&Format::ALL, Format::word, Format::description)
+    )]
     format: Format,
     /// Print JSON
     #[arg(long)]

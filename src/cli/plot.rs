@@ -24,14 +24,23 @@ pub struct Arguments {
     /// List the columns that can be drawn, with units and meanings
     #[arg(long)]
     list: bool,
-    /// Formats, separated by commas [default: svg,png]
-    #[arg(long, value_delimiter = ',', value_parser = choice(&Format::ALL, Format::word, Format::description))]
+    /// Formats, separated by commas
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "svg,png",
+        value_parser = choice(&Format::ALL, Format::word, Format::description)
+    )]
     format: Vec<Format>,
     /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: what the data need; in print one or two columns wide]
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     size: Option<Size>,
     /// Style
-    #[arg(long, default_value = "screen", value_parser = choice(&Style::ALL, Style::word, Style::description))]
+    #[arg(
+        long,
+        default_value = "screen",
+        value_parser = choice(&Style::ALL, Style::word, Style::description)
+    )]
     style: Style,
     #[command(flatten)]
     custom: CustomFlags,
@@ -65,14 +74,6 @@ impl Arguments {
             ..Look::of_sweep(results.sweep().name())
         }
     }
-
-    fn formats(&self) -> &[Format] {
-        if self.format.is_empty() {
-            &Format::DEFAULT
-        } else {
-            &self.format
-        }
-    }
 }
 
 pub fn plot(arguments: &Arguments) -> Result<Exit> {
@@ -92,14 +93,14 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
             output::report(&format!("for the caption: {}", picture.note()));
         }
         match &out {
-            None => write_custom(layout, picture, &look, arguments.formats())?,
+            None => write_custom(layout, picture, &look, &arguments.format)?,
             Some((out, format)) => {
                 output::write(out, &picture.encoded(*format)?)?;
                 arguments.out.iter().cloned().collect()
             }
         }
     } else {
-        draw_all(layout, &look, arguments.formats())?
+        draw_all(layout, &look, &arguments.format)?
     };
     if files.is_empty() {
         output::report("there is nothing to draw: no set has a result");

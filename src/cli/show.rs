@@ -8,7 +8,7 @@ use crate::reduce::{
     read_sets, renew, sets_where,
 };
 use crate::results::Results;
-use crate::sets::{Digits, label};
+use crate::sets::{Digits, label, with_decimals};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::Kind;
@@ -403,14 +403,12 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
         0.0
     } - exponent;
     let digits = floored(digits).min(18);
-    let rounded = |value: f64| format!("{value:.digits$}");
-    // Not -0.00, which is 0 with 0 added.
-    let [value, low, high] =
-        [value, low, high].map(|end| rounded(rounded(end).parse().unwrap_or(end) + 0.0));
+    let half = with_decimals(half, digits);
+    let [value, low, high] = [value, low, high].map(|end| with_decimals(end, digits));
     if is_lopsided {
         format!("{value} ({low} to {high})")
     } else {
-        format!("{value} ± {}", rounded(half))
+        format!("{value} ± {half}")
     }
 }
 

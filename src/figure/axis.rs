@@ -1,6 +1,6 @@
 //! Axes: range, scale, and where ticks go.
 
-use crate::sets::{Digits, power_of_ten};
+use crate::sets::{Digits, power_of_ten, with_decimals};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -383,15 +383,9 @@ fn with_power(label: &str, power: i32) -> String {
     }
 }
 
-/// With a true minus sign, and none before zero.
+/// With a true minus sign.
 fn number(value: f64, decimals: usize) -> String {
-    let digits = format!("{:.decimals$}", value.abs());
-    let is_zero = digits.chars().all(|digit| digit == '0' || digit == '.');
-    if value < 0.0 && !is_zero {
-        format!("−{digits}")
-    } else {
-        digits
-    }
+    with_decimals(value, decimals).replace('-', "−")
 }
 
 fn plain_power(mantissa: f64, power: i32) -> String {

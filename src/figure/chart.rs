@@ -15,7 +15,7 @@ use super::style::{
 };
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, Values, ascending, is_same};
+use crate::reduce::{SetRow, Values, is_same};
 use std::collections::BTreeMap;
 
 /// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
@@ -437,17 +437,12 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
     let Some(values) = panels else {
         return Ok(vec![(String::new(), sets.to_vec())]);
     };
-    let of = |value: f64| {
+    let of = |&value: &f64| {
         let is_of = |set: &usize| values.numbers[*set].is_some_and(|number| is_same(value, number));
-        (
-            values.setting(value),
-            sets.iter().copied().filter(is_of).collect::<Vec<_>>(),
-        )
+        let sets: Vec<usize> = sets.iter().copied().filter(is_of).collect();
+        (values.setting(value), sets)
     };
-    let mut groups: Vec<_> = ascending(values.numbers.iter().copied().flatten())
-        .into_iter()
-        .map(of)
-        .collect();
+    let mut groups: Vec<_> = values.distinct.iter().map(of).collect();
     groups.retain(|(_, sets)| !sets.is_empty());
     // Sets without a value, such as a frequency at Δ = 0, have a separate panel.
     let without: Vec<usize> = sets

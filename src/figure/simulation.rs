@@ -46,10 +46,7 @@ pub fn simulation(
         common(std::iter::once(parameters)),
         parameters.seed
     );
-    let look = &Look {
-        note,
-        ..Look::default()
-    };
+    let look = &Look::default().with_note(&note);
     let empty = |what| anyhow!("figure {NAME}: there are no {what} to draw");
     let blocks = parameters.blocks;
     if map.is_some_and(|map| map.len() < 2 * blocks || !map.len().is_multiple_of(blocks)) {

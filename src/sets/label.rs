@@ -214,6 +214,12 @@ impl Digits {
     }
 }
 
+/// With this many decimals, and no sign before zero.
+pub fn with_decimals(value: f64, decimals: usize) -> String {
+    let rounded: f64 = format!("{value:.decimals$}").parse().unwrap_or(value);
+    format!("{:.decimals$}", rounded + 0.0)
+}
+
 pub fn power_of_ten(mantissa: f64, power: i32) -> String {
     const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let raised = |character: char| {

@@ -3,7 +3,9 @@
 
 mod label;
 
-pub use label::{Digits, Label, capitalised, first_clause, label, power_of_ten, symbol_of};
+pub use label::{
+    Digits, Label, capitalised, first_clause, label, power_of_ten, symbol_of, with_decimals,
+};
 
 use crate::model::Symbol;
 use crate::model::selected::{Selected, Selection};
