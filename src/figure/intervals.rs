@@ -46,7 +46,8 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let few = Axis::linear(few, 0.0, f64::from(LINES) + 0.5)
         .with_ticks_at(few, &(0..=LINES).map(f64::from).collect::<Vec<_>>());
 
-    let (phased, others): (Vec<_>, Vec<_>) = slips.iter().partition(|slip| slip.0.has_phase);
+    let (phased, others): (Vec<&(&Point, Place)>, Vec<_>) =
+        slips.iter().partition(|slip| slip.0.has_phase);
     let of_phased = phased.iter().map(|slip| slip.0.drive_velocity);
     let of_phased: Vec<f64> = of_phased.collect();
     // The same colours whatever has a phase.
