@@ -268,17 +268,15 @@ impl Axis {
     }
 
     /// `count` >= 2 values from end to end, evenly placed.
-    pub(super) fn evenly_placed(&self, count: usize) -> impl Iterator<Item = f64> + use<> {
-        let low = self.low;
-        let high = self.high;
-        let scale = self.scale;
-        (0..count).map(move |step| {
+    pub(super) fn evenly_placed(&self, count: usize) -> Vec<f64> {
+        let value = |step: usize| {
             let place = step as f64 / (count - 1) as f64;
-            match scale {
-                Scale::Linear => low + place * (high - low),
-                Scale::Logarithmic => low * libm::exp(place * libm::log(high / low)),
+            match self.scale {
+                Scale::Linear => self.low + place * (self.high - self.low),
+                Scale::Logarithmic => self.low * libm::exp(place * libm::log(self.high / self.low)),
             }
-        })
+        };
+        (0..count).map(value).collect()
     }
 }
 
@@ -576,7 +574,7 @@ mod tests {
     #[test]
     fn even_places_go_from_end_to_end() {
         let axis = Axis::logarithmic("", 0.2, 1000.0);
-        let values: Vec<f64> = axis.evenly_placed(5).collect();
+        let values = axis.evenly_placed(5);
         assert!((values[0] - 0.2).abs() < 1e-12 && (values[4] - 1000.0).abs() < 1e-9);
         assert!((axis.place(values[2]) - 0.5).abs() < 1e-12);
     }

@@ -92,24 +92,16 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let entries: Vec<Entry> = medians.into_iter().chain([lines]).collect();
     // τ = nT is a curve in T, and level in Δ.
     let period = ramped().find_map(|point| point.period)?;
-    let line = |n: f64| {
-        [low, high].map(|at| {
-            (
-                at,
-                n * factor * if is_period { at / x_factor } else { period },
-            )
-        })
-    };
+    let period_at = |at: f64| if is_period { at / x_factor } else { period };
+    let line = |n: f64| [low, high].map(|at| (at, n * factor * period_at(at)));
     // Slip by slip, so that neither stage covers the other.
     let dots = slips.iter().map(|&(stage, x, tau, _)| {
-        Layer::Dots(
-            vec![(x, tau)],
-            Dot {
-                ink: STAGES[stage].2,
-                radius: 2.0,
-                opacity: 0.45,
-            },
-        )
+        let dot = Dot {
+            ink: STAGES[stage].2,
+            radius: 2.0,
+            opacity: 0.45,
+        };
+        Layer::Dots(vec![(x, tau)], dot)
     });
     // Where lines leave the frame: at its right, or through its top.
     let end = |n: f64| {
@@ -122,33 +114,19 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let numbers = Layer::Drawn(Box::new(move |sheet, frame| {
         for (n, end) in ends_of_lines {
             let (x, y) = frame.place(end);
-            let y = y.max(frame.top + BELOW_TOP);
-            sheet.centred_text(
-                (x + 6.0, y),
-                &format!("n = {n}"),
-                LEGEND_TEXT,
-                Anchor::Start,
-            );
+            let place = (x + 6.0, y.max(frame.top + BELOW_TOP));
+            sheet.centred_text(place, &format!("n = {n}"), LEGEND_TEXT, Anchor::Start);
         }
     }));
-    let lines = Layer::Inside(
-        multiples()
-            .map(|n| Layer::Curve(line(n).into(), GRID))
-            .chain(dots)
-            .collect(),
-    );
+    let lines = multiples().map(|n| Layer::Curve(line(n).into(), GRID));
+    let lines = Layer::Inside(lines.chain(dots).collect());
     let tau = Axis::linear(&format!("Slip interval τ ({unit})"), taus.0, taus.1);
     let upper = Panel::new(320.0, x.clone(), tau, vec![lines, numbers]);
     let ratio = Axis::linear("Median and quartiles of τ / T", least - 0.3, most + 0.3);
     let levels = multiples().map(|n| Layer::Level(n, GRID));
     let lower = Panel::inside(210.0, x, ratio, levels.chain(medians_of(&slips, ends)));
-    Some(panel::draw(
-        NAME,
-        look,
-        LAYOUT,
-        &entries,
-        vec![upper, lower],
-    ))
+    let panels = vec![upper, lower];
+    Some(panel::draw(NAME, look, LAYOUT, &entries, panels))
 }
 
 /// Medians and quartiles of τ/T in bins of the modulation, of both stages.
@@ -163,20 +141,15 @@ fn medians_of<'a>(slips: &[Slip], (low, high): Ends) -> Vec<Layer<'a>> {
             } else {
                 start + width
             };
-            let ratios = ratios(
-                slips
-                    .iter()
-                    .filter(|slip| slip.0 == stage && (start..end).contains(&slip.1)),
-            );
+            let is_in_bin = |slip: &&Slip| slip.0 == stage && (start..end).contains(&slip.1);
+            let ratios = ratios(slips.iter().filter(is_in_bin));
             let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share));
             if let [Some(first), Some(median), Some(third)] = quartiles
                 && ratios.len() >= MIN_INTERVALS
             {
                 let x = start + (0.5 + OFFSETS[stage]) * width;
-                layers.push(Layer::Bars(
-                    vec![(x, (first, third))],
-                    Stroke::solid(ink, 2.0),
-                ));
+                let stroke = Stroke::solid(ink, 2.0);
+                layers.push(Layer::Bars(vec![(x, (first, third))], stroke));
                 layers.push(Layer::Dots(vec![(x, median)], Dot::solid(ink, 4.5)));
             }
         }

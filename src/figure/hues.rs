@@ -28,12 +28,10 @@ impl Hues {
             [low, .., high] if values.len() > INKS.len() => {
                 Self::Scale(Axis::spanning(label, (low, high)))
             }
-            _ => Self::Inks(
-                values
-                    .into_iter()
-                    .map(|value| (value, word(value)))
-                    .collect(),
-            ),
+            _ => {
+                let named = values.into_iter().map(|value| (value, word(value)));
+                Self::Inks(named.collect())
+            }
         }
     }
 

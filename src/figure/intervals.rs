@@ -59,26 +59,20 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     });
     let mut entries: Vec<Entry> = hues.entries(3.0, |value| of_phased.contains(&value));
     if hues.bar().is_some() {
-        entries.push(entry(
-            Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)),
-            "slips of sets with a phase",
-        ));
+        let dot = Dot::solid(hues.ink(f64::INFINITY), RADIUS);
+        entries.push(entry(Mark::Dot(dot), "slips of sets with a phase"));
     }
     if !others.is_empty() {
-        entries.push(entry(
-            Mark::Dot(Dot { ink: GREY, ..OTHER }),
-            "slips of sets without a phase",
-        ));
+        let dot = Dot { ink: GREY, ..OTHER };
+        entries.push(entry(Mark::Dot(dot), "slips of sets without a phase"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
         let mut layers: Vec<Layer<'_>> = (1..=lines)
             .map(|n| Layer::Level(f64::from(n), GRID))
             .collect();
-        layers.push(Layer::Dots(
-            others.iter().map(|slip| slip.1).collect(),
-            OTHER,
-        ));
+        let places = others.iter().map(|slip| slip.1);
+        layers.push(Layer::Dots(places.collect(), OTHER));
         layers.extend(phased.iter().map(|&&(point, place)| {
             let dot = Dot {
                 ink: hues.ink(point.drive_velocity),
@@ -92,13 +86,8 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
             ..Panel::inside(height, x.clone(), y, layers)
         }
     });
-    Some(panel::draw(
-        NAME,
-        look,
-        Layout::column(560.0),
-        &entries,
-        panels.into(),
-    ))
+    let layout = Layout::column(560.0);
+    Some(panel::draw(NAME, look, layout, &entries, panels.into()))
 }
 
 #[cfg(test)]

@@ -64,6 +64,7 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
                 |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
             let places: Vec<Place> = x_axis
                 .evenly_placed(200)
+                .into_iter()
                 .map(|place| (place, amplitude(place)))
                 .collect();
             [CASING, LINE]
@@ -112,18 +113,10 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         ["slip_share", "mean_friction", "tau_mean"]
     };
     let panels = columns.into_iter().filter_map(panel).collect();
-    let (name, width) = if is_locking {
-        (LOCKING, 560.0)
-    } else {
-        (REGIMES, 490.0)
-    };
-    Some(panel::draw(
-        name,
-        look,
-        Layout::column(width),
-        &legend(is_locking),
-        panels,
-    ))
+    let name = if is_locking { LOCKING } else { REGIMES };
+    let layout = Layout::column(if is_locking { 560.0 } else { 490.0 });
+    let legend = legend(is_locking);
+    Some(panel::draw(name, look, layout, &legend, panels))
 }
 
 /// T, or 1/T if its steps are even and those of T are not.

@@ -61,7 +61,8 @@ pub(super) fn phase_eta(
     let x = Axis::logarithmic(&label("eta").axis(""), low, high).with_enough_numbers();
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
     let curve = |phase: fn(f64) -> Option<f64>| {
-        let modulated = x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
+        let etas = x.evenly_placed(CURVE_POINTS).into_iter();
+        let modulated = etas.filter(|&eta| eta >= 1.0);
         modulated
             .filter_map(|eta| Some((eta, phase(eta)?)))
             .collect()
@@ -71,17 +72,14 @@ pub(super) fn phase_eta(
         .map(|&(cell, density)| (cell, shade(shades.place(density))));
     let mut layers = vec![Layer::Cells(coloured.collect(), OVERLAP)];
     let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
+    let bars = averages
+        .iter()
+        .filter_map(|&(eta, _, ends)| Some((eta, ends?)));
     layers.extend([
         Layer::Upright(1.0, REFERENCE),
         Layer::Curve(curve(|eta| Some(minimum_phase_asymptote(eta))), ASYMPTOTE),
         Layer::Curve(curve(minimum_phase), EXACT),
-        Layer::Bars(
-            averages
-                .iter()
-                .filter_map(|&(eta, _, ends)| Some((eta, ends?)))
-                .collect(),
-            Stroke::solid(BLUE, BAR_WIDTH),
-        ),
+        Layer::Bars(bars.collect(), Stroke::solid(BLUE, BAR_WIDTH)),
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
@@ -90,13 +88,8 @@ pub(super) fn phase_eta(
         bar,
         ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers)
     };
-    Some(panel::draw(
-        NAME,
-        look,
-        Layout::column(WIDTH),
-        &entries,
-        vec![panel],
-    ))
+    let layout = Layout::column(WIDTH);
+    Some(panel::draw(NAME, look, layout, &entries, vec![panel]))
 }
 
 /// Mean η of the sets of each bin that have a phase, the mean of these phases in rad, and the ends of its interval.

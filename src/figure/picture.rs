@@ -77,7 +77,7 @@ impl Picture {
         match format {
             Format::Svg => Ok(self.svg().into_bytes()),
             Format::Png => self.png(),
-            Format::Pdf => self.pdf(),
+            Format::Pdf => Ok(pdf(&self.scene, self.style.points())),
         }
     }
 
@@ -91,12 +91,6 @@ impl Picture {
         let sides = format!(r#"width="{width:.2}mm" height="{height:.2}mm""#);
         let units = format!("0 0 {:.2} {:.2}", self.scene.width, self.scene.height);
         format!(r#"<svg xmlns="http://www.w3.org/2000/svg" {sides} viewBox="{units}">{svg}</svg>"#)
-    }
-
-    /// The figure as a PDF file of one page.
-    pub fn pdf(&self) -> Result<Vec<u8>> {
-        pdf(&self.scene, self.style.points())
-            .map_err(|reason| self.not_encoded(Format::Pdf, &reason))
     }
 
     pub fn png(&self) -> Result<Vec<u8>> {
@@ -114,15 +108,7 @@ impl Picture {
         RasterBackend::new()
             .with_scale(self.style.pixels())
             .render_scene(&self.scene)
-            .map_err(|reason| self.not_encoded(Format::Png, &reason))
-    }
-
-    fn not_encoded(&self, format: Format, reason: &str) -> anyhow::Error {
-        anyhow!(
-            "figure {}: cannot be turned into {}: {reason}",
-            self.name,
-            format.word().to_uppercase()
-        )
+            .map_err(|reason| anyhow!("figure {}: cannot be turned into PNG: {reason}", self.name))
     }
 }
 

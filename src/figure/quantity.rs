@@ -238,6 +238,16 @@ fn lies_decades_apart(column: &Values) -> bool {
     !column.is_worded() && low > 0.0 && is_wide(ends)
 }
 
+/// Each name once, in the order of first appearance.
+pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    names.fold(Vec::new(), |mut known, name| {
+        if !known.contains(&name) {
+            known.push(name);
+        }
+        known
+    })
+}
+
 /// What sets without a value of a column are called: of a period, that they have no modulation.
 pub(super) fn without_value(values: &Values) -> String {
     let is_period = parameter(&values.column.name) == Some(Symbol::T);

@@ -91,6 +91,7 @@ pub fn simulation(
         let points = floored(POINTS_PER_PERIOD * (last - first) / period) + 2;
         let curve = x()
             .evenly_placed(points)
+            .into_iter()
             .map(|time| (time, amplitude * libm::cos(TAU * time / (factor * period))));
         let level = std::iter::once(Layer::Level(0.0, GRID));
         Panel::inside(
@@ -150,13 +151,8 @@ pub fn simulation(
         .into_iter()
         .flatten()
         .collect();
-    Ok(panel::draw(
-        NAME,
-        look,
-        Layout::column(width),
-        &legend,
-        panels,
-    ))
+    let layout = Layout::column(width);
+    Ok(panel::draw(NAME, look, layout, &legend, panels))
 }
 
 /// The least and the largest of the samples of each column of a figure: no peak is lost.

@@ -126,22 +126,16 @@ pub(super) fn font_file() -> &'static [u8] {
     dejavu::sans::regular()
 }
 
-static FACE: LazyLock<Option<Face<'static>>> = LazyLock::new(|| Face::parse(font_file(), 0).ok());
-/// Width of a letter over the size of the text, if the font cannot be read.
-const LETTER: f64 = 0.6;
+pub(super) static FACE: LazyLock<Face<'static>> =
+    LazyLock::new(|| Face::parse(font_file(), 0).expect("the font of the program can be read"));
 
 /// Width of a text of this size.
 pub(super) fn text_width(text: &str, size: u32) -> f64 {
-    let letter = |letter: char| {
-        let face = FACE.as_ref()?;
-        let glyph = face.glyph_index(letter).unwrap_or(GlyphId(0));
-        Some(f64::from(face.glyph_hor_advance(glyph)?) / f64::from(face.units_per_em()))
+    let advance = |letter: char| {
+        let glyph = FACE.glyph_index(letter).unwrap_or(GlyphId(0));
+        f64::from(FACE.glyph_hor_advance(glyph).unwrap_or(0)) / f64::from(FACE.units_per_em())
     };
-    f64::from(size)
-        * text
-            .chars()
-            .map(|character| letter(character).unwrap_or(LETTER))
-            .sum::<f64>()
+    f64::from(size) * text.chars().map(advance).sum::<f64>()
 }
 
 /// An opaque colour: red, green and blue.

@@ -6,6 +6,7 @@ use super::frame::{Ends, Layout};
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
+use super::quantity::distinct;
 use super::style::{Dot, INKS, Ink, Look, RADIUS, STRIPE, Stroke, WHITE};
 use anyhow::{Result, anyhow};
 
@@ -165,23 +166,8 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
         Some(Panel::new(HEIGHT, x, y, layers))
     };
     let panels: Option<Vec<Panel<'_>>> = panels.iter().enumerate().map(panel).collect();
-    Ok(panel::draw(
-        NAME,
-        look,
-        layout,
-        &legend,
-        panels.ok_or_else(empty)?,
-    ))
-}
-
-/// Each name once, in the order of first appearance.
-fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-    names.fold(Vec::new(), |mut known, name| {
-        if !known.contains(&name) {
-            known.push(name);
-        }
-        known
-    })
+    let panels = panels.ok_or_else(empty)?;
+    Ok(panel::draw(NAME, look, layout, &legend, panels))
 }
 
 #[cfg(test)]

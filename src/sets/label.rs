@@ -33,12 +33,10 @@ const COMPARED: [(&str, &str); 5] = [
 pub fn label(column: &str) -> Label {
     for (end, words) in COMPARED {
         if let Some(column) = column.strip_suffix(end) {
-            let Label { symbol, what, unit } = label(column);
-            return Label {
-                symbol: symbol + words,
-                what: what + words,
-                unit,
-            };
+            let mut label = label(column);
+            label.symbol += words;
+            label.what += words;
+            return label;
         }
     }
     let is_of_formula = |letter: char| !letter.is_alphanumeric() && letter != '_';
