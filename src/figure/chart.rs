@@ -77,9 +77,8 @@ impl<'a> Chart<'a> {
         };
         let y_axes: Vec<Axis> = ys.iter().map(y_axis).collect::<Result<_, BadOption>>()?;
         let is_on = |axis: &Axis, quantity: &Quantity<'_>, set| {
-            quantity
-                .number(set)
-                .is_some_and(|value| axis.contains(value))
+            let number = quantity.number(set);
+            number.is_some_and(|value| axis.contains(value))
         };
         let is_inside = |set: &usize| {
             let mut pairs = ys.iter().zip(&y_axes);
@@ -87,19 +86,15 @@ impl<'a> Chart<'a> {
         };
         let inside: Vec<usize> = sets.iter().copied().filter(is_inside).collect();
         if inside.is_empty() {
-            let problem = format!(
-                "none of {} sets lies within --xlim and --ylim; give wider ones",
-                sets.len()
-            );
-            return Err(x.refuse(&problem));
+            let count = sets.len();
+            return Err(x.refuse(&format!(
+                "none of {count} sets lies within --xlim and --ylim; give wider ones"
+            )));
         }
+        let has_many = inside.len() > FEW_SETS;
         let dots = Dots {
             hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
-            radius: if inside.len() > FEW_SETS {
-                SMALL_RADIUS
-            } else {
-                RADIUS
-            },
+            radius: if has_many { SMALL_RADIUS } else { RADIUS },
             lines: self.lines(&sets),
             x_axis,
             free,
@@ -163,26 +158,19 @@ impl<'a> Chart<'a> {
             return Vec::new();
         };
         // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.
-        if self
-            .colour
-            .as_ref()
-            .is_some_and(|colour| colour.symbol.is_none())
+        let mut colour = self.colour.iter();
+        if colour.any(|colour| colour.symbol.is_none())
             || self.ys.iter().any(|y| y.symbol.is_some())
         {
             return Vec::new();
         }
-        let others: Vec<_> = self
-            .swept
-            .iter()
-            .filter(|other| parameter(other.name()) != Some(symbol))
-            .map(Values::places)
-            .collect();
+        let is_other = |swept: &&Values| parameter(swept.name()) != Some(symbol);
+        let others = self.swept.iter().filter(is_other);
+        let others: Vec<_> = others.map(Values::places).collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
         for &set in sets {
-            lines
-                .entry(others.iter().map(|places| places[set]).collect())
-                .or_default()
-                .push(set);
+            let key = others.iter().map(|places| places[set]).collect();
+            lines.entry(key).or_default().push(set);
         }
         let mut lines: Vec<Vec<usize>> =
             lines.into_values().filter(|line| line.len() > 1).collect();
@@ -207,12 +195,8 @@ impl<'a> Chart<'a> {
     /// Sets as dots, joined, with their intervals along both axes, over those without modulation and the drive's part.
     fn layers(&self, y: &Quantity<'_>, dots: &Dots, members: &[usize]) -> Vec<Layer<'a>> {
         let level = |set: &usize| {
-            let has_colour = dots.hues.is_some();
-            let ink = if has_colour {
-                self.ink(dots, *set)
-            } else {
-                GREY
-            };
+            let hues = dots.hues.as_ref();
+            let ink = hues.map_or(GREY, |_| self.ink(dots, *set));
             Some(Layer::Level(y.number(*set)?, Stroke { ink, ..REFERENCE }))
         };
         let mut layers: Vec<Layer<'a>> = Vec::new();
@@ -222,11 +206,8 @@ impl<'a> Chart<'a> {
         }
         layers.extend(dots.free.iter().filter_map(level));
         for line in &dots.lines {
-            let line: Vec<usize> = line
-                .iter()
-                .copied()
-                .filter(|set| members.contains(set))
-                .collect();
+            let mut line = line.clone();
+            line.retain(|set| members.contains(set));
             self.add_line(&mut layers, y, dots, &line);
         }
         if dots.lines.is_empty() {
@@ -284,11 +265,8 @@ impl<'a> Chart<'a> {
         let Some((at_x, at_y)) = self.place(y, set) else {
             return;
         };
-        let width = if dots.radius < RADIUS {
-            LINE_WIDTH
-        } else {
-            BAR_WIDTH
-        };
+        let is_small = dots.radius < RADIUS;
+        let width = if is_small { LINE_WIDTH } else { BAR_WIDTH };
         let stroke = Stroke::solid(self.ink(dots, set), width);
         if let Some(ends) = y.interval(set) {
             layers.push(Layer::Bars(vec![(at_x, ends)], stroke));
@@ -307,15 +285,12 @@ impl<'a> Chart<'a> {
     /// Amplitudes at which the paper finds a significant reduction of the friction to begin, on the x axis.
     fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
         let is_fixed = |symbol| {
-            self.swept
-                .iter()
-                .all(|swept| parameter(swept.name()) != Some(symbol))
+            let mut swept = self.swept.iter();
+            swept.all(|swept| parameter(swept.name()) != Some(symbol))
         };
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
-        let free = self
-            .rows
-            .iter()
-            .find(|row| row.parameters.modulation_period.is_none());
+        let mut rows = self.rows.iter();
+        let free = rows.find(|row| row.parameters.modulation_period.is_none());
         let free = free.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
         Some((REDUCTION.0 * unit, REDUCTION.1 * unit))
@@ -445,11 +420,8 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
     let mut groups: Vec<_> = values.distinct.iter().map(of).collect();
     groups.retain(|(_, sets)| !sets.is_empty());
     // Sets without a value, such as a frequency at Δ = 0, have a separate panel.
-    let without: Vec<usize> = sets
-        .iter()
-        .copied()
-        .filter(|&set| values.numbers[set].is_none())
-        .collect();
+    let mut without = sets.to_vec();
+    without.retain(|&set| values.numbers[set].is_none());
     if !groups.is_empty() && !without.is_empty() {
         groups.insert(0, (without_value(values), without));
     }

@@ -286,6 +286,11 @@ impl Frame {
         for corner in 0..4 {
             sheet.line(vec![corners[corner], corners[(corner + 1) % 4]], AXIS);
         }
+        self.numbers(sheet, &x_axis, &y_axis);
+        self.labels(sheet);
+    }
+
+    fn numbers(&self, sheet: &mut Picture, x_axis: &Axis, y_axis: &Axis) {
         let height = f64::from(TICK_TEXT);
         // Where a frame is small, numbers that would meet their neighbours are left out, and those that would be cut.
         let mut free = f64::INFINITY;
@@ -302,37 +307,27 @@ impl Frame {
             let x = self.x_of(*value);
             let half = 0.5 * text_width(number, TICK_TEXT);
             if x - half >= free && x + half <= sheet.scene.width - EDGE {
-                sheet.text(
-                    (x, bottom + 1.3 * height),
-                    number,
-                    TICK_TEXT,
-                    Anchor::Middle,
-                );
+                let place = (x, self.bottom() + 1.3 * height);
+                sheet.text(place, number, TICK_TEXT, Anchor::Middle);
                 free = x + half + 0.3 * height;
             }
         }
+    }
+
+    fn labels(&self, sheet: &mut Picture) {
         let (label, size) = self.y_label();
         if !label.is_empty() {
-            sheet.text(
-                (self.room.0, self.top - self.heading - Y_LABEL_RISE),
-                &label,
-                size,
-                Anchor::Start,
-            );
+            let place = (self.room.0, self.top - self.heading - Y_LABEL_RISE);
+            sheet.text(place, &label, size, Anchor::Start);
         }
         if self.is_lowest {
             let (start, end) = self.room;
             let (label, size) = fitted_label("", &self.x, end - start);
             let half = 0.5 * text_width(&label, size);
-            let middle = (self.left + 0.5 * self.width)
-                .min(end - half)
-                .max(start + half);
-            sheet.text(
-                (middle, bottom + UNDER - 12.0),
-                &label,
-                size,
-                Anchor::Middle,
-            );
+            let middle = self.left + 0.5 * self.width;
+            let middle = middle.min(end - half).max(start + half);
+            let place = (middle, self.bottom() + UNDER - 12.0);
+            sheet.text(place, &label, size, Anchor::Middle);
         }
     }
 
@@ -356,12 +351,9 @@ impl Frame {
     pub(super) fn heading(&self, sheet: &mut Picture, text: &str) {
         let y = self.top - 9.0;
         if let Some(letter) = self.letter {
-            sheet.text(
-                (self.left - LEFT + MARGIN, y),
-                &format!("({letter})"),
-                LABEL_TEXT,
-                Anchor::Start,
-            );
+            let place = (self.left - LEFT + MARGIN, y);
+            let letter = format!("({letter})");
+            sheet.text(place, &letter, LABEL_TEXT, Anchor::Start);
         }
         let (text, size) = fitted(text, LEGEND_TEXT, self.room.1 - self.left);
         sheet.text((self.left, y), &text, size, Anchor::Start);

@@ -62,14 +62,10 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         Some(set) => {
             let amplitude =
                 |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
-            let places: Vec<Place> = x_axis
-                .evenly_placed(200)
-                .into_iter()
-                .map(|place| (place, amplitude(place)))
-                .collect();
-            [CASING, LINE]
-                .map(|stroke| Layer::Curve(places.clone(), stroke))
-                .into()
+            let places = x_axis.evenly_placed(200).into_iter();
+            let places: Vec<Place> = places.map(|place| (place, amplitude(place))).collect();
+            let lines = [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke));
+            lines.into()
         }
         None => map.borders(|set| sets[set].regime, BORDER),
     };
@@ -78,22 +74,16 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let is_of_periods = column == "periods";
         let is_known = |set: &usize| !is_of_periods || sets[*set].has_phase;
         let number = |set: usize| quantity.number(set).filter(|_| is_known(&set));
-        let ends = || {
-            bounds((0..sets.len()).filter_map(number).map(|n| {
-                if is_of_periods {
-                    n.min(MAX_PERIODS + 1.0)
-                } else {
-                    n
-                }
-            }))
+        let most = if is_of_periods {
+            MAX_PERIODS + 1.0
+        } else {
+            f64::INFINITY
         };
+        let ends = || bounds((0..sets.len()).filter_map(number).map(|n| n.min(most)));
         let label = quantity.axis_label();
         let scale = scale_of(column, &label, ends())?;
-        let colour = if column == "resultant_excess" {
-            diverging
-        } else {
-            shade
-        };
+        let is_excess = column == "resultant_excess";
+        let colour = if is_excess { diverging } else { shade };
         let mut bar = ColourBar::of_axis(&scale, colour);
         if is_of_periods {
             mark_periods(&mut bar, &scale, ends().unwrap_or_default());
