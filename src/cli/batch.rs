@@ -65,12 +65,12 @@ enum Engine {
 
 /// Least time in a queue: Slurm counts in minutes.
 const MIN_TIME: Duration = Duration::from_mins(1);
-/// A worker stops this share of its time before its end, and at most so much before: for its start, for commits, and for
-/// reduction and figures, which come on top.
+/// A worker stops this share of its time before its end, and at most so much before: for its start, for commits, and
+/// for reduction and figures, which come on top.
 const MARGIN_SHARE: u32 = 10;
 const MAX_MARGIN: Duration = Duration::from_mins(2);
-/// Seconds before the end at which Slurm sends its warning, or up to a minute earlier: after the worker's own stop, if the
-/// margin is whole.
+/// Seconds before the end at which Slurm sends its warning, or up to a minute earlier: after the worker's own stop, if
+/// the margin is whole.
 const WARNING: u32 = 15;
 
 fn time_in_queue(text: &str) -> Result<Duration, String> {
@@ -82,8 +82,8 @@ fn time_in_queue(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// The scripts, with {{names}} where values go. A job script lies within Slurm's, as the folder of the logs must be there
-/// before a job starts. HyperQueue gets relative paths of logs, as it reads a colon in one as a separator.
+/// The scripts, with {{names}} where values go. A job script lies within Slurm's, as the folder of the logs must be
+/// there before a job starts. HyperQueue gets relative paths of logs, as it reads a colon in one as a separator.
 const SLURM: &str = include_str!("batch/slurm.sh");
 const HYPERQUEUE: &str = include_str!("batch/hyperqueue.sh");
 

@@ -1,5 +1,5 @@
-//! Flags, text and JSON output, progress, exit codes: the only code that prints. Below: the commands, the exit codes, and
-//! the signals that end a run early.
+//! Flags, text and JSON output, progress, exit codes: the only code that prints. Below: the commands, the exit codes,
+//! and the signals that end a run early.
 
 mod accuracy;
 mod batch;
@@ -37,7 +37,8 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Parameter sweeps of stick-slip friction: a slider held by breakable contacts (Capozza et al., PRL 107, 024301, 2011).
+/// Parameter sweeps of stick-slip friction: a slider held by breakable contacts (Capozza et al., PRL 107, 024301,
+/// 2011).
 #[derive(Debug, Parser)]
 #[command(name = "stickslip", version, max_term_width = 100, after_help = EXAMPLES)]
 struct Cli {
@@ -181,9 +182,9 @@ impl Exit {
     }
 }
 
-// Signals. Batch systems warn with one signal and follow with others, and some send the same one twice. So only a second
-// SIGINT, which is Ctrl-C, exits at once. SIGINT and SIGTERM cancel a run; the others warn that its time is over.
-// SIGHUP keeps its usual effect: it ends the program unless `nohup` started it.
+// Signals. Batch systems warn with one signal and follow with others, and some send the same one twice. So only a
+// second SIGINT, which is Ctrl-C, exits at once. SIGINT and SIGTERM cancel a run; the others warn that its time is
+// over. SIGHUP keeps its usual effect: it ends the program unless `nohup` started it.
 
 const WARNING: &[i32] = &[SIGUSR1, SIGUSR2, SIGXCPU];
 const CANCELLING: &[i32] = &[SIGINT, SIGTERM];

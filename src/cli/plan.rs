@@ -32,7 +32,8 @@ pub struct Arguments {
     preset: PresetFlag,
     #[command(flatten)]
     variation: Variation,
-    /// Results directory to compare with, if it is there [default: results/<name of the sweep>; none with --set or --axis]
+    /// Results directory to compare with, if it is there [default: results/<name of the sweep>; none with --set or
+    /// --axis]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print JSON
@@ -42,7 +43,7 @@ pub struct Arguments {
 
 const JSON_FORMAT: u32 = 2;
 
-/// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction. As measured, rounded up.
+/// Bytes that a worker takes beside its jobs, for the program, commits and the reduction: measured, rounded up.
 const MEMORY: f64 = 80e6;
 
 /// What a sweep would run.

@@ -141,7 +141,7 @@ impl Progress {
         self.bar.suspend(|| output::report(line));
     }
 
-    /// Draws the bar, which counts the jobs of all workers since this one began, or prints a line if the last is long ago.
+    /// Draws the bar, which counts the jobs of all workers since this one began, or now and then prints a line.
     fn draw(&mut self) {
         let share = self.tally.share();
         let elapsed = self.begin.elapsed().as_secs_f64();

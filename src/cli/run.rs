@@ -51,7 +51,8 @@ pub struct Arguments {
     preset: PresetFlag,
     #[command(flatten)]
     variation: Variation,
-    /// Results directory [default: results/<name of the sweep>, with --set or --axis if it is new; or the one to resume]
+    /// Results directory [default: results/<name of the sweep>, with --set or --axis if it is new; or the one to
+    /// resume]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads [default: those that the batch system grants, else all cores]
@@ -60,7 +61,8 @@ pub struct Arguments {
     /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// End within this time, such as 55m, 1h30m or 1:30:00, and keep what is done; reduction and figures take extra time
+    /// End within this time, such as 55m, 1h30m or 1:30:00, and keep what is done; reduction and figures take extra
+    /// time
     #[arg(long, value_name = "TIME", value_parser = batch::parse_time)]
     walltime: Option<Duration>,
     /// Run as one of many workers in a batch queue: exit with 0 also when others run the rest, or when the time is over

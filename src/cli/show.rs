@@ -386,8 +386,8 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
 /// How far the middle of an interval may lie from its value, as a share of the half-width, to be shown as ±.
 const LOPSIDED: f64 = 0.2;
 
-/// A value and the half-width of its interval, with the digits that this leaves; or its ends, if the value is not in the
-/// middle, or ± would reach beyond zero and the interval does not.
+/// A value and the half-width of its interval, with the digits that this leaves; or its ends, if the value is not in
+/// the middle, or ± would reach beyond zero and the interval does not.
 fn with_interval(value: f64, low: f64, high: f64) -> String {
     let half = 0.5 * (high - low);
     if half.is_nan() || half <= 0.0 {
@@ -412,7 +412,7 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
     }
 }
 
-/// Notes on jobs that ended otherwise, each kind with a command that shows one, and on sets that the sweep no longer has.
+/// Notes on jobs that ended early, each kind with a command that shows one, and on sets that left the sweep.
 fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     let sweep = results.sweep();
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();

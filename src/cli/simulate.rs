@@ -1,7 +1,7 @@
 //! `stickslip simulate`: one job, everything visible.
 //!
-//! The job is the only one of a sweep: of a file, or of the text that flags make. So values, messages and the id of the job
-//! are those of a sweep.
+//! The job is the only one of a sweep: of a file, or of the text that flags make. So values, messages and the id of the
+//! job are those of a sweep.
 
 use super::output::{self, TextTable};
 use super::plot::picture_file;
@@ -303,15 +303,14 @@ impl Arguments {
             return Ok(());
         }
         let refused = |problem: String| UsageError(format!("--from {from}: {problem}"));
-        let last = records.trace.last().map(|row| row.time);
-        let last = last
-            .or(records.map.last().map(|row| row.time))
-            .unwrap_or(0.0);
+        let of_trace = records.trace.last().map(|row| row.time);
+        let of_map = records.map.last().map(|row| row.time);
+        let last = of_trace.or(of_map).unwrap_or(0.0);
         if *from >= last {
-            let problem = format!(
+            return Err(refused(format!(
                 "the simulation ended at {last} s; take an earlier instant, or a longer --time"
-            );
-            return Err(refused(problem).into());
+            ))
+            .into());
         }
         let shown = self.shown_times();
         let trace = records.trace.iter().filter(|row| shown.contains(&row.time));
@@ -350,9 +349,8 @@ impl JobFlags {
             ("tolerance", &self.tolerance),
             ("dt", &dt),
         ];
-        let flags = flags
-            .into_iter()
-            .filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
+        let flags = flags.into_iter();
+        let flags = flags.filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
         changes(&Variation {
             settings: self.settings.iter().cloned().chain(flags).collect(),
             axes: Vec::new(),
@@ -362,10 +360,8 @@ impl JobFlags {
 
 /// The parameters as JSON, under their keys.
 fn as_json(parameters: &Parameters) -> String {
-    let entries = Symbol::ALL
-        .into_iter()
-        .map(|symbol| (symbol.key().to_owned(), json!(parameters.get(symbol))));
-    serde_json::Value::Object(entries.collect()).to_string()
+    let entry = |symbol: Symbol| (symbol.key().to_owned(), json!(parameters.get(symbol)));
+    serde_json::Value::Object(Symbol::ALL.map(entry).into_iter().collect()).to_string()
 }
 
 /// What is printed of a job.
@@ -391,7 +387,7 @@ struct Report<'a> {
 impl<'a> Report<'a> {
     fn new(job_id: &'a str, measured: &Measurements, wall_seconds: f64) -> Self {
         let summary = &measured.summary;
-        let averages = &measured.averages;
+        let averages = measured.averages;
         let slips = measured.slips.iter();
         let intervals: Vec<f64> = slips.filter_map(|slip| slip.interval).collect();
         let mean = intervals.iter().sum::<f64>() / intervals.len() as f64;
@@ -402,9 +398,9 @@ impl<'a> Report<'a> {
             mean_interval_seconds: Some(mean).filter(|mean| mean.is_finite()),
             outcome: JobOutcome::of(measured).word(),
             regime: measured.regime().map(Regime::word),
-            mean_friction_newtons: averages.as_ref().map(|averages| averages.friction),
-            attached_fraction: averages.as_ref().map(|averages| averages.attached_fraction),
-            slip_share: averages.as_ref().map(|averages| averages.slip_share),
+            mean_friction_newtons: averages.map(|averages| averages.friction),
+            attached_fraction: averages.map(|averages| averages.attached_fraction),
+            slip_share: averages.map(|averages| averages.slip_share),
             breaks: summary.breaks,
             reattachments: summary.reattachments,
             ruptures: measured.ruptures,

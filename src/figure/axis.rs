@@ -28,20 +28,20 @@ pub(super) struct Axis {
 const MAX_TICKS: f64 = 6.0;
 /// Fewest numbers that show the scale of an axis.
 const FEWEST: usize = 3;
-/// Mantissas with a number on logarithmic axes: over several decades, over few, and over so short a range that those give
-/// one or two numbers.
+/// Mantissas with a number on logarithmic axes: over several decades, over few, and over so short a range that those
+/// give one or two numbers.
 const MANTISSAS: [&[f64]; 3] = [
     &[1.0],
     &[1.0, 2.0, 5.0],
     &[1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0],
 ];
-/// Numbers of values within these limits are written out, if they need no more decimals than this; others are multiples of a
-/// power of ten that stands in the label.
+/// Numbers of values within these limits are written out, if they need no more decimals than this; others are multiples
+/// of a power of ten that stands in the label.
 const WRITTEN_OUT: std::ops::Range<f64> = 1e-2..1e6;
 const MAX_DECIMALS: usize = 3;
 /// Ratio of the largest to the least value above which a scale is logarithmic.
 const DECADES: f64 = 20.0;
-/// Most ticks of any kind: values of which nothing can come have no end of them.
+/// Largest number of ticks of any kind, as absurd values would give no end of them.
 const MAX_MULTIPLES: usize = 1000;
 /// No quantity is larger than this, nor smaller than its inverse.
 const LARGEST: f64 = 1e100;
@@ -343,7 +343,7 @@ fn exponent(value: f64) -> i32 {
     (libm::log10(value) + 1e-9).floor() as i32
 }
 
-/// The least of 1, 2, 5 times a power of ten that is not below `step`.
+/// The smallest of 1, 2, 5 times a power of ten that is at least `step`.
 fn nice_step(step: f64) -> f64 {
     let decade = libm::exp10(f64::from(exponent(step)));
     let nice = [1.0, 2.0, 5.0]
@@ -369,7 +369,7 @@ fn decimals(step: f64) -> usize {
     usize::try_from(-exponent(step)).unwrap_or(0)
 }
 
-/// A label for numbers that are those of the values over a power of ten: with it before the unit.
+/// The label of an axis whose numbers are the values over a power of ten: the power stands before the unit.
 fn with_power(label: &str, power: i32) -> String {
     if power == 0 || label.is_empty() {
         return label.to_owned();

@@ -299,7 +299,7 @@ impl<'a> Chart<'a> {
 
 /// What the marks mean: the legend and the small print.
 impl Chart<'_> {
-    /// What each mark means that is drawn.
+    /// The meaning of each mark that is drawn.
     fn legend(&self, inside: &[usize], dots: &Dots) -> Vec<Entry> {
         let mut entries = Vec::new();
         if let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) {

@@ -1,5 +1,5 @@
-//! Frames: rectangles with two axes and the data in them. A layout places them on a sheet, with the legend above and the
-//! small print under them.
+//! Frames: rectangles with two axes and the data in them. A layout places them on a sheet, with the legend above and
+//! the small print under them.
 
 use super::axis::Axis;
 use super::legend::{Entry, draw_legend, legend_rows};
@@ -47,7 +47,7 @@ const NOTE_ROW: f64 = 16.0;
 const Y_LABEL_RISE: f64 = 13.0;
 /// By how much a cell reaches under a neighbour that is drawn later: viewers that scale would show a seam.
 pub(super) const OVERLAP: f64 = 0.5;
-/// Shortest side of a frame; a sheet that is asked to be smaller becomes larger.
+/// Shortest side of a frame. If the requested sheet has no room for it, the sheet becomes larger.
 const SHORTEST: f64 = 60.0;
 
 /// Frames of a figure, in rows and columns; numbers and label of the x axes stand under the lowest row only.
@@ -76,7 +76,7 @@ impl Layout {
         }
     }
 
-    /// Frames with these heights of the rows on a sheet of the size that is asked for, under this legend.
+    /// Places rows of frames with these heights on a sheet of the requested size, under this legend.
     pub(super) fn page(
         self,
         name: &str,
@@ -331,7 +331,8 @@ impl Frame {
         }
     }
 
-    /// Letter and label of the y axis, above its numbers, and their size; the letter of a frame with a heading goes there.
+    /// Letter and label of the y axis, above its numbers, and their size; the letter of a frame with a heading goes
+    /// there.
     fn y_label(&self) -> (String, u32) {
         let letter = self
             .letter

@@ -1,5 +1,5 @@
-//! Maps: sets on a grid of two quantities, each a cell whose colour shows a statistic. The locking map lies over period and
-//! amplitude of the modulation, a regime map over two other parameters.
+//! Maps: sets on a grid of two quantities, each a cell whose colour shows a statistic. The locking map lies over period
+//! and amplitude of the modulation, a regime map over two other parameters.
 
 use super::axis::{Axis, bounds, is_wide};
 use super::frame::{Cell, Layout, OVERLAP, Place};
@@ -33,8 +33,9 @@ const FREE: Ink = Ink::new(0xf2_f2_f0);
 /// A column and a row of a map.
 type Position = (usize, usize);
 
-/// Draws the map of sets in which two parameters alone differ and fill at least half of a grid: of 8 amplitudes and periods or
-/// more, or of 4 values or more of two other parameters; `None` for others. Sets without modulation do not count.
+/// Draws the map of sets in which two parameters alone differ and fill at least half of a grid: of 8 amplitudes and
+/// periods or more, or of 4 values or more of two other parameters; `None` for others. Sets without modulation do not
+/// count.
 pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     // The drive velocity is the x axis wherever it is one.
     let [horizontal, vertical] = match differing(&sets.iter())[..] {

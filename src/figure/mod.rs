@@ -2,8 +2,7 @@
 //!
 //! ```text
 //! a file for each standing figure: its data, its panels; `None` where the data do not fit
-//! overview.rs, custom.rs -> sets against a column (chart.rs, quantity.rs): the overview of a sweep, and any column against
-//!                           any other
+//! overview.rs, custom.rs -> sets against a column (chart.rs, quantity.rs): an overview, and any column against another
 //! map.rs                 -> sets over two parameters
 //!     panel.rs            panels as data: axes, layers between them
 //!     frame.rs, axis.rs   frames on a sheet, axes; legend.rs, hues.rs explain marks and colours
@@ -210,7 +209,8 @@ pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
     let Some(first) = all.first() else {
         return String::new();
     };
-    // What is off, or enters nothing that figures show, is left out, and the default of what the paper has no symbol for.
+    // What is off, or enters nothing that figures show, is left out, and the default of what the paper has no symbol
+    // for.
     let is_shown = |symbol: &Symbol| {
         let value = first.get(*symbol);
         !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)

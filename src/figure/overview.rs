@@ -17,8 +17,8 @@ const QUANTITIES: [&str; 5] = [
     "resultant_length",
 ];
 
-/// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third panels.
-/// A single set is a dot over its velocity. `None` if nothing was found.
+/// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third
+/// panels. A single set is a dot over its velocity. `None` if nothing was found.
 pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     let swept = swept(rows);
     let quantity = |place: usize, option| Quantity::of(rows, option, swept.get(place)?.name()).ok();

@@ -13,7 +13,7 @@ use subsetter::GlyphRemapper;
 use ttf_parser::GlyphId;
 
 const FONT: Name = Name(b"F");
-/// Six letters and a plus mark a font that is not whole.
+/// Six letters and a plus mark a subset of a font.
 const FONT_NAME: Name = Name(b"STICKS+DejaVuSans");
 const SYSTEM: SystemInfo = SystemInfo {
     registry: Str(b"Adobe"),
@@ -271,7 +271,7 @@ impl Page {
         pdf.finish()
     }
 
-    /// Writes the letters that are used, with their widths and what they are as text.
+    /// Writes the letters in use: their shapes, their widths, and the text that they stand for.
     fn write_font(&self, pdf: &mut Pdf, font: Ref, mut id: impl FnMut() -> Ref) {
         let descendant = id();
         let descriptor = id();

@@ -1,5 +1,5 @@
-//! One simulation: the modulation and the shear force over time (Fig. 1d), and under them the space-time map of detached
-//! contacts (Fig. 4b, d) with the onsets of slips.
+//! One simulation: the modulation and the shear force over time (Fig. 1d), and under them the space-time map of
+//! detached contacts (Fig. 4b, d) with the onsets of slips.
 
 use super::axis::{Axis, bounds, widened};
 use super::common;
@@ -46,8 +46,8 @@ struct Shared<'a> {
     width: f64,
 }
 
-/// Draws what is given: the shear force in N against time in s, the map, instant by instant, or the map under the force;
-/// above them the modulation. Onsets of slips are marked in the map.
+/// Draws what is given: the shear force in N against time in s, the map, instant by instant, or the map under the
+/// force; above them the modulation. Onsets of slips are marked in the map.
 pub fn simulation(
     parameters: &Parameters,
     trace: Option<&[(f64, f64)]>,
@@ -68,7 +68,7 @@ pub fn simulation(
         .ok_or_else(|| empty("instants of the simulation"))?;
     let (factor, unit) = label("tau_mean").scale(last);
     let time = Axis::linear(&format!("Time t ({unit})"), factor * first, factor * last);
-    // One that is ramped, or too fast, is not drawn.
+    // A ramped modulation is not drawn, nor one that is too fast.
     let is_drawn =
         |period: &f64| parameters.ramp_time == 0.0 && (last - first) / period <= MAX_PERIODS;
     let period = parameters.modulation_period.filter(is_drawn);

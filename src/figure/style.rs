@@ -1,5 +1,5 @@
-//! The look of all figures: paper, font, sizes of text, strokes, dots, colours. Lengths on a sheet are units, of which a style says how
-//! long they are: text has the same size in every figure, whatever the size of the sheet.
+//! The look of all figures: paper, font, sizes of text, strokes, dots, colours. Lengths on a sheet are units; a style
+//! says how long a unit is. Text has the same size in every figure, whatever the size of the sheet.
 
 use crate::table::value::{floored, words};
 use std::fmt;
@@ -49,7 +49,7 @@ impl Style {
         }
     }
 
-    /// Width of a sheet of which no size is asked and that is this wide in units.
+    /// Width of a sheet of this natural width, in units, if no size is requested.
     pub(super) fn width(self, natural: f64) -> f64 {
         match self {
             Self::Screen => natural,
@@ -237,7 +237,7 @@ pub(super) const GRID: Stroke = Stroke::solid(LIGHT_GREY, 1.0);
 /// What the data are compared with.
 pub(super) const REFERENCE: Stroke = Stroke::dashed(GREY, 1.4, (6.0, 4.0));
 pub(super) const BAR_WIDTH: f64 = 1.6;
-/// A range that is pointed out.
+/// A highlighted range.
 pub(super) const STRIPE: Fill = Fill {
     ink: LIGHT_GREY,
     opacity: 0.35,

@@ -200,8 +200,8 @@ const SCRIPTS: [&str; 9] = [
     include_str!("main.js"),
 ];
 
-/// The page of this content: its files put together, with the content compressed, so that no text of it can be taken for
-/// HTML.
+/// The page of this content: its files put together, with the content compressed, so that no text of it can be taken
+/// for HTML.
 fn html(content: &Json) -> Result<String> {
     let data = data(content)?;
     let script = format!("\"use strict\";\n{}", SCRIPTS.concat());

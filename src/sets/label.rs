@@ -1,4 +1,5 @@
-//! Labels of columns in figures and printed tables: symbol, a few words, the unit that suits the values, and their digits.
+//! Labels of columns in figures and printed tables: symbol, a few words, the unit that suits the values, and their
+//! digits.
 
 use super::SetRow;
 use crate::model::Symbol;
