@@ -101,7 +101,7 @@ impl Axis {
     pub(super) fn with_ticks_at(mut self, label: &str, values: &[f64]) -> Self {
         let digits = Digits::THREE.distinguishing(values);
         let ticks = values.iter().map(|&value| (value, digits.typeset(value)));
-        self.label = label.to_owned();
+        label.clone_into(&mut self.label);
         self.power = None;
         self.ticks = ticks.collect();
         self.minor.clear();

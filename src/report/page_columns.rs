@@ -174,15 +174,13 @@ impl Sets {
             swept: Vec::new(),
             places: HashMap::new(),
         };
-        let mut number = 0_u64;
         let mut shown = Vec::new();
-        for row in read_sets(layout) {
+        for (row, number) in read_sets(layout).zip(0_u64..) {
             let row = row?;
             if number.is_multiple_of(spacing) {
                 sets.push(sweep, &row);
                 shown.push(row);
             }
-            number += 1;
         }
         sets.columns.label(|column| label(&column.name));
         for swept in &swept(&shown) {
