@@ -231,9 +231,8 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     }
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
-        output::report(&format!(
-            "{failed} failed; tables/jobs has the reasons. --retry-failed runs them again."
-        ));
+        let hint = "tables/jobs has the reasons. --retry-failed runs them again.";
+        output::report(&format!("{failed} failed; {hint}"));
     }
     if report.jobs_left > 0 && !arguments.worker {
         Exit::Stopped

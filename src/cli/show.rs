@@ -104,10 +104,8 @@ impl Arguments {
             let sets = (0..count).map(|set| record(columns, set).into_iter().collect());
             let sets: Vec<Map<String, Json>> = sets.collect();
             let edges: Vec<Json> = edges.iter().map(json).collect();
-            output::json(
-                JSON_FORMAT,
-                &serde_json::json!({ "sets": sets, "edges": edges }),
-            )
+            let found = serde_json::json!({ "sets": sets, "edges": edges });
+            output::json(JSON_FORMAT, &found)
         } else if self.csv {
             print_csv(columns, count)
         } else {
@@ -372,11 +370,10 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
         };
         format!("{from}{} to {}", number(low), number(high))
     });
-    columns.words("", edges, |edge| {
-        let change = edge
-            .rises
-            .map(|rises| if rises { "rises" } else { "falls" });
-        change.unwrap_or_default().to_owned()
+    columns.words("", edges, |edge| match edge.rises {
+        Some(true) => "rises".to_owned(),
+        Some(false) => "falls".to_owned(),
+        None => String::new(),
     });
     columns.words("jobs", edges, |edge| edge.jobs.to_string());
     columns.words("ended by", edges, |edge| edge.ended.word().to_owned());
@@ -446,9 +443,8 @@ fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let job = places
         .next()
         .and_then(|set| sweep.jobs_at(set..set + 1).next());
-    let command = job.map_or_else(String::new, |job| {
-        format!("; a job of one such set: {}", sweep.command(&job))
-    });
+    let command = job.map(|job| format!("; a job of one such set: {}", sweep.command(&job)));
+    let command = command.unwrap_or_default();
     Some(format!(
         "{jobs} ended because no further slip came: the slider slides, or give_up_after is too short{command}"
     ))
@@ -458,9 +454,8 @@ fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
     let jobs = jobs_of_sets(rows, |row| row.jobs_cut.unwrap_or(0))?;
     let cut = rows.iter().filter(|row| row.jobs_cut > Some(0));
     let off = cut.filter_map(|row| row.tau_off).reduce(f64::min);
-    let off = off.map_or_else(String::new, |off| {
-        format!(", by up to about {:.1} %", -100.0 * off)
-    });
+    let off = off.map(|off| format!(", by up to about {:.1} %", -100.0 * off));
+    let off = off.unwrap_or_default();
     Some(format!(
         "{jobs} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` \
          in place of max_time ends jobs with a slip"

@@ -147,9 +147,8 @@ impl PlotFlags {
             return Err(format!("--from {from}: must be a finite number >= 0, in s"));
         }
         if from >= longest {
-            return Err(format!(
-                "--from {from}: must lie before the end, {longest} s"
-            ));
+            let problem = "must lie before the end";
+            return Err(format!("--from {from}: {problem}, {longest} s"));
         }
         match self.until {
             Some(until) if !(until > from && until.is_finite()) => Err(format!(

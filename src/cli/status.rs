@@ -38,11 +38,10 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
         output::pairs(&pairs(&status))?;
         output::lines(status.workers.iter().map(worker_in_words))?;
         for failure in &status.failures {
+            let job = &failure.job_id;
             let reason = shown_text(&failure.reason);
-            output::print(&format!(
-                "failed  {}: {reason}\n  alone: {}\n",
-                failure.job_id, failure.command
-            ))?;
+            let command = &failure.command;
+            output::print(&format!("failed  {job}: {reason}\n  alone: {command}\n"))?;
         }
         if overview.jobs_failed > status.failures.len() as u64 {
             output::print(&output::by_reason(&status.failure_reasons))?;
@@ -66,10 +65,8 @@ fn pairs(status: &Status) -> Vec<(&'static str, String)> {
         let kept = overview.jobs_kept;
         done = format!("{done}, {kept} of them kept of values that the sweep no longer has");
     }
-    let parts = format!(
-        "{} done, {} missing",
-        overview.parts_done, overview.parts_missing
-    );
+    let parts_done = overview.parts_done;
+    let parts = format!("{parts_done} done, {} missing", overview.parts_missing);
     let mut pairs = vec![
         ("sweep", status.name.clone()),
         ("jobs done", done),

@@ -148,12 +148,8 @@ impl ColourBar {
             }
         }
         let end = frame.right() + COLOUR_BAR - BAR_INSET;
-        let size = fitting(
-            &self.label,
-            LEGEND_TEXT,
-            end - frame.y_label_end() - BAR_GAP,
-        )
-        .unwrap_or(NOTE_TEXT);
+        let room = end - frame.y_label_end() - BAR_GAP;
+        let size = fitting(&self.label, LEGEND_TEXT, room).unwrap_or(NOTE_TEXT);
         sheet.text((end, top - 12.0), &self.label, size, Anchor::End);
     }
 }

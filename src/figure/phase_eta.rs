@@ -49,11 +49,9 @@ pub(super) fn phase_eta(
     let (shades, cells) = density(&slips);
     let (low, high) = bounds(cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?;
     let averages = averages(bins, sets);
+    let of_bins = "mean of all sets with a phase in a bin of η, 95 %";
     let entries = [
-        entry(
-            Mark::Bar(AVERAGE),
-            "mean of all sets with a phase in a bin of η, 95 %",
-        ),
+        entry(Mark::Bar(AVERAGE), of_bins),
         entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
         entry(Mark::Line(REFERENCE), "η = 1"),
@@ -164,14 +162,9 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
             let low = low.max(eta / WIDEST);
             let high = high.min(eta * WIDEST);
             // None reaches over η = 1, where the load begins to fall in each period.
-            (
-                if eta > SAME { low.max(1.0) } else { low },
-                if eta * SAME < 1.0 {
-                    high.min(1.0)
-                } else {
-                    high
-                },
-            )
+            let least = if eta > SAME { 1.0 } else { 0.0 };
+            let most = if eta * SAME < 1.0 { 1.0 } else { f64::INFINITY };
+            (low.max(least), high.min(most))
         };
         return cells.map(clipped).collect();
     }

@@ -277,9 +277,9 @@ impl Picture {
     ) {
         let id = format!("frame-{}", self.clips);
         self.clips += 1;
-        self.scene.defs.push(format!(
-            r#"<clipPath id="{id}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath>"#
-        ));
+        let inside = format!(r#"x="{x}" y="{y}" width="{width}" height="{height}""#);
+        let clip = format!(r#"<clipPath id="{id}"><rect {inside}/></clipPath>"#);
+        self.scene.defs.push(clip);
         self.scene.add(Primitive::ClipStart {
             x,
             y,
@@ -319,10 +319,8 @@ fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
         let mut done = 0.0;
         while done < length {
             let at = |done: f64| {
-                (
-                    x + (end_x - x) * done / length,
-                    y + (end_y - y) * done / length,
-                )
+                let x = x + (end_x - x) * done / length;
+                (x, y + (end_y - y) * done / length)
             };
             let step = left.min(length - done);
             if draws {

@@ -161,11 +161,10 @@ impl Quantity<'_> {
             return Err(self.refuse_limits(&format!("{name} holds words; limits are for numbers")));
         }
         if words.len() > MAX_WORDS {
-            let problem = format!(
-                "has {} words, and {MAX_WORDS} fit an axis; take another column",
-                words.len()
-            );
-            return Err(self.refuse(&problem));
+            let count = words.len();
+            return Err(self.refuse(&format!(
+                "has {count} words, and {MAX_WORDS} fit an axis; take another column"
+            )));
         }
         Ok(Axis::categories(label, words))
     }

@@ -265,11 +265,9 @@ mod tests {
 
     #[test]
     fn the_requested_panels_are_drawn_and_labelled_once() {
-        let (force, position, bar) = (
-            "Shear force Fₛ (N)<",
-            "Position x (mm), trailing edge at 0<",
-            ">detached (%)<",
-        );
+        let force = "Shear force Fₛ (N)<";
+        let position = "Position x (mm), trailing edge at 0<";
+        let bar = ">detached (%)<";
         let panels = [
             (true, false, vec![force]),
             (false, true, vec![position, bar]),
