@@ -3,7 +3,7 @@
 use crate::figure::BadOption;
 use crate::reduce::NoJobs;
 use crate::results::{ErrorKind, ResultsError};
-use crate::run::threads::ThreadsError;
+use crate::run::limits::ThreadsError;
 use crate::solver::SimulationError;
 use crate::sweep::SweepError;
 

@@ -6,7 +6,7 @@ use super::sweep::{self, PresetFlag, Variation};
 use crate::results::layout::Layout;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
-use crate::run::threads::{self, Threads};
+use crate::run::limits::{self, Threads};
 use crate::run::{Overview, status};
 use crate::sweep::{Bounds, Extension, Plan, Sweep};
 use crate::table::shown::{serialize_path, shown, shown_bytes};
@@ -94,7 +94,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         sweep::warn_of_partitions(root, &sweep);
     }
     let threads = Threads::choose(None, |variable| std::env::var_os(variable))?;
-    let threads = threads::or_all_cores(threads.count);
+    let threads = limits::or_all_cores(threads.count);
     let directory = root.map_or(Ok(None), |root| DirectoryState::of(&sweep, root))?;
     let forecast = Forecast::new(&sweep, threads, directory);
     if arguments.json {

@@ -5,7 +5,7 @@ use crate::results::layout::{PartName, shorter_in_tests};
 use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
 use crate::run::take::{PartJob, Taken, Work};
-use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, memory_limits, threads};
+use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, limits};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
 use std::any::Any;
@@ -219,7 +219,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                     self.take(&job, Err(reason), JobTime::default())?;
                     continue;
                 }
-                if out.memory + memory_limits::beside_threads(job.memory, threads) > free {
+                if out.memory + limits::beside_threads(job.memory, threads) > free {
                     let is_limit = out.jobs < threads && job.memory.is_finite();
                     if is_limit && !std::mem::replace(&mut is_short_of_memory, true) {
                         let allowed = free - out.memory;
@@ -381,7 +381,7 @@ fn run_job(
     };
     let key = (job.of.part.extension, job.of.part.index, job.position);
     locked(under_way).insert(key, long);
-    let (cpu, outcome) = threads::timed(|| outcome(task, kernel, interrupt));
+    let (cpu, outcome) = limits::timed(|| outcome(task, kernel, interrupt));
     locked(under_way).remove(&key);
     let wall = begin.elapsed().as_secs_f64();
     let time = JobTime { cpu, wall };

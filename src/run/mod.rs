@@ -1,7 +1,7 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
-//! take.rs     outlines of missing parts, claimed -> their jobs (walltime.rs: while there is time)
+//! take.rs     outlines of missing parts, claimed -> their jobs while there is time (limits.rs)
 //! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
@@ -13,14 +13,12 @@
 //! job in flight.
 
 mod collect;
-mod memory_limits;
+pub mod limits;
 mod shard;
 mod state;
 mod take;
 #[cfg(test)]
 mod tests;
-pub mod threads;
-mod walltime;
 
 pub use crate::results::log::{RunEvent, RunReport};
 pub use crate::results::pending::Overview;
@@ -36,8 +34,8 @@ use crate::results::workers::{Member, host};
 use crate::results::{Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
+use crate::run::limits::Walltime;
 use crate::run::take::{LOOK, Left};
-use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
 use crate::table::file::PROGRAM;
@@ -103,7 +101,7 @@ pub fn join<T, E: From<ResultsError>>(
     body: impl FnOnce(&Joined<'_>) -> Result<T, E>,
 ) -> Result<T, E> {
     let begin = Instant::now();
-    let threads = threads::or_all_cores(options.threads);
+    let threads = limits::or_all_cores(options.threads);
     if sweep.rounds().is_some() && options.shard != Shard::default() {
         let problem = "a sweep with [precision] or [refine] has no shards: each round needs all results of the one before; \
                        run it on a common disk, started as often as you like";
@@ -121,7 +119,7 @@ pub fn join<T, E: From<ResultsError>>(
             begin,
             walltime: Walltime::new(begin, options.walltime),
             threads,
-            allowed_memory: memory_limits::allowed(),
+            allowed_memory: limits::allowed_memory(),
             options,
         })?;
         member
@@ -191,7 +189,7 @@ impl Joined<'_> {
 
     /// Memory that all jobs together may take now, in bytes.
     fn memory(&self) -> f64 {
-        self.allowed_memory.min(memory_limits::available())
+        self.allowed_memory.min(limits::available_memory())
     }
 
     /// Runs the parts of the rounds so far.

@@ -10,8 +10,7 @@ use crate::results::layout::{PartName, shorter_in_tests};
 use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
-use crate::run::memory_limits;
-use crate::run::walltime::Walltime;
+use crate::run::limits::{Walltime, beside_threads};
 use crate::sweep::{Job, Outline, Part, predicted_memory};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
@@ -135,7 +134,7 @@ impl<'a> Work<'a> {
             pass.rotate_left(usize::try_from(place).unwrap_or_default());
         }
         pass.sort_by_key(|part| {
-            let needed = memory_limits::beside_threads(part.memory, threads);
+            let needed = beside_threads(part.memory, threads);
             let may_not_fit = needed > pending.retry.memory;
             (pending.deaths(part), may_not_fit, pending.done.has(part))
         });
