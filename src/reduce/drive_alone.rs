@@ -6,10 +6,9 @@
 //! slider: the excess, of pairs of a job and its control.
 
 use super::circular::{Sum, unit};
-use super::confidence::{MIN_VALUES, ROUNDING, Unseen};
+use super::confidence::{MIN_VALUES, OF_INTERVALS, OF_PHASES, ROUNDING, Unseen};
 use super::sequence::{Centred, Sequences};
 use super::set::{Cycles, FinishedSet};
-use super::tongue::{OF_INTERVALS, OF_PHASES};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;

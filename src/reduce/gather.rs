@@ -8,9 +8,8 @@
 //! hold more, the slips are read again for the next sets.
 
 use super::drive_alone::{Controls, Explained};
-use super::jobs_of_set::{JobFacts, SetJobs};
 use super::sample::Point;
-use super::set::{FinishedSet, SetSlips};
+use super::set::{FinishedSet, JobFacts, SetJobs, SetSlips};
 use crate::model::selected::{Selected, Selection as _};
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::Slip;

@@ -4,7 +4,9 @@
 //! which are independent whatever the correlation within them: n values in m jobs with the sums S_j of the deviations from the
 //! mean have m/(m-1) Σ_j S_j²/n² with m - 1 degrees of freedom. It is the jackknife over jobs of any function of means, to
 //! first order. Of fewer than [`MIN_STRETCHES`] jobs, each is cut into equal stretches that count as jobs (batch means). What
-//! that costs where stretches are no longer than the memory of slips is in docs/coverage.md.
+//! that costs where stretches are no longer than the memory of slips is in docs/coverage.md. Quantiles are of sorted values.
+
+use crate::table::value::floored;
 
 /// Stretches of slips whose sums make a variance, at least: it is then known to 27 %.
 const MIN_STRETCHES: usize = 8;
@@ -214,6 +216,23 @@ impl<const D: usize> Estimate<D> {
     }
 }
 
+/// Quantile of sorted values, interpolated linearly (NumPy's default); `None` without values.
+pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    at_rank(sorted, share.clamp(0.0, 1.0) * last as f64)
+}
+
+/// The value at a rank from 0, interpolated linearly; `None` beyond the last.
+pub(super) fn at_rank(sorted: &[f64], rank: f64) -> Option<f64> {
+    let below = floored(rank);
+    let value = *sorted.get(below)?;
+    let part = rank - below as f64;
+    if part == 0.0 {
+        return Some(value);
+    }
+    Some(value + part * (sorted.get(below + 1)? - value))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::confidence::tests::Draws;
@@ -290,5 +309,22 @@ mod tests {
         let equal = Sequences::of([[[0.5]; 3]]).estimate();
         assert_eq!(equal.variance(&[1.0]), 0.0);
         assert_eq!(Sequences::<2>::default().estimate().mean(), None);
+    }
+
+    #[test]
+    fn quantiles_lie_between_neighbours() {
+        let values = [0.0, 1.0, 2.0, 10.0];
+        assert_eq!(quantile(&values, 0.0), Some(0.0));
+        assert_eq!(quantile(&values, 0.5), Some(1.5));
+        assert_eq!(quantile(&values, 1.0), Some(10.0));
+        assert_eq!(quantile(&[7.0], 0.3), Some(7.0));
+        assert_eq!(quantile(&[], 0.3), None);
+    }
+
+    #[test]
+    fn there_is_nothing_beyond_the_last_rank() {
+        let ranks = [0.0, 0.5, 1.0, 1.5, 2.0];
+        let found = ranks.map(|rank| at_rank(&[1.0, 2.0], rank));
+        assert_eq!(found, [Some(1.0), Some(1.5), Some(2.0), None, None]);
     }
 }

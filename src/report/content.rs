@@ -10,7 +10,7 @@ use crate::reduce::advise;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::run::{RunEvent, status_with};
-use crate::sweep::{PLAN_VERSION, Sweep};
+use crate::sweep::{PLAN_VERSION, Rounds, Sweep};
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
@@ -87,12 +87,8 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
 
 /// The statistics by which an adaptive sweep chooses its next round.
 fn asked(sweep: &Sweep) -> Vec<&'static str> {
-    let precision = sweep.rounds().and_then(|rounds| rounds.precision.as_ref());
-    let refinement = sweep.refinement().map(|refinement| &refinement.by);
-    let asked = precision
-        .map(|precision| &precision.statistics)
-        .or(refinement);
-    let statistics = asked.into_iter().flatten();
+    let rounds = sweep.rounds().into_iter();
+    let statistics = rounds.flat_map(Rounds::statistics);
     statistics.map(|statistic| statistic.key).collect()
 }
 

@@ -7,7 +7,7 @@
 use super::axes::Axis;
 use super::grid::{Sweep, find_rows};
 use super::quantity::{Point, Quantity};
-use super::rounds::{Bounds, Refinement, Round, Rounds, Standing};
+use super::rounds::{Bounds, Goal, Refinement, Round, Rounds, Standing};
 use crate::model::Parameters;
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
@@ -20,7 +20,10 @@ impl Sweep {
 
     /// Where it looks for edges, if it does.
     pub fn refinement(&self) -> Option<&Refinement> {
-        self.rounds.as_ref()?.refinement.as_ref()
+        match &self.rounds.as_ref()?.goal {
+            Goal::Edges(refinement) => Some(refinement),
+            Goal::Precision(_) => None,
+        }
     }
 
     /// Number of the axis of seeds, if they have one.
@@ -134,9 +137,9 @@ impl Sweep {
         let costs: Vec<f64> = jobs.map(|job| job.cost).collect();
         let largest = costs.iter().copied().fold(0.0, f64::max);
         let known = costs.len() as u64;
-        let (seeds, jobs) = match &rounds.refinement {
-            None => (self.seed_count(), known * self.seed_count()),
-            Some(refinement) => (*rounds.seeds.start(), refinement.max_jobs),
+        let (seeds, jobs) = match &rounds.goal {
+            Goal::Precision(_) => (self.seed_count(), known * self.seed_count()),
+            Goal::Edges(refinement) => (*rounds.seeds.start(), refinement.max_jobs),
         };
         let sets = jobs / seeds;
         let predicted_cost =

@@ -7,7 +7,7 @@
 use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
-use super::rounds::{MAX_SETS, Rounds};
+use super::rounds::{Goal, MAX_SETS, Rounds};
 use super::source::{Refused, Section, Source};
 use crate::model::Symbol;
 use crate::model::theory::typical_interval;
@@ -166,11 +166,8 @@ pub(super) fn rounds(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
     let refine = file
         .entry("refine")
         .and_then(|refine| refine.section("[refine]"));
-    match (
-        &rounds.refinement,
-        refine.and_then(|refine| refine.entry("jobs")),
-    ) {
-        (Some(refinement), Some(jobs)) if refinement.max_jobs < min_jobs => {
+    match (&rounds.goal, refine.and_then(|refine| refine.entry("jobs"))) {
+        (Goal::Edges(refinement), Some(jobs)) if refinement.max_jobs < min_jobs => {
             Err(jobs.must_be(&format!("at least the {min_jobs} of the first round")))
         }
         _ => Ok(()),
@@ -247,16 +244,12 @@ fn modulation(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<
 
 /// Statistics of what the drive alone explains are refused in a sweep without controls.
 fn without_controls(rounds: &Rounds, file: &Section<'_>) -> Result<(), Refused> {
-    let precise = rounds.precision.iter();
-    let precise = precise.flat_map(|precision| &precision.statistics);
-    let refined = rounds.refinement.iter();
-    let refined = refined.flat_map(|refinement| &refinement.by);
-    let section = if rounds.refinement.is_some() {
-        "refine"
-    } else {
-        "precision"
+    let section = match rounds.goal {
+        Goal::Precision(_) => "precision",
+        Goal::Edges(_) => "refine",
     };
-    match precise.chain(refined).find(|by| by.needs_control()) {
+    let mut statistics = rounds.statistics().iter();
+    match statistics.find(|statistic| statistic.needs_control()) {
         None => Ok(()),
         Some(Statistic { key, .. }) => {
             let problem =

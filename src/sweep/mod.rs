@@ -29,9 +29,7 @@ mod read;
 mod read_axes;
 mod read_rounds;
 mod rounds;
-mod samples;
 mod source;
-mod spelling;
 #[cfg(test)]
 mod tests;
 mod twins;
@@ -42,11 +40,11 @@ pub use expression::{Expression, ExpressionError};
 pub use grid::Sweep;
 pub use job::{Identity, Job};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
+pub use quantity::nearest;
 pub use rounds::{
-    Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
+    Bounds, Goal, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
 };
 pub use source::{Mistake, SweepError};
-pub use spelling::nearest;
 pub use variation::{Change, varied};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,

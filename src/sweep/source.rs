@@ -7,8 +7,7 @@
 //! derive: the keys come from tables ([`fields!`](crate::model::fields)) or are open, and its errors name neither the
 //! value as written nor the way out.
 
-use super::quantity::Quantity;
-use super::spelling::{hint, nearest};
+use super::quantity::{Quantity, hint, nearest};
 use crate::model::{self, BreakOn};
 use crate::table::shown::{shown, shown_text};
 use crate::table::value::{Field, Value};
