@@ -4,12 +4,11 @@
 //! A worker that finds the winner dead makes the next generation. A claim stays while any worker runs, as a worker that
 //! looked earlier may not know yet what became of it. A worker that has lost some claims lists them all again.
 
-use crate::results::layout::is_hidden;
+use crate::results::layout::claim;
 use crate::results::workers::{Living, Member};
 use crate::table::error::ResultsError;
 use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::ffi::OsStr;
 
 #[derive(Debug)]
 pub struct Claims<'a> {
@@ -17,13 +16,6 @@ pub struct Claims<'a> {
     /// The last generation of each.
     generations: HashMap<String, u64>,
     own: HashSet<String>,
-}
-
-/// What is claimed by a file of this name, and the generation; `None` if it is not a claim.
-pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
-    let (what, generation) = name.to_str()?.rsplit_once('.')?;
-    let generation = generation.parse().ok()?;
-    (!is_hidden(name)).then_some((what, generation))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

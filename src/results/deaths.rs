@@ -5,15 +5,13 @@
 //! be named, and does not stop the others. No job fails for a mark: kills, power cuts and queues leave marks, too.
 //! A run that ends in order removes the marks of parts that are done.
 
-use crate::results::layout::{Layout, PartName};
-use crate::results::pending::Pending;
+use crate::results::layout::Layout;
 use crate::results::tables;
 use crate::results::workers::{Member, PREFIX};
-use crate::sweep::Outline;
+use crate::sweep::PartName;
 use crate::table::shown::shown_bytes;
 use crate::table::storage::{StorageError, gone_is_fine};
 use serde::{Deserialize, Serialize};
-use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::fmt;
@@ -22,9 +20,6 @@ use std::time::SystemTime;
 
 /// The deaths at each part, each with a name.
 pub(super) type Deaths = HashMap<PartName, Vec<OsString>>;
-
-/// Parts that [`Pending::marked`] lists, at most.
-const MAX_MARKED: usize = 10;
 
 /// A missing part at which workers died.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -124,30 +119,5 @@ impl Layout<'_> {
             self.remove(&self.deaths().join(mark))?;
         }
         Ok(())
-    }
-}
-
-impl Pending<'_> {
-    /// The missing parts with the most deaths.
-    pub fn marked(&self) -> Vec<Marked> {
-        let may_run = |part: &Outline| !self.done.has(part) || self.may_run_again(part);
-        let is_marked = |part: &&Outline| self.deaths(part) > 0 && may_run(part);
-        let mut parts: Vec<&Outline> = self.parts.iter().filter(is_marked).collect();
-        parts.sort_by_key(|part| Reverse(self.deaths(part)));
-        parts.truncate(MAX_MARKED);
-        let marked = parts.into_iter().map(|outline| {
-            let jobs = self.part(outline).jobs;
-            let ends = [&jobs[0], &jobs[jobs.len() - 1]];
-            let mut commands = Vec::from(ends.map(|job| self.results.sweep().command(job)));
-            commands.dedup();
-            Marked {
-                part: PartName::from(outline).to_string(),
-                deaths: self.deaths(outline),
-                jobs: jobs.len(),
-                memory: outline.memory,
-                commands,
-            }
-        });
-        marked.collect()
     }
 }

@@ -3,9 +3,9 @@
 
 use crate::model::selected::Selected;
 use crate::results::directory::Results;
-use crate::results::layout::PartName;
 use crate::results::parts::row_count;
 use crate::results::tables::{All, JOBS, JobRow, recorded_schema};
+use crate::sweep::PartName;
 use crate::table::arrow::{schema, schema_of};
 use crate::table::columns::columns;
 use crate::table::error::ResultsError;

@@ -14,7 +14,7 @@
 //! EEE is the number of the extension, FFFFFF that of the part in it. Staging lies on the same file system as the tables,
 //! so that a rename moves a whole file at once, but outside their folders: a stray file there breaks some reader.
 
-use crate::sweep::{Outline, Sweep};
+use crate::sweep::{PartName, Sweep};
 use crate::table::error::ResultsError;
 use crate::table::file::FILE_EXTENSION;
 use crate::table::shown::shown;
@@ -203,6 +203,13 @@ pub(super) fn is_table_file(name: &OsStr) -> bool {
     !is_hidden(name) && extension.is_some_and(|extension| extension == FILE_EXTENSION)
 }
 
+/// What is claimed by a file of this name, and the generation; `None` if it is not a claim.
+pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
+    let (what, generation) = name.to_str()?.rsplit_once('.')?;
+    let generation = generation.parse().ok()?;
+    (!is_hidden(name)).then_some((what, generation))
+}
+
 fn extension_name(number: usize) -> String {
     format!("{EXTENSION}{number:03}.json")
 }
@@ -245,14 +252,6 @@ places! {
     workers = "run/workers";
 }
 
-/// Name of a part, which is that of its file in every table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PartName {
-    pub extension: usize,
-    /// Number of the part within its extension.
-    pub index: u64,
-}
-
 impl PartName {
     /// What the name of a file says; `None` if it is not that of a part's.
     pub fn of_path(path: &Path) -> Option<Self> {
@@ -275,28 +274,9 @@ impl PartName {
     }
 }
 
-impl From<&Outline> for PartName {
-    fn from(part: &Outline) -> Self {
-        Self {
-            extension: part.extension,
-            index: part.index,
-        }
-    }
-}
-
 impl fmt::Display for PartName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "part-{:03}-{:06}", self.extension, self.index)
-    }
-}
-
-/// The parts that are done: those that have a file in every table.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DoneParts(pub(super) BTreeSet<PartName>);
-
-impl DoneParts {
-    pub fn has(&self, part: &Outline) -> bool {
-        self.0.contains(&part.into())
     }
 }
 

@@ -82,7 +82,10 @@ impl Results<'_> {
         let done = current.done_parts()?;
         // Another worker was first, or a repair has moved a part away.
         if current.extensions().len() > self.extensions().len()
-            || current.plan().outlines().any(|part| !done.has(&part))
+            || current
+                .plan()
+                .outlines()
+                .any(|part| !done.contains(&part.name))
         {
             return Ok(Some(current));
         }

@@ -7,13 +7,12 @@
 use crate::observe::Measurements;
 use crate::results::commit::Commit;
 use crate::results::directory::Results;
-use crate::results::layout::PartName;
 use crate::results::tables::{
     self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
     label, relabel,
 };
 use crate::results::workers::Member;
-use crate::sweep::{Outline, Part};
+use crate::sweep::{Outline, Part, PartName};
 use crate::table::columns::{Table, columns};
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
@@ -51,7 +50,7 @@ impl<'a> Results<'a> {
     }
 
     pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
-        self.layout().table(table).join(PartName::from(part).file())
+        self.layout().table(table).join(part.name.file())
     }
 
     /// Spills the outcomes of some jobs of a part, beside those at the positions that are spilled already.
@@ -101,7 +100,7 @@ impl<'a> Results<'a> {
         }
         let done = self.done_parts()?;
         for part in parts {
-            if spilled.contains(&PartName::from(part)) && done.has(part) {
+            if spilled.contains(&part.name) && done.contains(&part.name) {
                 self.remove_spilled(part)?;
             }
         }
@@ -111,7 +110,7 @@ impl<'a> Results<'a> {
     fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
         // Jobs first: without them the other files do not count.
         self.tables().rev().try_for_each(|table| {
-            let file = self.file_in(&self.layout().spill(), table, part.into());
+            let file = self.file_in(&self.layout().spill(), table, part.name);
             self.layout().remove(&file.path)
         })
     }
@@ -125,7 +124,7 @@ impl<'a> Results<'a> {
         is_written: impl Fn(&usize) -> bool,
         places: (Option<&PathBuf>, &PathBuf),
     ) -> Result<(), ResultsError> {
-        let sweep = &self.extensions()[part.extension].sweep;
+        let sweep = &self.extensions()[part.name.extension].sweep;
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
         let positions = (0..part.jobs.len()).filter(is_written);
         let jobs: Jobs<'_> = positions
@@ -169,7 +168,7 @@ impl<'a> Results<'a> {
         ) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
-        let file = |place: &PathBuf| self.file_in(place, R::NAME, PartName::from(&**part));
+        let file = |place: &PathBuf| self.file_in(place, R::NAME, part.name);
         let target = file(to).path;
         // A run makes the folder of the tables when it begins.
         let top = if *to == self.layout().spill() {
@@ -179,9 +178,9 @@ impl<'a> Results<'a> {
         };
         storage.ensure_folder_below(top, &to.join(R::NAME))?;
         let kept = KeptRows::read(Dataset::of(storage, from.map(file).into_iter().collect()))?;
-        let sweep = &self.extensions()[part.extension].sweep;
+        let sweep = &self.extensions()[part.name.extension].sweep;
         let left_out = sweep.recording().left_out();
-        let footer = self.footer(part.extension, &target);
+        let footer = self.footer(part.name.extension, &target);
         let mut writer = TableWriter::without(&left_out, commit.stage(&target)?, &footer)?;
         for (job, outcome) in jobs {
             match outcome {

@@ -1,13 +1,13 @@
 //! The collector hands jobs to the threads, puts their outcomes together into parts, and commits them. Only it uses the disk.
 
 use crate::results::ResultsError;
-use crate::results::layout::{PartName, shorter_in_tests};
+use crate::results::layout::shorter_in_tests;
 use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
 use crate::run::take::{PartJob, Taken, Work};
 use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, limits};
 use crate::solver::SimulationError;
-use crate::sweep::Job;
+use crate::sweep::{Job, PartName};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -51,8 +51,8 @@ struct UnderWay {
     long_after: Duration,
 }
 
-/// The jobs under way, by extension, part and position.
-type AllUnderWay = Mutex<BTreeMap<(usize, u64, usize), UnderWay>>;
+/// The jobs under way, by part and position.
+type AllUnderWay = Mutex<BTreeMap<(PartName, usize), UnderWay>>;
 
 /// The jobs that were handed out and have not ended.
 #[derive(Default)]
@@ -94,7 +94,7 @@ pub(super) struct Collector<'a, 'e> {
     pending: &'a Pending<'a>,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
-    open: BTreeMap<(usize, u64), OpenPart>,
+    open: BTreeMap<PartName, OpenPart>,
     /// Number and predicted cost of the jobs of the parts that it has committed, spilled ones included.
     own: (u64, f64),
 }
@@ -297,7 +297,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             },
         };
         self.events.send(&event)?;
-        let key = (part.extension, part.index);
+        let key = part.name;
         let open = self.open.entry(key).or_insert_with(|| OpenPart {
             of: Arc::clone(&of.of),
             outcomes: Outcomes::new(),
@@ -324,7 +324,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         self.pending
             .results
             .commit(self.joined.member, part, &whole.outcomes, spilled)?;
-        let name = PartName::from(&**part);
+        let name = part.name;
         self.joined.member.end_part(name)?;
         let took = whole.of.begin.elapsed();
         self.joined.walltime.committed(took, begin.elapsed());
@@ -353,7 +353,7 @@ impl<'a, 'e> Collector<'a, 'e> {
     }
 }
 
-fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(usize, u64, usize), UnderWay>> {
+fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(PartName, usize), UnderWay>> {
     // Nothing panics while it is held.
     under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -379,7 +379,7 @@ fn run_job(
         begin,
         long_after: long_after.unwrap_or(Duration::MAX).max(LONG),
     };
-    let key = (job.of.part.extension, job.of.part.index, job.position);
+    let key = (job.of.part.name, job.position);
     locked(under_way).insert(key, long);
     let (cpu, outcome) = limits::timed(|| outcome(task, kernel, interrupt));
     locked(under_way).remove(&key);

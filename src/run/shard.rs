@@ -77,14 +77,17 @@ impl Shard {
 mod tests {
     use super::*;
 
+    use crate::sweep::PartName;
     use proptest::prelude::*;
 
     fn plan(costs: &[f64]) -> impl Iterator<Item = Outline> {
         let part = |(index, &cost): (usize, &f64)| {
             let point = index as u64;
             Outline {
-                extension: index / 7,
-                index: point,
+                name: PartName {
+                    extension: index / 7,
+                    index: point,
+                },
                 points: point..=point,
                 job_count: 1,
                 cost,
@@ -119,7 +122,7 @@ mod tests {
                 loads.push(own.iter().map(|part| part.cost).sum::<f64>());
                 all.extend(own);
             }
-            all.sort_by_key(|part| part.index);
+            all.sort_by_key(|part| part.name.index);
             prop_assert_eq!(all, plan(&costs).collect::<Vec<_>>());
             let spread = loads.iter().copied().fold(0.0, f64::max) - loads.iter().copied().fold(f64::INFINITY, f64::min);
             // Sums in another order differ by roundings.

@@ -90,7 +90,8 @@ impl Cut {
 /// Jobs of finished parts that the current sweep does not have.
 fn jobs_kept(pending: &Pending<'_>) -> u64 {
     let last = pending.results.extensions().len() - 1;
-    let is_earlier = |part: &&Outline| part.extension < last && pending.done.has(part);
+    let is_earlier =
+        |part: &&Outline| part.name.extension < last && pending.done.contains(&part.name);
     let parts = pending.parts.iter().filter(is_earlier);
     let jobs = parts.flat_map(|part| pending.part(part).jobs);
     let kept = jobs.filter(|job| !pending.results.sweep().contains(&job.parameters));

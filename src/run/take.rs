@@ -6,7 +6,7 @@
 //! that ends its process must not end others.
 
 use crate::results::claims::{ClaimState, Claims};
-use crate::results::layout::{PartName, shorter_in_tests};
+use crate::results::layout::shorter_in_tests;
 use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
@@ -68,7 +68,7 @@ impl Pending<'_> {
     /// Number and predicted cost of the jobs of parts that were finished since they were looked up.
     pub(super) fn done_since(&self) -> Result<(u64, f64), ResultsError> {
         let done = self.results.done_parts()?;
-        let is_new = |part: &&Outline| done.has(part) && !self.done.has(part);
+        let is_new = |part: &&Outline| done.contains(&part.name) && !self.done.contains(&part.name);
         let mut jobs = 0;
         let mut cost = 0.0;
         for part in self.parts.iter().filter(is_new) {
@@ -84,9 +84,9 @@ impl Pending<'_> {
         let claims = Claims::list(member)?;
         let done = self.results.done_parts()?;
         let mut left = Left::default();
-        for part in self.parts.iter().filter(|part| !done.has(part)) {
+        for part in self.parts.iter().filter(|part| !done.contains(&part.name)) {
             left.jobs += part.job_count as u64;
-            match claims.standing(&PartName::from(part).to_string(), &others)? {
+            match claims.standing(&part.name.to_string(), &others)? {
                 ClaimState::Taken(owner) => {
                     left.hosts.insert(others[owner].worker.host.clone());
                 }
@@ -127,7 +127,8 @@ impl<'a> Work<'a> {
     ) -> Result<Self, ResultsError> {
         let others = member.others()?;
         let claims = Claims::list(member)?;
-        let is_left = |part: &&Outline| !pending.done.has(part) || pending.may_run_again(part);
+        let is_left =
+            |part: &&Outline| !pending.done.contains(&part.name) || pending.may_run_again(part);
         let mut pass: Vec<&Outline> = pending.parts.iter().filter(is_left).collect();
         if !others.is_empty() && !pass.is_empty() {
             let place = member.number() % pass.len() as u64;
@@ -136,7 +137,11 @@ impl<'a> Work<'a> {
         pass.sort_by_key(|part| {
             let needed = beside_threads(part.memory, threads);
             let may_not_fit = needed > pending.retry.memory;
-            (pending.deaths(part), may_not_fit, pending.done.has(part))
+            (
+                pending.deaths(part),
+                may_not_fit,
+                pending.done.contains(&part.name),
+            )
         });
         Ok(Self {
             pending,
@@ -218,8 +223,8 @@ impl<'a> Work<'a> {
 
     /// Takes a part in the first pass: unclaimed, or finished with jobs that may run again and no worker that runs them.
     fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
-        let name = PartName::from(outline).to_string();
-        if !self.pending.done.has(outline) {
+        let name = outline.name.to_string();
+        if !self.pending.done.contains(&outline.name) {
             return Ok(self.claims.last(&name).is_none() && self.take_part(outline, 0)?);
         }
         match self.claims.standing(&name, &self.others)? {
@@ -237,8 +242,13 @@ impl<'a> Work<'a> {
         let done = self.pending.results.done_parts()?;
         let mut is_certain = true;
         let mut free = Vec::new();
-        for part in self.pending.parts.iter().filter(|part| !done.has(part)) {
-            let name = PartName::from(part).to_string();
+        for part in self
+            .pending
+            .parts
+            .iter()
+            .filter(|part| !done.contains(&part.name))
+        {
+            let name = part.name.to_string();
             match self.claims.standing(&name, &others)? {
                 ClaimState::Own => (),
                 ClaimState::Taken(owner) => {
@@ -267,7 +277,7 @@ impl<'a> Work<'a> {
 
     /// Takes what is to be run of a part.
     fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
-        if !self.pending.done.has(outline) {
+        if !self.pending.done.contains(&outline.name) {
             let spilled = self.pending.spilled(outline)?;
             let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
             let jobs = left.map(|position| (position, false)).collect();
@@ -296,7 +306,7 @@ impl<'a> Work<'a> {
         if !self.walltime.admits_part() {
             return Ok(false);
         }
-        let name = PartName::from(&*part);
+        let name = part.name;
         if !self.claims.take(&name.to_string(), generation)? {
             self.losses += 1;
             if self.losses == LOSSES {
@@ -307,7 +317,7 @@ impl<'a> Work<'a> {
         }
         self.member.begin_part(name)?;
         let is_alone = self.pending.deaths(&part) >= DEATHS;
-        let again = self.pending.done.has(&part);
+        let again = self.pending.done.contains(&part.name);
         let taken = Arc::new(Taken {
             part,
             spilled,

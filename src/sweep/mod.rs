@@ -39,7 +39,9 @@ pub use cost::{LARGE, certain_memory, predicted_cost, predicted_memory};
 pub use expression::{Expression, ExpressionError};
 pub use grid::Sweep;
 pub use job::{Identity, Job};
-pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
+pub use plan::{
+    Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, PartName, Plan, Totals,
+};
 pub use quantity::nearest;
 pub use rounds::{
     Bounds, Goal, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,

@@ -49,13 +49,19 @@ pub struct Plan<'a> {
     extensions: &'a [Extension],
 }
 
-/// A part without its jobs: where they lie, and their sums.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outline {
+/// The name of a part, which is that of its file in every table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PartName {
     /// Number of the extension, from 0.
     pub extension: usize,
     /// Number of the part within its extension, from 0.
     pub index: u64,
+}
+
+/// A part without its jobs: where they lie, and their sums.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    pub name: PartName,
     /// Points of the grid from its first job to its last.
     pub points: RangeInclusive<u64>,
     /// Number of its jobs. At least one.
@@ -188,8 +194,7 @@ impl<'a> Plan<'a> {
                 .map(|job| predicted_memory(&job.parameters, own.sweep.recording()));
             Some(Part {
                 outline: Outline {
-                    extension,
-                    index,
+                    name: PartName { extension, index },
                     points,
                     job_count: jobs.len(),
                     cost,
@@ -213,8 +218,8 @@ impl<'a> Plan<'a> {
 
     /// The part of an outline, whose points alone are walked through.
     pub fn part(self, outline: &Outline) -> Part {
-        let own = &self.extensions[outline.extension];
-        let earlier = &self.extensions[..outline.extension];
+        let own = &self.extensions[outline.name.extension];
+        let earlier = &self.extensions[..outline.name.extension];
         let points = *outline.points.start()..outline.points.end() + 1;
         Part {
             outline: outline.clone(),
@@ -232,12 +237,12 @@ impl<'a> Plan<'a> {
         let mut next = None;
         for part in self.parts_of(extension).filter(is_kept) {
             match ranges.last_mut() {
-                Some(range) if next == Some(part.index) => {
+                Some(range) if next == Some(part.name.index) => {
                     *range = *range.start()..=*part.points.end();
                 }
                 _ => ranges.push(part.points.clone()),
             }
-            next = Some(part.index + 1);
+            next = Some(part.name.index + 1);
         }
         ranges
     }
@@ -245,7 +250,7 @@ impl<'a> Plan<'a> {
     /// Walks through the plan and sums it up.
     pub fn totals(self) -> Totals {
         self.parts().fold(Totals::default(), |totals, part| {
-            let recording = self.extensions[part.extension].sweep.recording();
+            let recording = self.extensions[part.name.extension].sweep.recording();
             let jobs = part.jobs.iter();
             let intervals = jobs.map(|job| typical_interval(&job.parameters));
             let slips: f64 = intervals

@@ -16,12 +16,11 @@ use crate::model::Parameters;
 use crate::observe::{Measurements, Precursor, Slip};
 use crate::reduce::SetRow;
 use crate::results::ErrorKind;
-use crate::results::layout::PartName;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::results::workers::SILENCE;
 use crate::results::workers::tests::{leave, open};
 use crate::solver::{SimulationError, Summary};
-use crate::sweep::Job;
+use crate::sweep::{Job, PartName};
 use crate::table::columns::Row;
 use crate::table::storage::{Disk, Storage};
 use arrow_array::cast::AsArray;
@@ -762,9 +761,7 @@ fn parts_of_a_dead_worker_elsewhere_are_taken_over_and_those_of_a_living_one_lef
         fs::create_dir_all(layout.claims()).unwrap();
         for part in results.plan().parts().skip(1).take(2) {
             fs::write(
-                layout
-                    .claims()
-                    .join(format!("{}.0", PartName::from(&*part))),
+                layout.claims().join(format!("{}.0", part.name)),
                 "worker-elsewhere",
             )
             .unwrap();
