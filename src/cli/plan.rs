@@ -7,7 +7,7 @@ use crate::results::layout::Layout;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
 use crate::run::limits::{self, Threads};
-use crate::run::{Overview, status};
+use crate::run::{MAX_FAILURES, Overview, status};
 use crate::sweep::{Bounds, Extension, Plan, Sweep};
 use crate::table::shown::{serialize_path, shown, shown_bytes};
 use crate::table::storage::{Disk, Storage};
@@ -196,7 +196,8 @@ impl DirectoryState {
             return Ok(None);
         }
         let layout = Layout::new(&Disk, &root);
-        let found = Results::preview(&layout, sweep).and_then(|results| status(&results));
+        let found =
+            Results::preview(&layout, sweep).and_then(|results| status(&results, MAX_FAILURES));
         let (refused, overview, rounds) = match found {
             Ok(status) => (None, Some(status.overview), status.rounds),
             Err(error) if error.kind == ErrorKind::Refused => (Some(error.to_string()), None, None),

@@ -4,10 +4,11 @@ use super::exit::{Exit, UsageError};
 use super::figure_flags::{CUSTOM_FIGURE, CustomFlags, size};
 use super::output::{self, TextTable};
 use crate::figure::{Format, Look, Size, Style, draw_all, draw_custom, write_custom};
-use crate::reduce::{renew, set_columns};
+use crate::reduce::{SetRow, renew};
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
 use crate::results::layout::Layout;
+use crate::table::columns::Row as _;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -122,7 +123,7 @@ pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
 
 /// The columns of the table of sets.
 fn list() -> String {
-    let described = set_columns();
+    let described = SetRow::columns();
     let mut columns = TextTable::default();
     columns.words("", &described, |column| column.name.to_string());
     columns.words("", &described, |column| column.unit.to_owned());

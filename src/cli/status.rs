@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::run::{Present, Status};
+use crate::run::{MAX_FAILURES, Present, Status};
 use crate::table::shown::shown_text;
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -33,7 +33,7 @@ const JSON_FORMAT: u32 = 3;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read_plan(&Layout::new(&Disk, &arguments.directory))?;
-    let status = crate::run::status(&results)?;
+    let status = crate::run::status(&results, MAX_FAILURES)?;
     let overview = status.overview;
     if arguments.json {
         output::json(JSON_FORMAT, &status)?;

@@ -351,11 +351,7 @@ pub fn lines<'a>(
     } else {
         refinement.to
     };
-    let scale = Scale::of(sweep, refinement).unwrap_or(Scale {
-        first: f64::NAN,
-        step: f64::NAN,
-        is_log: refinement.is_log,
-    });
+    let scale = Scale::of(sweep, refinement);
     let width = to / scale.step;
     let window = |place: f64| {
         let value = if scale.is_log {
@@ -411,20 +407,19 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(sweep: &Sweep, refinement: &Refinement) -> Option<Self> {
+    fn of(sweep: &Sweep, refinement: &Refinement) -> Self {
         let is_log = refinement.is_log;
         let place = |row: u64| {
-            let (_, value) = sweep.value_at(refinement.axis, row)?;
-            Some(if is_log { libm::log(value) } else { value })
+            let (_, value) = sweep.value_at(refinement.axis, row);
+            if is_log { libm::log(value) } else { value }
         };
         let last = sweep.row_counts()[refinement.axis] - 1;
-        let first = place(0)?;
-        let step = (place(last)? - first) / last as f64;
-        Some(Self {
+        let first = place(0);
+        Self {
             first,
-            step,
+            step: (place(last) - first) / last as f64,
             is_log,
-        })
+        }
     }
 
     /// The value of the parameter at a row, or a fraction of one.
@@ -441,17 +436,14 @@ pub(super) fn edge_rows(
 ) -> Result<Vec<EdgeRow>, ResultsError> {
     let sweep = results.sweep();
     let sets = sets_of_edges(results, refinement)?;
-    let Some(scale) = Scale::of(sweep, refinement) else {
-        return Ok(Vec::new());
-    };
+    let scale = Scale::of(sweep, refinement);
     let is_over = results.rounds_so_far().is_none_or(|rounds| rounds.is_over);
     let mut rows = Vec::new();
     for line in lines(sweep, refinement, &sets) {
         let key = line.statistic.key;
         for edge in &line.edges {
             let [low, high] = &edge.bracket;
-            let row = row_between(sweep, refinement, key, (low.row, low.set), high.row);
-            rows.extend(row.map(|row| EdgeRow {
+            rows.push(EdgeRow {
                 edge: Some(scale.value(edge.place)),
                 edge_interval: Some(Interval {
                     low: scale.value(edge.interval[0]),
@@ -460,17 +452,16 @@ pub(super) fn edge_rows(
                 rises: Some(high.side > 0.0),
                 jobs: edge.sets.iter().map(|set| set.set.seeds).sum(),
                 ended: edge.ended(sweep.seed_count(), is_over),
-                ..row
-            }));
+                ..row_between(sweep, refinement, key, (low.row, low.set), high.row)
+            });
         }
         if line.edges.is_empty()
             && let Some((first, last)) = line.sets.first().zip(line.sets.last())
         {
-            let row = row_between(sweep, refinement, key, *first, last.0);
-            rows.extend(row.map(|row| EdgeRow {
+            rows.push(EdgeRow {
                 jobs: line.sets.iter().map(|(_, set)| set.seeds).sum(),
-                ..row
-            }));
+                ..row_between(sweep, refinement, key, *first, last.0)
+            });
         }
     }
     Ok(rows)
@@ -483,10 +474,10 @@ fn row_between(
     key: &str,
     (first, set): (u64, &SetOfEdges),
     last: u64,
-) -> Option<EdgeRow> {
-    let (axis, bracket_low) = sweep.value_at(refinement.axis, first)?;
-    let (_, bracket_high) = sweep.value_at(refinement.axis, last)?;
-    Some(EdgeRow {
+) -> EdgeRow {
+    let (axis, bracket_low) = sweep.value_at(refinement.axis, first);
+    let (_, bracket_high) = sweep.value_at(refinement.axis, last);
+    EdgeRow {
         set_id: set.set_id.clone(),
         parameters: Selected::new(set.parameters.clone()),
         axis: axis.to_owned(),
@@ -498,7 +489,7 @@ fn row_between(
         bracket_low,
         bracket_high,
         ..EdgeRow::default()
-    })
+    }
 }
 
 /// The sets that the rounds of a directory have chosen, by their numbers.

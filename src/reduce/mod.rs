@@ -40,8 +40,7 @@ pub use reduction::{
 pub use sample::{Point, RampStage};
 pub use sequence::quantile;
 pub use values::{
-    Swept, Values, ascending, differing, has_even_steps, is_same, is_spread, set_columns,
-    sets_where, swept,
+    Swept, Values, ascending, differing, has_even_steps, is_same, is_spread, sets_where, swept,
 };
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

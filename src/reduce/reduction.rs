@@ -6,8 +6,9 @@ use super::backbone::{Backbone, BackboneBin};
 use super::crossings::{EdgeRow, edge_rows};
 use super::gather::{Gathering, MAX_SLIPS};
 use super::reduced::{SOURCE, source};
-use super::sample::{Point, spacing};
+use super::sample::spacing;
 use crate::results::commit::{Commit, exclusive_lock};
+use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
 use crate::sets::SetRow;
@@ -15,9 +16,9 @@ use crate::sweep::{Goal, Precision, Sweep, Target};
 use crate::table::columns::{Row, Table, columns, tables};
 use crate::table::file::{Footer, TableWriter};
 use crate::table::shown::shown;
-use crate::table::storage::StoredFile;
 use anyhow::{Result, bail};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -74,7 +75,7 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
 fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary)> {
     let layout = results.layout();
     // In this order: what is committed in between makes these data old.
-    let footer = &results.footer_of_all().with(SOURCE, &source(results)?);
+    let footer = results.footer_of_all().with(SOURCE, &source(results)?);
     let gathering = Gathering::of_jobs(results, &|_| true)?;
     let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
@@ -91,21 +92,20 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     };
 
     layout.ensure_folder(&layout.reduced())?;
-    let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
-    let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
-    let at = |name: &str| footer.clone().at(&layout.reduced_file(name));
-    let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, &at(SetRow::NAME))?;
-    let mut histogram_writer =
-        TableWriter::new(stage(HistogramBin::NAME)?, &at(HistogramBin::NAME))?;
-    let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, &at(BackboneBin::NAME))?;
-    let mut point_writer = TableWriter::new(stage(Point::NAME)?, &at(Point::NAME))?;
-
+    let mut staged = Staged {
+        layout,
+        commit: Commit::begin(layout, &layout.staging(WRITER))?,
+        footer,
+    };
+    let rounds = RoundsOfSets::of(results);
+    let mut set_writer = staged.begin::<SetInRounds>(&rounds.left_out())?;
+    let mut histogram_writer = staged.begin::<HistogramBin>(&[])?;
     let mut pooled = Backbone::default();
     let mut kept = Vec::new();
     gathering.each_set(max_slips, spacing(total), |set, explained| {
         let (set, points) = set.finish_with(explained);
         let row = &set.row;
-        set_writer.push(row)?;
+        set_writer.push(&(row.clone(), rounds.of_set(row)))?;
         if row.is_control {
             return Ok(());
         }
@@ -122,27 +122,45 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
         }
         Ok(())
     })?;
-    kept.sort_by_key(|(place, _)| *place);
-    summary.points = kept.len() as u64;
-    for (_, point) in &kept {
-        point_writer.push(point)?;
-    }
-    summary.backbone = pooled.finish();
-    for bin in &summary.backbone {
-        backbone_writer.push(bin)?;
-    }
-    if let Some(refinement) = results.sweep().refinement() {
-        let mut edge_writer = TableWriter::new(stage(EdgeRow::NAME)?, &at(EdgeRow::NAME))?;
-        for edge in edge_rows(results, refinement)? {
-            edge_writer.push(&edge)?;
-        }
-        edge_writer.finish()?;
-    }
     set_writer.finish()?;
     histogram_writer.finish()?;
-    backbone_writer.finish()?;
-    point_writer.finish()?;
-    Ok((commit, summary))
+    summary.backbone = pooled.finish();
+    staged.write(summary.backbone.iter().copied())?;
+    kept.sort_by_key(|(place, _)| *place);
+    summary.points = kept.len() as u64;
+    staged.write(kept.into_iter().map(|(_, point)| point))?;
+    if let Some(refinement) = results.sweep().refinement() {
+        staged.write(edge_rows(results, refinement)?)?;
+    }
+    Ok((staged.commit, summary))
+}
+
+/// Reduced tables on the way to their places.
+struct Staged<'r, 'a> {
+    layout: &'r Layout<'a>,
+    commit: Commit<'a>,
+    footer: Footer,
+}
+
+impl Staged<'_, '_> {
+    /// Begins a table without the columns of these names.
+    fn begin<R: Table>(
+        &mut self,
+        left_out: &[Cow<'static, str>],
+    ) -> Result<TableWriter<R>, ResultsError> {
+        let file = self.layout.reduced_file(R::NAME);
+        let footer = self.footer.clone().at(&file);
+        TableWriter::without(left_out, self.commit.stage(&file)?, &footer)
+    }
+
+    /// Writes a whole table.
+    fn write<R: Table>(&mut self, rows: impl IntoIterator<Item = R>) -> Result<(), ResultsError> {
+        let mut writer = self.begin(&[])?;
+        for row in rows {
+            writer.push(&row)?;
+        }
+        writer.finish()
+    }
 }
 
 columns! {
@@ -166,26 +184,15 @@ pub type SetInRounds = (SetRow, RoundOfSet);
 
 tables! { SetInRounds = SetRow::NAME, SetRow::MEANING; }
 
-/// Writes the table of sets, with the columns that the sweep asks for.
-pub(super) struct SetWriter<'a> {
-    writer: TableWriter<SetInRounds>,
+/// How the sets that the rounds of a sweep have chosen came about, by their numbers.
+struct RoundsOfSets<'a> {
     sweep: &'a Sweep,
-    /// How the sets that the rounds have chosen came about, by their numbers.
     of_sets: HashMap<u64, RoundOfSet>,
 }
 
-impl<'a> SetWriter<'a> {
-    pub(super) fn new(
-        results: &'a Results<'a>,
-        file: StoredFile,
-        footer: &Footer,
-    ) -> Result<Self, ResultsError> {
+impl<'a> RoundsOfSets<'a> {
+    fn of(results: &'a Results<'_>) -> Self {
         let sweep = results.sweep();
-        let columns = RoundOfSet::columns().into_iter();
-        let mut left_out: Vec<_> = columns.map(|column| column.name).collect();
-        if sweep.rounds().is_some() {
-            left_out.clear();
-        }
         let mut of_sets: HashMap<u64, RoundOfSet> = HashMap::new();
         for (round, extension) in (1..).zip(results.rounds()) {
             let rounds = extension.round.iter();
@@ -197,29 +204,32 @@ impl<'a> SetWriter<'a> {
                 *of_set.seeds.get_or_insert(0) += 1;
             }
         }
-        Ok(Self {
-            writer: TableWriter::without(&left_out, file, footer)?,
-            sweep,
-            of_sets,
-        })
+        Self { sweep, of_sets }
     }
 
-    pub(super) fn push(&mut self, row: &SetRow) -> Result<(), ResultsError> {
-        let mut of_set = RoundOfSet::default();
-        if let Some(rounds) = self.sweep.rounds() {
-            let number = self.sweep.set_with(&row.parameters);
-            let known = number.and_then(|set| self.of_sets.get(&set));
-            of_set = known.cloned().unwrap_or_default();
-            if let Goal::Precision(precision) = &rounds.goal {
-                let error = error_over_target(row, precision);
-                of_set.target_met = error.map(|error| error <= 1.0);
-            }
+    /// Columns that the table of sets does not have.
+    fn left_out(&self) -> Vec<Cow<'static, str>> {
+        match self.sweep.rounds() {
+            Some(_) => Vec::new(),
+            None => RoundOfSet::columns()
+                .into_iter()
+                .map(|column| column.name)
+                .collect(),
         }
-        self.writer.push(&(row.clone(), of_set))
     }
 
-    pub(super) fn finish(self) -> Result<(), ResultsError> {
-        self.writer.finish()
+    fn of_set(&self, row: &SetRow) -> RoundOfSet {
+        let Some(rounds) = self.sweep.rounds() else {
+            return RoundOfSet::default();
+        };
+        let number = self.sweep.set_with(&row.parameters);
+        let known = number.and_then(|set| self.of_sets.get(&set));
+        let mut of_set = known.cloned().unwrap_or_default();
+        if let Goal::Precision(precision) = &rounds.goal {
+            let error = error_over_target(row, precision);
+            of_set.target_met = error.map(|error| error <= 1.0);
+        }
+        of_set
     }
 }
 

@@ -25,15 +25,10 @@ pub struct Values {
     pub words: Vec<String>,
 }
 
-/// The columns of the sets that can be shown.
-pub fn set_columns() -> Vec<Column> {
-    SetRow::columns()
-}
-
 impl Values {
     /// The values of a column, or of a formula such as `tau_sd / tau_mean`. An error says what is wrong with the name.
     pub fn of(rows: &[SetRow], name: &str) -> Result<Self, String> {
-        let columns = set_columns();
+        let columns = SetRow::columns();
         let index = |name: &str| columns.iter().position(|column| column.name == name);
         let Some(column) = index(name) else {
             return Self::of_formula(rows, name, &columns);
@@ -158,7 +153,7 @@ fn word(cell: Value<'_>) -> Option<String> {
 
 /// The sets for which a condition on their columns holds, such as `V0 < 1e-4 and resultant_length > 0.5`.
 pub fn sets_where(rows: Vec<SetRow>, condition: &str) -> Result<Vec<SetRow>, String> {
-    let columns = set_columns();
+    let columns = SetRow::columns();
     let condition = Expression::condition(condition, &|name| number_column(name, &columns));
     let condition = condition.map_err(|error| error.to_string())?;
     let holds = |row: &SetRow| evaluate(&condition, row) == 1.0;
@@ -361,7 +356,7 @@ mod tests {
             [Some(50.0), None]
         );
         assert!(
-            set_columns()
+            SetRow::columns()
                 .iter()
                 .any(|column| column.name == FREQUENCY && column.unit == "Hz")
         );

@@ -9,7 +9,7 @@ use crate::model::{MODEL_VERSION, RNG_SCHEME, Symbol};
 use crate::reduce::advise;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::run::{RunEvent, status_with};
+use crate::run::{RunEvent, status};
 use crate::sweep::{PLAN_VERSION, Rounds, Sweep};
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
@@ -64,7 +64,7 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
         "directory": shown(layout.root()).to_string(),
         // Set during a run; times in s, `written` since 1970 UTC.
         "live": refresh.map(|refresh| json!({ "refresh": refresh.as_secs_f64(), "written": written })),
-        "status": status_with(results, MAX_FAILURES)?,
+        "status": status(results, MAX_FAILURES)?,
         "asked": asked(sweep),
         // Keys that each axis moves, and its number of values.
         "axes": sweep.axes().collect::<Vec<_>>(),

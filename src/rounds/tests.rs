@@ -71,7 +71,7 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
                 let rows = sweep.rows(number);
                 let value = |key: &str| {
                     (0..rows.len())
-                        .filter_map(|axis| sweep.value_at(axis, rows[axis]))
+                        .map(|axis| sweep.value_at(axis, rows[axis]))
                         .find(|found| found.0 == key)
                 };
                 let had = sets.get(&number).map_or(0, |set| set.seeds);
@@ -89,7 +89,7 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
 /// Where on a linear axis the edges of each row lie, with their intervals, and whether these are as narrow as is wanted.
 fn found(sweep: &Sweep, sets: &BTreeMap<u64, SetOfEdges>) -> Vec<Vec<([f64; 3], bool)>> {
     let axis = sweep.refinement().unwrap().axis;
-    let [first, second] = [0, 1].map(|row| sweep.value_at(axis, row).unwrap().1);
+    let [first, second] = [0, 1].map(|row| sweep.value_at(axis, row).1);
     let of_edge = |edge: &Edge<'_>| {
         let [low, high] = edge.interval;
         (

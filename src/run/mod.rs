@@ -23,7 +23,7 @@ mod tests;
 pub use crate::results::log::{RunEvent, RunReport};
 pub use crate::results::pending::Overview;
 pub use shard::Shard;
-pub use state::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status, status_with};
+pub use state::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status};
 
 use crate::observe::Measurements;
 use crate::results::claims::{ClaimState, Claims};
@@ -337,15 +337,4 @@ impl Joined<'_> {
         let generation = claims.last(REDUCTION).unwrap_or_default();
         Ok(is_taken.then_some((claims, generation)))
     }
-}
-
-/// Runs the jobs of a sweep that are not yet in a directory: a [`Joined`] of this alone.
-pub fn run(
-    layout: &Layout<'_>,
-    sweep: &Sweep,
-    options: Options<'_>,
-    kernel: &Kernel<'_>,
-    display: &mut dyn FnMut(&RunEvent),
-) -> Result<RunReport, ResultsError> {
-    join(layout, sweep, options, |joined| joined.run(kernel, display))
 }

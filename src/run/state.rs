@@ -14,7 +14,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::time::SystemTime;
 
-/// Failed jobs that [`status`] lists one by one, at most.
+/// Failed jobs that people are shown one by one, at most.
 pub const MAX_FAILURES: u64 = 10;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -98,12 +98,8 @@ fn jobs_kept(pending: &Pending<'_>) -> u64 {
     kept.count() as u64
 }
 
-pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
-    status_with(results, MAX_FAILURES)
-}
-
-/// The same, with another number of failed jobs.
-pub fn status_with(results: &Results<'_>, max_failures: u64) -> Result<Status, ResultsError> {
+/// How far a directory is, with this many failed jobs at most.
+pub fn status(results: &Results<'_>, max_failures: u64) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
     let mut failure_reasons = Reasons::default();
     let parts: Vec<Outline> = results.plan().outlines().collect();

@@ -55,22 +55,17 @@ impl Sweep {
         self.axes.iter().map(Axis::len).collect()
     }
 
-    /// Key and value of an axis of one quantity at a row; `None` for a word, or for several quantities.
-    pub fn value_at(&self, axis: usize, row: u64) -> Option<(&'static str, f64)> {
+    /// Key and value of the first quantity of an axis at a row; NaN for a word.
+    pub fn value_at(&self, axis: usize, row: u64) -> (&'static str, f64) {
         let mut point = Point {
             parameters: self.base.clone(),
             fixes_period: None,
         };
         self.axes[axis].apply(row, &mut point);
-        let [quantity] = self.axes[axis].quantities()[..] else {
-            return None;
-        };
-        let value = match (point.fixes_period, quantity) {
-            (Some((_, value)), _) => Some(value),
-            (None, Quantity::Parameter(symbol)) => point.parameters.get(symbol).number(),
-            _ => None,
-        };
-        Some((quantity.key(), value?))
+        let quantity = self.axes[axis].quantities()[0];
+        let period = point.fixes_period.map(|(_, value)| value);
+        let value = period.unwrap_or_else(|| point.number(quantity));
+        (quantity.key(), value)
     }
 
     pub fn set_of(&self, point: u64) -> u64 {
@@ -84,7 +79,10 @@ impl Sweep {
 
     /// The set of a job with these canonical parameters, whatever its seed.
     pub fn set_with(&self, parameters: &Parameters) -> Option<u64> {
-        self.find_set(parameters).map(|point| self.set_of(point))
+        let control =
+            || Some(self.point_count() + self.controls.as_ref()?.find_set_in_grid(parameters)?);
+        let point = self.find_set_in_grid(parameters).or_else(control)?;
+        Some(self.set_of(point))
     }
 
     /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ in

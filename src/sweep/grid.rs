@@ -123,13 +123,6 @@ impl Sweep {
         self.find_in_grid(parameters).or_else(control)
     }
 
-    /// Number of the point of a job with these canonical parameters and any seed.
-    pub fn find_set(&self, parameters: &Parameters) -> Option<u64> {
-        let control =
-            || Some(self.point_count() + self.controls.as_ref()?.find_set_in_grid(parameters)?);
-        self.find_set_in_grid(parameters).or_else(control)
-    }
-
     fn find_in_grid(&self, parameters: &Parameters) -> Option<u64> {
         let rows = self.axes.iter().map(|axis| axis.find(parameters));
         let rows: Vec<u64> = rows.collect::<Option<_>>()?;

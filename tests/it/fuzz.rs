@@ -25,7 +25,7 @@ use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::results::tables::{JobRow, PrecursorRow, SlipRow};
 use stickslip::rounds::next;
-use stickslip::run::{Options, Shard, run, status};
+use stickslip::run::{MAX_FAILURES, Options, Shard, join, status};
 use stickslip::sweep::Sweep;
 use stickslip::table::checksum::hexadecimal;
 use stickslip::table::columns::Row;
@@ -215,13 +215,11 @@ static RESULTS: LazyLock<Examples> = LazyLock::new(|| {
         let kernel = |job: &stickslip::sweep::Job, stop: &AtomicBool| {
             measure(&job.parameters, &recording, solver, stop)
         };
-        run(
-            &Layout::new(&Disk, &folder.path().join(name)),
-            &sweep,
-            options,
-            &kernel,
-            &mut |_| (),
-        )
+        let folder = folder.path().join(name);
+        let layout = Layout::new(&Disk, &folder);
+        join(&layout, &sweep, options, |joined| {
+            joined.run(&kernel, &mut |_| ())
+        })
         .unwrap();
     }
     for name in EXAMPLES {
@@ -414,7 +412,7 @@ fn read_all(root: &Path, file: &Path) {
         if file.starts_with(layout.reduced()) {
             let _ = draw_all(&layout, &Look::default(), &Format::ALL);
         } else {
-            let _ = status(&results);
+            let _ = status(&results, MAX_FAILURES);
             let _ = reduce(&results);
         }
     }

@@ -15,9 +15,12 @@ fn marks(root: &Path) -> Vec<String> {
 }
 
 fn marked(root: &Path) -> Vec<Marked> {
-    status(&Results::read(&Layout::new(&Disk, root)).unwrap())
-        .unwrap()
-        .marked
+    status(
+        &Results::read(&Layout::new(&Disk, root)).unwrap(),
+        MAX_FAILURES,
+    )
+    .unwrap()
+    .marked
 }
 
 /// Leaves the marks of this number of deaths at the parts of these numbers.

@@ -1,11 +1,10 @@
 //! Directories of programs of other versions: what is there is read, and nothing is run in them.
 
-use super::{fine, options, run_all, sweep};
+use super::{fine, options, run, run_all, sweep};
 use crate::reduce::{SetRow, read_reduced, reduce};
 use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, Names, PrecursorRow, SlipRow};
 use crate::results::{ErrorKind, Results, of_other_versions};
-use crate::run::run;
 use crate::table::columns::Row;
 use crate::table::file::{Dataset, Footer, TableWriter};
 use crate::table::formats::Format;
