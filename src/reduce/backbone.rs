@@ -1,11 +1,11 @@
 //! The φ-η back-bone: phases pooled in logarithmic bins of η (Fig. 3e).
 
-use super::circular::unit;
-use super::sequence::{Centred, Estimate, add};
+use super::sequence::{Centred, Estimate, add, unit};
 use super::set::FinishedSet;
 use super::top_of_phases;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::table::columns::{columns, tables};
+use crate::table::columns::columns;
+use crate::table::tables;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -109,7 +109,6 @@ fn edge(bin: i32) -> f64 {
     libm::exp10(f64::from(bin) / f64::from(BINS_PER_DECADE))
 }
 
-/// The bin that holds an η > 0.
 fn bin_of(eta: f64) -> i32 {
     #[expect(
         clippy::cast_possible_truncation,

@@ -9,8 +9,7 @@
 //! seen none. Each would change its statistics much, so its intervals allow for some of them (`Unseen`). How much each would
 //! change is a choice by which intervals hold the true value as often as they say: docs/coverage.md.
 
-use super::circular::heading;
-use super::sequence::{Centred, Estimate};
+use super::sequence::{Centred, Estimate, heading};
 use crate::model::standard_normal_quantile;
 use crate::table::columns::Interval;
 use std::f64::consts::PI;
@@ -217,22 +216,15 @@ pub(crate) fn student_at(confidence: f64, freedom: f64) -> f64 {
 /// Integral of cos^(ν-1) from 0 to an angle, by Simpson's rule: with t = √ν tan θ, that of the density of t.
 fn cosine_integral(angle: f64, nu: f64) -> f64 {
     const STEPS: u32 = 32;
-    let step = angle / f64::from(STEPS);
-    let value = |index: u32| libm::pow(libm::cos(f64::from(index) * step), nu - 1.0);
-    simpson(STEPS, step, value)
-}
-
-/// Integral by Simpson's rule of a function that has these values at an even number of steps of this width.
-fn simpson(steps: u32, width: f64, value: impl Fn(u32) -> f64) -> f64 {
-    let weighted = |step| {
-        value(step)
-            * if step == 0 || step == steps {
-                1.0
-            } else {
-                f64::from(2 + 2 * (step % 2))
-            }
+    let width = angle / f64::from(STEPS);
+    let weighted = |step: u32| {
+        let value = libm::pow(libm::cos(f64::from(step) * width), nu - 1.0);
+        match step {
+            0 | STEPS => value,
+            _ => value * f64::from(2 + 2 * (step % 2)),
+        }
     };
-    width / 3.0 * (0..=steps).map(weighted).sum::<f64>()
+    width / 3.0 * (0..=STEPS).map(weighted).sum::<f64>()
 }
 
 /// Standard deviation of intervals about whole numbers of periods, in periods, from which jitter alone puts slips off n.
@@ -305,8 +297,7 @@ impl Tongue {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::circular::unit;
-    use super::super::sequence::Sequences;
+    use super::super::sequence::{Sequences, unit};
     use super::*;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};

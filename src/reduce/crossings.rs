@@ -18,7 +18,8 @@ use crate::model::selected::Selected;
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, Digits, Statistic, label};
 use crate::sweep::{Refinement, Sweep};
-use crate::table::columns::{Interval, columns, tables};
+use crate::table::columns::{Interval, columns};
+use crate::table::tables;
 use crate::table::value::floored;
 use crate::table::value::words;
 use std::collections::BTreeMap;
@@ -80,7 +81,7 @@ impl EdgeRow {
 }
 
 /// A statistic less its threshold, and what each group of seeds adds to it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Sample {
     pub(crate) excess: f64,
     /// Of the mean of independent values: the sums of their deviations from it, over their number.
@@ -111,6 +112,15 @@ impl Sample {
         Some(sample)
     }
 
+    /// Adds another one with a factor.
+    fn add(&mut self, factor: f64, other: &Self) {
+        self.excess += factor * other.excess;
+        for (sum, influence) in self.influences.iter_mut().zip(other.influences) {
+            *sum += factor * influence;
+        }
+        self.concentration = self.concentration.max(other.concentration);
+    }
+
     /// Below the threshold, above it, or equal if that is not clear.
     pub(crate) fn side(&self) -> f64 {
         let variance = product(&self.influences, &self.influences);
@@ -139,7 +149,6 @@ fn product(left: &[f64; GROUPS], right: &[f64; GROUPS]) -> f64 {
 pub struct SetOfEdges {
     pub set_id: String,
     pub parameters: Parameters,
-    /// Seeds that it was given.
     pub seeds: u64,
     /// For each statistic; `None` if it has no value.
     pub samples: Vec<Option<Sample>>,
@@ -276,22 +285,6 @@ impl<'a> Edge<'a> {
     }
 }
 
-/// A sum of samples with factors.
-#[derive(Default)]
-struct Combination {
-    excess: f64,
-    influences: [f64; GROUPS],
-}
-
-impl Combination {
-    fn add(&mut self, factor: f64, sample: &Sample) {
-        self.excess += factor * sample.excess;
-        for (sum, influence) in self.influences.iter_mut().zip(sample.influences) {
-            *sum += factor * influence;
-        }
-    }
-}
-
 /// A line through the samples of sets.
 struct Fit {
     slope: f64,
@@ -308,17 +301,15 @@ fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
     let mean = points().map(|(x, weight)| weight * x).sum::<f64>() / total;
     let moments = points().map(|(x, weight)| weight * (x - mean) * (x - mean));
     let moment: f64 = moments.sum();
-    let mut begin = Combination::default();
-    let mut slope = Combination::default();
-    let mut concentration: f64 = 0.0;
+    let mut begin = Sample::default();
+    let mut slope = Sample::default();
     for (set, (x, weight)) in sets.iter().zip(points()) {
         let of_slope = weight * (x - mean) / moment;
         begin.add(weight / total - mean * of_slope, set.sample);
         slope.add(of_slope, set.sample);
-        concentration = concentration.max(set.sample.concentration);
     }
-    let factor = LOOKS * LOOKS * quantile(concentration);
-    let beyond_error = |left: &Combination, right: &Combination| {
+    let factor = LOOKS * LOOKS * quantile(slope.concentration);
+    let beyond_error = |left: &Sample, right: &Sample| {
         left.excess * right.excess - factor * product(&left.influences, &right.influences)
     };
     // All x at which the line is no more than so many standard deviations away: a + 2 b x + c x² <= 0.
@@ -429,7 +420,6 @@ impl Scale {
     }
 }
 
-/// The table of edges of a directory.
 pub(super) fn edge_rows(
     results: &Results<'_>,
     refinement: &Refinement,

@@ -5,9 +5,8 @@
 //! Phases and intervals of these passages go through the estimators of the slips. What is seen beyond them is due to the
 //! slider: the excess, of pairs of a job and its control.
 
-use super::circular::{Sum, unit};
 use super::confidence::{MIN_VALUES, OF_INTERVALS, OF_PHASES, ROUNDING, Unseen};
-use super::sequence::{Centred, Sequences};
+use super::sequence::{Centred, Sequences, Sum, unit};
 use super::set::{Cycles, FinishedSet};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
@@ -20,7 +19,6 @@ use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
 
 columns! {
-    /// What is read of a slip of a control.
     #[derive(Clone, Copy, Debug)]
     struct Onset {
         onset: f64;
@@ -33,7 +31,6 @@ columns! {
 pub(super) struct Controls(HashMap<String, BTreeMap<u64, Vec<Onset>>>);
 
 impl Controls {
-    /// Reads the slips of the controls of these sets.
     pub(super) fn read<'a>(
         slips: Dataset<'_>,
         plan: Plan<'_>,
@@ -77,7 +74,6 @@ pub(super) struct Explained {
 }
 
 impl Explained {
-    /// Adds to a set what is explained of its jobs.
     pub(super) fn add_to(&self, set: &mut FinishedSet) {
         set.row.is_control = self.is_control;
         let Some(passages) = &self.passages else {
@@ -102,7 +98,6 @@ impl Explained {
     }
 }
 
-/// The phases of passages, by their seeds.
 fn phases_of(
     passages: &BTreeMap<u64, Passage>,
     cycles: Option<Cycles>,

@@ -2,7 +2,6 @@
 //! of τ, and a sample of slips for scatter figures.
 
 mod backbone;
-mod circular;
 mod compare;
 mod confidence;
 mod crossings;
@@ -10,9 +9,7 @@ mod drive_alone;
 mod gather;
 #[cfg(test)]
 mod pool;
-mod reduced;
 mod reduction;
-mod sample;
 mod sequence;
 mod set;
 mod values;
@@ -27,17 +24,16 @@ pub(crate) use confidence::student_at;
 #[cfg(test)]
 pub(crate) use crossings::{Edge, GROUPS, Sample};
 pub use crossings::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
-pub use gather::reduce_chosen;
+pub use gather::{Point, RampStage, reduce_chosen};
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
-pub use reduced::{Renewed, advise, read_reduced, read_sets, renew};
 #[cfg(test)]
 pub(crate) use reduction::RoundOfSet;
 pub(crate) use reduction::WRITER;
 pub use reduction::{
-    HistogramBin, NoJobs, ReductionSummary, SetInRounds, error_over_target, reduce,
+    HistogramBin, NoJobs, ReductionSummary, Renewed, SetInRounds, advise, error_over_target,
+    read_reduced, read_sets, reduce, renew,
 };
-pub use sample::{Point, RampStage};
 pub use sequence::quantile;
 pub use values::{
     Swept, Values, ascending, differing, has_even_steps, is_same, is_spread, sets_where, swept,

@@ -1,26 +1,33 @@
 //! The reduction of a results directory: sets, histograms of τ (Fig. 2), back-bone, points and edges, committed together.
 //! Sets stand in the order of their parameters, so the same tables give the same bytes. Sets of an adaptive sweep have
 //! further columns: the rounds in which a set ran, and whether it is as precise as is wanted.
+//!
+//! Reduced data are up to date by the content of the tables that they were made from, as a copied folder has other times.
 
 use super::backbone::{Backbone, BackboneBin};
 use super::crossings::{EdgeRow, edge_rows};
-use super::gather::{Gathering, MAX_SLIPS};
-use super::reduced::{SOURCE, source};
-use super::sample::spacing;
+use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
-use crate::results::{Results, ResultsError};
+use crate::results::{ErrorKind, Results, ResultsError};
 use crate::sets::SetRow;
 use crate::sweep::{Goal, Precision, Sweep, Target};
-use crate::table::columns::{Row, Table, columns, tables};
-use crate::table::file::{Footer, TableWriter};
+use crate::table::checksum::hexadecimal;
+use crate::table::columns::{FromRow, Row, columns};
+use crate::table::file::{DataFile, Dataset, Footer, TableWriter};
 use crate::table::shown::shown;
+use crate::table::storage::StorageError;
+use crate::table::{Table, tables};
 use anyhow::{Result, bail};
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::io;
+use std::ops::Deref;
 use std::path::PathBuf;
+use tempfile::TempDir;
 
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
 pub const WRITER: &str = "reduce";
@@ -31,11 +38,9 @@ pub const WRITER: &str = "reduce";
     shown(tables)
 )]
 pub struct NoJobs {
-    /// Folder of the jobs table.
     tables: PathBuf,
 }
 
-/// What a reduction found, in brief.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReductionSummary {
     /// Jobs run to an end.
@@ -150,10 +155,9 @@ impl Staged<'_, '_> {
     ) -> Result<TableWriter<R>, ResultsError> {
         let file = self.layout.reduced_file(R::NAME);
         let footer = self.footer.clone().at(&file);
-        TableWriter::without(left_out, self.commit.stage(&file)?, &footer)
+        TableWriter::new(left_out, self.commit.stage(&file)?, &footer)
     }
 
-    /// Writes a whole table.
     fn write<R: Table>(&mut self, rows: impl IntoIterator<Item = R>) -> Result<(), ResultsError> {
         let mut writer = self.begin(&[])?;
         for row in rows {
@@ -164,7 +168,6 @@ impl Staged<'_, '_> {
 }
 
 columns! {
-    /// How a set came about.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct RoundOfSet {
         first_round: Option<u64> = "", "round in which the set began, from 1; null if the present sweep has not chosen it";
@@ -179,7 +182,6 @@ tables! {
     RoundOfSet = "sets of a sweep in rounds", "Further columns of `sets`, if the sweep has `[precision]` or `[refine]`";
 }
 
-/// A set of a sweep in rounds.
 pub type SetInRounds = (SetRow, RoundOfSet);
 
 tables! { SetInRounds = SetRow::NAME, SetRow::MEANING; }
@@ -294,6 +296,120 @@ pub(super) fn histogram(set: &SetRow, sorted: &[f64]) -> Vec<HistogramBin> {
     bins.map(row).collect()
 }
 
+/// The footer's key of the source.
+const SOURCE: &str = "reduced_from";
+
+/// A checksum of all sweeps of a directory, and of names and sizes of the committed files of jobs.
+fn source(results: &Results<'_>) -> Result<String, ResultsError> {
+    let mut digest = Sha256::new();
+    // All: which sets are controls follows from them.
+    for sweep in results.plan().sweeps() {
+        digest.update(sweep.text());
+    }
+    for path in results.dataset(JOBS)?.files() {
+        digest.update(path.file_name().unwrap_or_default().as_encoded_bytes());
+        digest.update(results.layout().storage.length(path)?.to_le_bytes());
+    }
+    Ok(hexadecimal(&digest.finalize()))
+}
+
+/// A directory whose reduced data are up to date. If nothing can be written there, they lie elsewhere as long as this lives.
+pub struct Renewed<'a> {
+    results: Results<'a>,
+    _elsewhere: Option<TempDir>,
+}
+
+impl<'a> Deref for Renewed<'a> {
+    type Target = Results<'a>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.results
+    }
+}
+
+/// Reduces the tables if the reduced data are out of date, and there are tables.
+pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
+    let renewed = Renewed {
+        results: results.clone(),
+        _elsewhere: None,
+    };
+    let layout = results.layout();
+    let is_there = layout.storage.exists(&layout.reduced_file(SetRow::NAME))?;
+    if is_there && !layout.storage.exists(&layout.table(JOBS))? {
+        return Ok(renewed);
+    }
+    let source = Footer::empty().with(SOURCE, &source(results)?);
+    let is_current = |table| {
+        let file = DataFile::with_footer(layout.reduced_file(table), source.clone());
+        file.check(layout.storage).is_ok()
+    };
+    if is_current(SetRow::NAME)
+        && is_current(HistogramBin::NAME)
+        && is_current(BackboneBin::NAME)
+        && is_current(Point::NAME)
+    {
+        return Ok(renewed);
+    }
+    match reduce(results) {
+        Ok(_) => Ok(renewed),
+        Err(error) if is_read_only(&error) => {
+            let elsewhere = tempfile::tempdir()?;
+            let results = results.reduced_to(elsewhere.path());
+            reduce(&results)?;
+            Ok(Renewed {
+                results,
+                _elsewhere: Some(elsewhere),
+            })
+        }
+        Err(error) if is_there => Err(error.context("the reduced data are out of date")),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether something failed because writing is not permitted.
+fn is_read_only(error: &anyhow::Error) -> bool {
+    let of_storage = error.downcast_ref().map(StorageError::kind);
+    let of_results = error.downcast_ref().map(|error: &ResultsError| error.kind);
+    let kind = of_storage.map(ErrorKind::Disk).or(of_results);
+    let Some(ErrorKind::Disk(kind)) = kind else {
+        return false;
+    };
+    matches!(
+        kind,
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
+    )
+}
+
+/// An error of a table, with what to do.
+pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
+    move |error| {
+        let advised = format!("{error}; {advice}");
+        anyhow::Error::new(error).context(advised)
+    }
+}
+
+/// The rows of a reduced table, such as [`Point`].
+pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
+    let file = layout.reduced_file(R::NAME);
+    let batches = Dataset::new(layout.storage, vec![file]).rows();
+    let batches: Vec<Vec<R>> = batches.collect::<Result<_, _>>()?;
+    Ok(batches.into_iter().flatten().collect())
+}
+
+/// The sets with at least one interval or a regime, controls left out, in order; empty if there are more than `max`.
+pub fn read_sets(layout: &Layout<'_>, max: usize) -> Result<Vec<SetRow>, ResultsError> {
+    let mut sets = Vec::new();
+    let file = layout.reduced_file(SetRow::NAME);
+    for batch in Dataset::new(layout.storage, vec![file]).rows::<SetRow>() {
+        let rows = batch?.into_iter().filter(|row| !row.is_control);
+        sets.extend(rows.filter(|row| row.intervals > 0 || row.regime.is_some()));
+        if sets.len() > max {
+            return Ok(Vec::new());
+        }
+    }
+    Ok(sets)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::read_reduced;
@@ -305,7 +421,7 @@ mod tests {
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{
-        DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, SlipRow, relabel,
+        All, DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, SlipRow,
     };
     use crate::results::workers::tests::open;
     use crate::solver::Summary;
@@ -396,7 +512,7 @@ mod tests {
             let path = layout.table("slips").join(&name);
             let file = Disk.create(&path).unwrap();
             let mut slip_writer =
-                TableWriter::<SlipRow<'_>>::new(file, &Footer::default()).unwrap();
+                TableWriter::<SlipRow<'_>>::new(&[], file, &Footer::default()).unwrap();
             let labels: Vec<JobLabel<DriveAndSeed>> = (0..3)
                 .map(|set| label(set, seed, [0.0, 1e-6, 2e-6][set as usize]))
                 .collect();
@@ -414,7 +530,16 @@ mod tests {
             if part < 2 {
                 let path = layout.table("jobs").join(&name);
                 let file = Disk.create(&path).unwrap();
-                let mut job_writer = TableWriter::<JobRow>::new(file, &Footer::default()).unwrap();
+                let mut job_writer =
+                    TableWriter::<JobRow>::new(&[], file, &Footer::default()).unwrap();
+                let relabel = |(names, selected, loading): &JobLabel<DriveAndSeed>| {
+                    let label: JobLabel<All> = (
+                        names.clone(),
+                        Selected::new(selected.parameters.clone()),
+                        *loading,
+                    );
+                    label
+                };
                 for (job, result) in labels.iter().zip(&measured) {
                     job_writer
                         .push(&(relabel(job), JobRecord::new(Ok(result))))

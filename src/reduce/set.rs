@@ -1,9 +1,8 @@
 //! The table of sets, a row for each with all seeds together: what the jobs table says (outcomes, averages over the time of
 //! each job), and from the slips, statistics of intervals, locking and phases.
 
-use super::circular::unit;
 use super::confidence::{OF_INTERVALS, OF_PHASES, Tongue};
-use super::sequence::{Centred, Estimate, Sequences, at_rank};
+use super::sequence::{Centred, Estimate, Sequences, at_rank, unit};
 use super::top_of_phases;
 use crate::model::Parameters;
 use crate::model::selected::Selected;
@@ -20,13 +19,13 @@ const WHOLE_TURN: f64 = 1.5 * PI;
 
 /// The numbers of a slip that are kept until its set is complete. Missing values are NaN, so that a slip takes 48 bytes.
 #[derive(Clone, Copy, Debug)]
-struct SlipStats {
+pub(super) struct SlipStats {
     onset: f64,
     /// Interval before it, in s.
-    interval: f64,
+    pub(super) interval: f64,
     /// The interval in periods of the modulation at its end.
     periods: f64,
-    phase: f64,
+    pub(super) phase: f64,
     /// In N.
     peak_force: f64,
     /// Stress drop, in N.
@@ -49,8 +48,7 @@ impl SlipStats {
     }
 }
 
-/// A value that is not missing.
-fn non_nan(value: f64) -> Option<f64> {
+pub(super) fn non_nan(value: f64) -> Option<f64> {
     (!value.is_nan()).then_some(value)
 }
 
@@ -65,6 +63,10 @@ impl SetSlips {
     pub(super) fn push(&mut self, seed: u64, slip: &Slip) {
         let job = self.jobs.entry(seed).or_default();
         job.push(SlipStats::of(slip));
+    }
+
+    pub(super) fn of_job(&self, seed: u64) -> &[SlipStats] {
+        self.jobs.get(&seed).map_or(&[], Vec::as_slice)
     }
 
     /// Leaves the slips of other seeds out.
@@ -111,7 +113,6 @@ impl SetSlips {
     }
 }
 
-/// Stress drops and peak forces.
 fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) {
     let drops = estimate(jobs, |slip| Some([slip.drop]));
     // A longer interval ends at a force that is higher by the additional drop.

@@ -58,7 +58,6 @@ impl Values {
         })
     }
 
-    /// Adds the value of a set, and the ends of its interval.
     pub(super) fn push(&mut self, number: Option<f64>, interval: Option<(f64, f64)>) {
         self.numbers.push(number);
         self.intervals.push(interval);
@@ -103,7 +102,6 @@ impl Values {
         matches!(self.column.kind, Kind::Text | Kind::Flag)
     }
 
-    /// The word of a value.
     pub fn word(&self, value: f64) -> Option<&str> {
         self.words.get(floored(value)).map(String::as_str)
     }
@@ -142,7 +140,6 @@ impl Values {
     }
 }
 
-/// The word of a cell that holds one.
 fn word(cell: Value<'_>) -> Option<String> {
     match cell {
         Value::Flag(flag) => Some(if flag { "yes" } else { "no" }.to_owned()),

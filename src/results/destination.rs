@@ -57,7 +57,6 @@ impl Kind {
     }
 }
 
-/// Where a command writes a file.
 #[derive(Debug)]
 pub struct Destination {
     path: PathBuf,

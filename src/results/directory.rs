@@ -174,7 +174,6 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Whether this is the current sweep.
     pub(super) fn is_of(&self, sweep: &Sweep) -> bool {
         self.extensions
             .last()
@@ -289,7 +288,6 @@ impl<'a> Results<'a> {
         Ok(parts)
     }
 
-    /// The files of all parts in a table.
     pub fn dataset(&self, table: &str) -> Result<Dataset<'a>, ResultsError> {
         let tables = self.layout.tables();
         let parts = self.parts_of(table)?.into_iter();

@@ -28,7 +28,6 @@ use std::time::{Duration, Instant};
 
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
-/// Default folder of results directories.
 const RESULTS: &str = "results";
 pub const RUN_FOLDERS: [&str; 8] = [
     "staging", "lock", "log", "workers", "claims", "spill", "batch", "deaths",
@@ -118,7 +117,6 @@ impl<'a> Layout<'a> {
         Ok(names)
     }
 
-    /// The parts that have a file in a folder.
     pub(super) fn parts_in(&self, folder: &Path) -> Result<BTreeSet<PartName>, StorageError> {
         let names = self.names_in(folder)?.into_iter();
         Ok(names
@@ -237,7 +235,6 @@ places! {
     tables = "tables";
     figures = "figures";
     report = "report.html";
-    /// Everything that is no result.
     run = RUN;
     claims = "run/claims";
     /// The parts that dead workers were at.
@@ -280,7 +277,6 @@ impl fmt::Display for PartName {
     }
 }
 
-/// A duration that is shorter in tests.
 pub const fn shorter_in_tests(usual: Duration, in_tests: Duration) -> Duration {
     if cfg!(test) { in_tests } else { usual }
 }

@@ -3,8 +3,8 @@
 //! The log is lines of JSON in `run/log/`, one file for each run, so that no two hosts write into one file. Tables never
 //! depend on it.
 
+use crate::results::claims::Marked;
 use crate::results::commit::own_number;
-use crate::results::deaths::Marked;
 use crate::results::directory::Results;
 use crate::results::layout::is_hidden;
 use crate::results::next_round::RoundsSoFar;
@@ -31,7 +31,6 @@ pub enum RunEvent {
         jobs_there: u64,
         predicted_cost: f64,
     },
-    /// The next round of an adaptive sweep has begun.
     RoundBegun {
         jobs: u64,
         predicted_cost: f64,
@@ -80,7 +79,6 @@ pub enum RunEvent {
     Stopping,
     /// Not all parts would end in time; those that have begun do.
     OutOfTime,
-    /// The run ends by itself.
     Finished(RunReport),
     Error {
         error: String,

@@ -9,11 +9,12 @@ use crate::results::commit::Commit;
 use crate::results::directory::Results;
 use crate::results::tables::{
     self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
-    label, relabel,
+    label,
 };
 use crate::results::workers::Member;
 use crate::sweep::{Outline, Part, PartName};
-use crate::table::columns::{Table, columns};
+use crate::table::Table;
+use crate::table::columns::columns;
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
 use crate::table::storage::StorageError;
@@ -125,11 +126,12 @@ impl<'a> Results<'a> {
         places: (Option<&PathBuf>, &PathBuf),
     ) -> Result<(), ResultsError> {
         let sweep = &self.extensions()[part.name.extension].sweep;
-        let label = |position: usize| label(sweep, &part.jobs[position].parameters);
         let positions = (0..part.jobs.len()).filter(is_written);
-        let jobs: Jobs<'_> = positions
-            .map(|position| (label(position), outcomes.get(&position)))
-            .collect();
+        let job = |position: usize| {
+            let parameters = &part.jobs[position].parameters;
+            (label(sweep, parameters), outcomes.get(&position))
+        };
+        let jobs: Jobs<'_> = positions.map(job).collect();
         let mut commit = member.commit();
         self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             let mut slips = outcome.iter().flat_map(|measured| &measured.slips);
@@ -149,7 +151,7 @@ impl<'a> Results<'a> {
         }
         self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
-            writer.push(&(relabel(job), record))
+            writer.push(&(label(sweep, &job.1.parameters), record))
         })?;
         self.publish(commit)
     }
@@ -181,7 +183,7 @@ impl<'a> Results<'a> {
         let sweep = &self.extensions()[part.name.extension].sweep;
         let left_out = sweep.recording().left_out();
         let footer = self.footer(part.name.extension, &target);
-        let mut writer = TableWriter::without(&left_out, commit.stage(&target)?, &footer)?;
+        let mut writer = TableWriter::new(&left_out, commit.stage(&target)?, &footer)?;
         for (job, outcome) in jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,

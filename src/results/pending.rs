@@ -10,7 +10,7 @@
 //!
 //! Which worker runs it is decided in `claims.rs` and `run/take.rs`.
 
-use crate::results::deaths::{Deaths, Marked};
+use crate::results::claims::{Deaths, Marked};
 use crate::results::directory::Results;
 use crate::results::layout::settled;
 use crate::results::tables::{self, JobOutcome, RowOfJob};
@@ -52,7 +52,6 @@ pub struct Overview {
 /// Why a job of a finished part may run again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Again {
-    /// It failed, for this reason.
     Failed(String),
     /// A shorter `max_time` than the present one ended it.
     CutOff,
@@ -204,7 +203,6 @@ impl<'a> Pending<'a> {
         Ok(overview)
     }
 
-    /// Counts an unfinished part.
     fn count_missing(&self, part: &Outline, overview: &mut Overview) -> Result<(), ResultsError> {
         let spilled = self.spilled(part)?;
         let mut spilled_cost = 0.0;

@@ -29,7 +29,6 @@ pub struct Verification {
     pub problems: Vec<Problem>,
     /// Other files among tables and reduced data, which no command reads: paths, as messages show them.
     pub passed_over: Vec<String>,
-    /// Table files that are intact.
     pub files: u64,
     pub bytes: u64,
     /// Parts that are done and intact.

@@ -240,7 +240,6 @@ impl Layout<'_> {
         Ok(living)
     }
 
-    /// The text of a worker's file, and when it was written.
     fn read_beat(&self, path: &Path) -> Result<(Vec<u8>, SystemTime), StorageError> {
         let read = || Ok((self.storage.read(path)?, self.storage.modified(path)?));
         read().or_else(|error: StorageError| match error.kind() {

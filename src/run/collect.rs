@@ -43,11 +43,9 @@ struct JobTime {
     wall: f64,
 }
 
-/// A job that a thread runs.
 struct UnderWay {
     job: PartJob,
     begin: Instant,
-    /// When it counts as long.
     long_after: Duration,
 }
 
@@ -60,9 +58,18 @@ struct Out {
     jobs: usize,
     cost: f64,
     memory: f64,
+    /// Memory that all jobs together may take, in bytes.
+    free: f64,
+    /// Whether it has been reported that memory limits the jobs.
+    was_short: bool,
 }
 
 impl Out {
+    fn has_room(&self, threads: usize) -> bool {
+        self.jobs < threads
+            || (self.jobs < threads * MAX_AHEAD && self.cost < threads as f64 * AHEAD)
+    }
+
     fn add(&mut self, job: &PartJob) {
         self.jobs += 1;
         self.cost += job.job().cost;
@@ -75,7 +82,8 @@ impl Out {
         self.memory -= job.memory;
         if self.jobs == 0 {
             // Without rounding errors, or what infinity leaves.
-            *self = Self::default();
+            self.cost = 0.0;
+            self.memory = 0.0;
         }
     }
 }
@@ -186,10 +194,11 @@ impl<'a, 'e> Collector<'a, 'e> {
         under_way: &AllUnderWay,
         interrupt: &AtomicBool,
     ) -> Result<bool, ResultsError> {
-        let mut out = Out::default();
-        let mut free = self.joined.memory();
+        let mut out = Out {
+            free: self.joined.memory(),
+            ..Out::default()
+        };
         let mut is_out_of_time = false;
-        let mut is_short_of_memory = false;
         let [mut last_tick, mut last_look] = [Instant::now(); 2];
         loop {
             if last_look.elapsed() >= LOOK_AT_OTHERS {
@@ -198,7 +207,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             }
             if last_tick.elapsed() >= TICK {
                 last_tick = Instant::now();
-                free = self.joined.memory();
+                out.free = self.joined.memory();
                 self.report_long_jobs(under_way)?;
                 self.events.send(&RunEvent::Tick)?;
             }
@@ -206,34 +215,8 @@ impl<'a, 'e> Collector<'a, 'e> {
                 self.events.send(&RunEvent::Stopping)?;
             }
             let is_interrupted = interrupt.load(Ordering::Relaxed);
-            let has_room = |out: &Out| {
-                out.jobs < threads
-                    || (out.jobs < threads * MAX_AHEAD && out.cost < threads as f64 * AHEAD)
-            };
-            while !is_interrupted
-                && !self.joined.must_end()
-                && has_room(&out)
-                && let Some(job) = work.next(out.jobs > 0, out.jobs >= threads)?
-            {
-                if let Some(reason) = self.pending.refusal(job.job()) {
-                    self.take(&job, Err(reason), JobTime::default())?;
-                    continue;
-                }
-                if out.memory + limits::beside_threads(job.memory, threads) > free {
-                    let is_limit = out.jobs < threads && job.memory.is_finite();
-                    if is_limit && !std::mem::replace(&mut is_short_of_memory, true) {
-                        let allowed = free - out.memory;
-                        let needed = job.memory;
-                        self.events
-                            .send(&RunEvent::ShortOfMemory { allowed, needed })?;
-                    }
-                    if out.jobs > 0 {
-                        work.put_back(job);
-                        break;
-                    }
-                }
-                out.add(&job);
-                hand_out(job);
+            if !is_interrupted {
+                self.fill(&mut out, &mut work, threads, &hand_out)?;
             }
             if !is_out_of_time && self.joined.walltime.has_refused() {
                 is_out_of_time = true;
@@ -250,6 +233,41 @@ impl<'a, 'e> Collector<'a, 'e> {
                 }
             }
         }
+    }
+
+    /// Hands out jobs as long as threads wait for them and memory is free.
+    fn fill(
+        &mut self,
+        out: &mut Out,
+        work: &mut Work<'_>,
+        threads: usize,
+        hand_out: &impl Fn(PartJob),
+    ) -> Result<(), ResultsError> {
+        while !self.joined.must_end()
+            && out.has_room(threads)
+            && let Some(job) = work.next(out.jobs > 0, out.jobs >= threads)?
+        {
+            if let Some(reason) = self.pending.refusal(job.job()) {
+                self.take(&job, Err(reason), JobTime::default())?;
+                continue;
+            }
+            if out.memory + limits::beside_threads(job.memory, threads) > out.free {
+                let is_limit = out.jobs < threads && job.memory.is_finite();
+                if is_limit && !std::mem::replace(&mut out.was_short, true) {
+                    self.events.send(&RunEvent::ShortOfMemory {
+                        allowed: out.free - out.memory,
+                        needed: job.memory,
+                    })?;
+                }
+                if out.jobs > 0 {
+                    work.put_back(job);
+                    break;
+                }
+            }
+            out.add(&job);
+            hand_out(job);
+        }
+        Ok(())
     }
 
     fn report_long_jobs(&mut self, under_way: &AllUnderWay) -> Result<(), ResultsError> {

@@ -27,13 +27,12 @@ const VARIABLES: [&str; 5] = [
 /// Most threads of one process. Starting more would take minutes, in which no signal stops a run.
 pub const MAX_THREADS: usize = 1024;
 
-/// A bad number of threads.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ThreadsError(String);
 
 /// A number of threads, and where it is from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Threads {
     /// `None`: one for each core.
     pub count: Option<NonZeroUsize>,
@@ -72,10 +71,7 @@ impl Threads {
                 variable: Some(variable),
             });
         }
-        Ok(Self {
-            count: None,
-            variable: None,
-        })
+        Ok(Self::default())
     }
 }
 
@@ -86,7 +82,6 @@ pub fn or_all_cores(count: Option<NonZeroUsize>) -> usize {
         .map_or(1, NonZeroUsize::get)
 }
 
-/// A number of threads, as a flag has it.
 pub fn parse_threads(text: &str) -> Result<NonZeroUsize, String> {
     let count = text
         .parse()

@@ -14,7 +14,6 @@
 
 mod collect;
 pub mod limits;
-mod shard;
 mod state;
 mod take;
 #[cfg(test)]
@@ -22,8 +21,8 @@ mod tests;
 
 pub use crate::results::log::{RunEvent, RunReport};
 pub use crate::results::pending::Overview;
-pub use shard::Shard;
 pub use state::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status};
+pub use take::Shard;
 
 use crate::observe::Measurements;
 use crate::results::claims::{ClaimState, Claims};
@@ -59,9 +58,7 @@ pub struct Options<'a> {
     pub threads: Option<NonZeroUsize>,
     /// Ends the run when it turns true: jobs in flight are interrupted, whole parts are kept.
     pub stop: &'a AtomicBool,
-    /// Whether to run failed jobs again.
     pub retry_failed: bool,
-    /// The share of the parts to run.
     pub shard: Shard,
     /// Ends within this time after the run's beginning, and takes no part for which it is too short.
     pub walltime: Option<Duration>,

@@ -1,6 +1,6 @@
 //! How far a directory is, and how far a run is: jobs done and missing, failures by reason, time left.
 
-use crate::results::deaths::Marked;
+use crate::results::claims::Marked;
 use crate::results::log::RunEvent;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::pending::{Again, Overview, Pending, Retry};

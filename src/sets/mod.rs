@@ -8,7 +8,8 @@ pub use label::{Digits, Label, capitalised, first_clause, label, power_of_ten, s
 use crate::model::Symbol;
 use crate::model::selected::{Selected, Selection};
 use crate::observe::Regime;
-use crate::table::columns::{Column, Interval, Kind, Row, columns, tables};
+use crate::table::columns::{Column, Interval, Kind, Row, columns};
+use crate::table::tables;
 use std::borrow::Cow;
 use std::sync::LazyLock;
 

@@ -18,7 +18,6 @@ impl Sweep {
         self.rounds.as_ref()
     }
 
-    /// Where it looks for edges, if it does.
     pub fn refinement(&self) -> Option<&Refinement> {
         match &self.rounds.as_ref()?.goal {
             Goal::Edges(refinement) => Some(refinement),
@@ -32,7 +31,6 @@ impl Sweep {
         axes.position(|axis| axis.quantities() == [Quantity::SEED])
     }
 
-    /// Number of seeds of a set in the grid.
     pub fn seed_count(&self) -> u64 {
         self.seed_axis().map_or(1, |axis| self.axes[axis].len())
     }
@@ -50,7 +48,6 @@ impl Sweep {
         rows
     }
 
-    /// The number of rows of each axis.
     pub fn row_counts(&self) -> Vec<u64> {
         self.axes.iter().map(Axis::len).collect()
     }
@@ -151,7 +148,6 @@ impl Sweep {
         })
     }
 
-    /// The first round; `None` for a sweep without.
     pub fn first_round(&self) -> Option<Round> {
         let seeds = *self.rounds.as_ref()?.seeds.start();
         let sets = self.first_sets();

@@ -1,7 +1,7 @@
 //! Axes: rows of values that move together, and the look-up of a row by the parameters that it leads to.
 //!
 //! A grid axis has one column, a zip or a sample several. The points of a sweep are all combinations of one row of each
-//! axis. Contract: no two rows of an axis are equal, and the values of a column that differ are no twins (`twins.rs`), so
+//! axis. Contract: no two rows of an axis are equal, and the values of a column that differ are no twins (`checks.rs`), so
 //! that two points lead to the same parameters only where both are without modulation and differ in nothing but what fixes
 //! the period. Of such points the first counts: the row that [`Axis::is_first`].
 //!

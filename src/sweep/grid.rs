@@ -32,11 +32,9 @@ pub struct Sweep {
     pub(super) solver: Solver,
     pub(super) identity: Identity,
     pub(super) rounds: Option<Rounds>,
-    /// The sweep of its controls; see `controls.rs`.
     pub(super) controls: Option<Box<Self>>,
     /// In a sweep of controls, the sets that are run, in order; `None`: all.
     pub(super) needed: Option<Vec<u64>>,
-    /// The version of the plan by which it is read.
     pub(super) plan_version: u32,
 }
 
@@ -85,7 +83,8 @@ impl Sweep {
     }
 
     /// The jobs in grid order, then their controls.
-    pub fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
+    #[cfg(test)]
+    pub(crate) fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
         self.jobs_at(self.points())
     }
 
@@ -149,7 +148,6 @@ impl Sweep {
         jobs.find_map(|job| self.find_in_grid(&job))
     }
 
-    /// Whether a condition reads the seed.
     pub(super) fn reads_seed(&self) -> bool {
         let mut names = self.conditions.iter().flat_map(Expression::names);
         names.any(|name| *name == Quantity::SEED)

@@ -72,7 +72,6 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// The identity of jobs with this solver and recording.
     pub fn new(solver: Solver, recording: &Recording) -> Self {
         Self::of_versions(MODEL_VERSION, RNG_SCHEME, solver, recording)
     }

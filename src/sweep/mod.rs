@@ -7,7 +7,6 @@
 //! checks.rs      expression.rs
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: an adaptive sweep, which runs in rounds
-//! twins.rs: values that differ in the last digits alone
 //! variation.rs: a file with other values, as text
 //! ```
 //!
@@ -32,7 +31,6 @@ mod rounds;
 mod source;
 #[cfg(test)]
 mod tests;
-mod twins;
 mod variation;
 
 pub use cost::{LARGE, certain_memory, predicted_cost, predicted_memory};

@@ -75,7 +75,6 @@ pub struct Outline {
 /// Consecutive jobs of an extension.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// What is known of it without its jobs.
     pub outline: Outline,
     /// Its jobs, in plan order. At least one.
     pub jobs: Vec<Job>,
@@ -89,7 +88,6 @@ impl Deref for Part {
     }
 }
 
-/// The sums of a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
     pub jobs: u64,
@@ -138,7 +136,6 @@ impl Extension {
             .collect()
     }
 
-    /// Whether it keeps a point of its grid.
     fn keeps(&self, point: u64) -> bool {
         self.kept.as_ref().is_none_or(|kept| contains(kept, point))
             && self.round.as_ref().is_none_or(|round| round.has(point))
@@ -173,7 +170,6 @@ impl<'a> Plan<'a> {
         sweeps.filter_map(|rounds| Some(&rounds.first()?.sweep))
     }
 
-    /// The parts of an extension, in order.
     pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
         let own = &self.extensions[extension];
         let earlier = &self.extensions[..extension];
@@ -206,7 +202,6 @@ impl<'a> Plan<'a> {
         parts.filter(|part| own.keeps(*part.points.start()))
     }
 
-    /// The parts of all extensions, in order.
     pub fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
         (0..self.extensions.len()).flat_map(move |extension| self.parts_of(extension))
     }

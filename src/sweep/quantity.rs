@@ -66,7 +66,6 @@ impl Quantity {
         )
     }
 
-    /// Whether it belongs to the modulation.
     pub const fn is_of_modulation(self) -> bool {
         match self {
             Self::Parameter(symbol) => symbol.is_of_modulation(),
@@ -85,7 +84,6 @@ impl Quantity {
         }
     }
 
-    /// Whether it takes whole numbers only.
     pub fn is_count(self) -> bool {
         matches!(self, Self::Parameter(symbol) if symbol.description().kind == Kind::Count)
     }

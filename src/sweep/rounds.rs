@@ -44,7 +44,6 @@ impl Rounds {
 pub struct Precision {
     /// At least one, each with an interval.
     pub statistics: Vec<Statistic>,
-    /// Largest half-width of their intervals.
     pub target: Target,
 }
 
@@ -121,7 +120,6 @@ impl Round {
         self
     }
 
-    /// Whether the rounds are over.
     pub const fn is_end(&self) -> bool {
         self.points.is_empty()
     }

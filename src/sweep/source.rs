@@ -17,7 +17,6 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A sweep file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     #[error(

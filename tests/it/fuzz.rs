@@ -338,8 +338,7 @@ fn write_nonsense<R: Row>(path: &Path, column: Index, row: Index, value: Index) 
         .filter(is_left_out)
         .collect();
     Disk.remove(path).unwrap();
-    let mut writer =
-        TableWriter::<R>::without(&left_out, Disk.create(path).unwrap(), &footer).unwrap();
+    let mut writer = TableWriter::<R>::new(&left_out, Disk.create(path).unwrap(), &footer).unwrap();
     for Batch { path, rows } in batches
         .into_iter()
         .filter(|batch| batch.rows.num_rows() > 0)
@@ -474,7 +473,7 @@ proptest! {
             Err(error) => prop_assert!(error.to_string().starts_with("fuzzed.toml"), "{}", error),
             Ok(sweep) => {
                 // What is admitted can be planned: the first jobs have ids and are found again.
-                for job in sweep.jobs().take(20) {
+                for job in sweep.jobs_of_grid().take(20) {
                     prop_assert!(sweep.contains(&job.parameters));
                     prop_assert!(job.cost.is_finite() && job.cost >= 0.0, "{}", job.cost);
                     prop_assert_eq!(sweep.job_id(&job.parameters).len(), 32);

@@ -1,7 +1,7 @@
 //! Parts at which workers died, and jobs that memory forbids.
 
 use super::*;
-use crate::results::deaths::Marked;
+use crate::results::claims::Marked;
 use crate::results::pending::{Pending, Retry};
 use crate::results::workers::tests::lose;
 use crate::sweep::Part;

@@ -50,7 +50,7 @@ fn write_again<R: Row>(file: &Path, results: &Results<'_>) {
         .collect();
     fs::remove_file(file).unwrap();
     let created = Disk.create(file).unwrap();
-    let mut writer = TableWriter::<R>::without(&left_out, created, &Footer::default()).unwrap();
+    let mut writer = TableWriter::<R>::new(&left_out, created, &Footer::default()).unwrap();
     for batch in &batches {
         writer.copy(batch, 0..batch.rows.num_rows()).unwrap();
     }
