@@ -4,7 +4,7 @@
 //! Values are those of the table of sets, of the jobs with seeds that both have. The error of a difference is that of a mean
 //! over these seeds, of what each adds to it: the jackknife to first order, in a time proportional to the number of slips.
 
-use super::gather::{Gathered, Gathering, MAX_SLIPS, each_job};
+use super::gather::{Gathered, Gathering, MAX_SLIPS, by_parameters, each_job};
 use super::sequence::{Sequences, Sum, unit};
 use super::set::non_nan;
 use super::values::Values;
@@ -13,7 +13,6 @@ use crate::results::tables::{JOBS, JobOutcome};
 use crate::results::{Results, ResultsError};
 use crate::sets::{FREQUENCY, SetRow};
 use crate::table::columns::{Interval, Kind};
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Sums of a job, whose means are the statistics.
@@ -58,11 +57,7 @@ fn sets_of(results: &Results<'_>) -> Result<Vec<Set>, ResultsError> {
         set.seeds.insert(seed);
     })?;
     let mut sets: Vec<Set> = sets.into_values().collect();
-    sets.sort_by(|left, right| {
-        let key = |set: &Set| Symbol::ALL.map(|symbol| set.parameters.get(symbol));
-        let order = key(left).partial_cmp(&key(right));
-        order.unwrap_or(Ordering::Equal)
-    });
+    sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
     Ok(sets)
 }
 

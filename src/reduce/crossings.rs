@@ -352,41 +352,36 @@ pub fn lines<'a>(
         };
         floored((LARGEST_SHARE * value / scale.step).clamp(1.0, WINDOW)) as u64
     };
-    let line = |rows: &Vec<u64>, sets: &Vec<(u64, &'a SetOfEdges)>, statistic: usize| {
-        // Without a value, a set says nothing.
-        let sample = |&(row, set): &(u64, &'a SetOfEdges)| {
-            let sample = set.samples.get(statistic)?.as_ref()?;
-            Some(Placed {
-                row,
-                side: sample.side(),
-                sample,
-                set,
-            })
-        };
-        let known: Vec<Placed<'_>> = sets.iter().filter_map(sample).collect();
-        let mut clear: Vec<usize> = (0..known.len()).collect();
-        clear.retain(|&index| known[index].side != 0.0);
-        let is_opposite = |pair: &&[usize]| known[pair[0]].side != known[pair[1]].side;
-        let opposite = clear.windows(2).filter(is_opposite);
-        let edges = opposite
-            .filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window))
-            .collect();
-        Line {
-            rows: rows.clone(),
-            statistic: refinement.by[statistic],
-            sets: sets.clone(),
-            edges,
+    let mut lines = Vec::new();
+    for (rows, sets) in &rows_of {
+        for (number, &statistic) in refinement.by.iter().enumerate() {
+            // Without a value, a set says nothing.
+            let placed = |&(row, set): &(u64, &'a SetOfEdges)| {
+                let sample = set.samples.get(number)?.as_ref()?;
+                Some(Placed {
+                    row,
+                    side: sample.side(),
+                    sample,
+                    set,
+                })
+            };
+            let known: Vec<Placed<'_>> = sets.iter().filter_map(placed).collect();
+            let is_clear = |index: &usize| known[*index].side != 0.0;
+            let clear: Vec<usize> = (0..known.len()).filter(is_clear).collect();
+            let opposite = clear
+                .windows(2)
+                .filter(|pair| known[pair[0]].side != known[pair[1]].side);
+            let edges = opposite
+                .filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window));
+            lines.push(Line {
+                rows: rows.clone(),
+                statistic,
+                sets: sets.clone(),
+                edges: edges.collect(),
+            });
         }
-    };
-    let statistics = 0..refinement.by.len();
-    rows_of
-        .iter()
-        .flat_map(|(rows, sets)| {
-            statistics
-                .clone()
-                .map(move |number| line(rows, sets, number))
-        })
-        .collect()
+    }
+    lines
 }
 
 /// Where the rows of the refined axis lie.

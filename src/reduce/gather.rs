@@ -99,7 +99,8 @@ impl<'a> Gathering<'a> {
             set.push(seed, &job.facts);
         })?;
         let mut sets: Vec<SetJobs> = sets.into_values().collect();
-        sets.sort_by(by_parameters);
+        // From a map: sets that agree in all parameters stay in the order of their ids.
+        sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
         let controls = Controls::read(slips.clone(), plan, sets.iter().map(|set| &set.parameters))?;
         Ok(Self {
             sets,
@@ -180,9 +181,10 @@ pub(super) fn each_job(
     Ok(())
 }
 
-fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
+/// The order of sets in every table.
+pub(super) fn by_parameters(left: &Parameters, right: &Parameters) -> Ordering {
     let order = |&symbol: &Symbol| {
-        let values = (left.parameters.get(symbol), right.parameters.get(symbol));
+        let values = (left.get(symbol), right.get(symbol));
         match values {
             (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
             (Value::Count(left), Value::Count(right)) => left.cmp(&right),
@@ -191,7 +193,7 @@ fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
     };
     let mut orders = AllButSeed::SYMBOLS.iter().map(order);
     let order = orders.find(|order| order.is_ne());
-    order.unwrap_or_else(|| left.set_id.cmp(&right.set_id))
+    order.unwrap_or(Ordering::Equal)
 }
 
 /// Cuts the sets where their slips would exceed the most.

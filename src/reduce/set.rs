@@ -247,7 +247,7 @@ impl<'a> Intervals<'a> {
         estimate(self.jobs, |slip| non_nan((self.length)(slip)).map(&value))
     }
 
-    /// A quantile of all intervals; `None` if it is one that still ran.
+    /// A quantile of all intervals; `None` if that interval still ran.
     fn quantile(&self, share: f64) -> Option<f64> {
         let last = (self.sorted.len() + self.running.len()).checked_sub(1)?;
         at_rank(&self.sorted, share.clamp(0.0, 1.0) * last as f64)

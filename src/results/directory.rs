@@ -440,7 +440,7 @@ impl<'a> Results<'a> {
     }
 }
 
-/// Whether a directory holds nothing, or no more than what a run leaves that was killed before its first extension.
+/// Whether a directory is empty, or holds only what a run leaves that was killed before its first extension.
 pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
     let storage = layout.storage;
     let holds_only = |folder: &Path, known: &[&str]| -> Result<bool, StorageError> {

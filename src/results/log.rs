@@ -77,7 +77,7 @@ pub enum RunEvent {
     },
     /// The run was asked to stop, or its time is over; jobs in flight are interrupted.
     Stopping,
-    /// Not all parts would end in time; those that have begun do.
+    /// Not all parts would end in time; the parts that have begun do.
     OutOfTime,
     Finished(RunReport),
     Error {

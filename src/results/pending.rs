@@ -6,7 +6,7 @@
 //! | extensions | which extension has a job: the first that keeps it, else the last | `sweep/plan.rs` | `what_is_taken_out_of_the_sweep_is_kept_if_done_and_else_not_run` |
 //! | parts | a part is done if all its files are there | [`Results::done_parts`] | `a_damaged_part_is_named_with_the_way_out_which_works` |
 //! | retries | of a part that is done, jobs that failed, that needed more memory than was allowed, or that a shorter `max_time` cut off | [`Pending::runs_again`] | `failing_and_panicking_jobs_become_rows_others_continue_and_a_retry_mends_them`, `a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others` |
-//! | spill | of one that is not, all jobs but those that a stopped run has finished | [`Pending::spilled`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
+//! | spill | of a part that is not done, all jobs except those that a stopped run has finished | [`Pending::spilled`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
 //!
 //! Which worker runs it is decided in `claims.rs` and `run/take.rs`.
 

@@ -107,7 +107,7 @@ const KILOBYTE: f64 = 1024.0;
 /// Address space of a thread: its stack, and what the C library reserves for it.
 const OF_A_THREAD: f64 = 68e6;
 
-/// Memory in bytes that hard limits leave for jobs, infinite if unknown: limits of control groups, of the address space and of data.
+/// Bytes that hard limits leave for jobs: of control groups, of the address space and of data; infinite if unknown.
 pub(super) fn allowed_memory() -> f64 {
     let limits = text_of("/proc/self/limits");
     let status = text_of("/proc/self/status");
@@ -120,7 +120,7 @@ pub(super) fn allowed_memory() -> f64 {
         .min(left("Max data size", "VmData:"))
 }
 
-/// Memory in bytes that this process has or could get now without taking it from others, infinite if unknown.
+/// Bytes that this process has or could get now without taking them from others; infinite if unknown.
 pub(super) fn available_memory() -> f64 {
     let free = number_after(&text_of("/proc/meminfo"), "MemAvailable:");
     let own = number_after(&text_of("/proc/self/status"), "VmRSS:");

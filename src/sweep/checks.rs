@@ -67,7 +67,7 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// Reports a mistake where a quantity is set, or the one that bounds it, or at the head of the file.
+    /// Reports a mistake where a quantity is set, else where its bound is set, else at the head of the file.
     fn refuse(&self, quantity: Quantity, problem: String) -> Refused {
         let bound = match quantity {
             Quantity::Parameter(Symbol::Dfs) => Quantity::Parameter(Symbol::Fs),

@@ -1,6 +1,6 @@
 //! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
 //!
-//! Each sweep that is run in a directory opens an *extension*, which owns its jobs but for those that earlier extensions
+//! Each sweep that is run in a directory opens an *extension*, which owns its jobs except those that earlier extensions
 //! keep: what they had done by then. Each round of an adaptive sweep is one, too. A *part* is a run of consecutive jobs of an
 //! extension, committed together. Parts are small, so that many workers can share them and little is lost with one, but not
 //! many: see [`Extension::new`].

@@ -129,7 +129,7 @@ impl<'a> Source<'a> {
     pub fn error(&self) -> SweepError {
         let mut mistakes = self.mistakes.take();
         mistakes.sort_unstable();
-        // A misspelt key is met twice where it stands for one that must be there.
+        // A misspelt key that stands for a required key is met twice.
         mistakes.dedup();
         if let Some(of) = self.made_of {
             let problems = mistakes.into_iter().map(|(_, problem)| problem).collect();

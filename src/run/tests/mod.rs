@@ -800,7 +800,7 @@ fn parts_of_a_dead_worker_elsewhere_are_taken_over_and_those_of_a_living_one_lef
             let begin = Instant::now();
             let report = run_all(root.path(), &sweep(SEEDS, ""), &fine);
             done.store(true, Ordering::Relaxed);
-            // Who beats is known after a beat, and who does not after the silence.
+            // A worker that beats is known after a beat, and one that does not after the silence.
             assert!(begin.elapsed() < 2 * SILENCE, "{:?}", begin.elapsed());
             report
         });
