@@ -37,7 +37,6 @@ columns! {
 
 tables! { BackboneBin = "backbone", "One row per bin of eta that holds slips, four bins per decade"; }
 
-/// Pools the sets of each bin.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Backbone {
     bins: BTreeMap<i32, Bin>,

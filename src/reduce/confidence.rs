@@ -239,7 +239,6 @@ pub(super) const OF_INTERVALS: f64 = 1.4;
 /// Periods that are missing after an interval shorter than n: most are followed by one that is as much longer.
 const OF_SHORTER: f64 = 0.4;
 
-/// The intervals of a set in a tongue.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tongue {
     /// Mean interval in periods.

@@ -36,7 +36,6 @@ const LOOKS: f64 = 1.2;
 const MOVES: usize = 3;
 
 words! {
-    /// What ended the search for an edge.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Ended {
         Width = "width",
@@ -112,7 +111,6 @@ impl Sample {
         Some(sample)
     }
 
-    /// Adds another one with a factor.
     fn add(&mut self, factor: f64, other: &Self) {
         self.excess += factor * other.excess;
         for (sum, influence) in self.influences.iter_mut().zip(other.influences) {

@@ -154,7 +154,6 @@ impl Beyond {
         }
     }
 
-    /// Of sums of jobs and of their controls.
     fn of_pairs(seen: &[Sum], alone: &[Sum], unseen: f64) -> Self {
         let ends = |excess: f64| {
             let slips = Sum::of_all(seen).weight;

@@ -28,7 +28,6 @@ use std::collections::{BTreeMap, HashMap};
 /// Slips that are held at once: some 300 MB.
 pub(super) const MAX_SLIPS: u64 = 1 << 22;
 columns! {
-    /// The set of a job, and the job.
     pub(super) struct JobOfSet {
         set_id: String;
         facts: JobFacts;
@@ -231,7 +230,6 @@ impl Gathered {
         }
     }
 
-    /// The jobs with some of the seeds, and their slips.
     pub(super) fn only(&self, keeps: impl Fn(u64) -> bool) -> Self {
         let mut part = self.clone();
         part.jobs.averages.retain(|&seed, _| keeps(seed));

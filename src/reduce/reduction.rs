@@ -209,7 +209,6 @@ impl<'a> RoundsOfSets<'a> {
         Self { sweep, of_sets }
     }
 
-    /// Columns that the table of sets does not have.
     fn left_out(&self) -> Vec<Cow<'static, str>> {
         match self.sweep.rounds() {
             Some(_) => Vec::new(),
@@ -296,7 +295,6 @@ pub(super) fn histogram(set: &SetRow, sorted: &[f64]) -> Vec<HistogramBin> {
     bins.map(row).collect()
 }
 
-/// The footer's key of the source.
 const SOURCE: &str = "reduced_from";
 
 /// A checksum of all sweeps of a directory, and of names and sizes of the committed files of jobs.

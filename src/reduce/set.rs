@@ -52,7 +52,6 @@ pub(super) fn non_nan(value: f64) -> Option<f64> {
     (!value.is_nan()).then_some(value)
 }
 
-/// Gathers the slips of a set.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SetSlips {
     /// By their seeds.

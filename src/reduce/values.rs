@@ -164,7 +164,6 @@ fn evaluate(expression: &Expression<usize>, row: &SetRow) -> f64 {
     expression.evaluate(&|&column| cells[column])
 }
 
-/// The place of a column of numbers.
 fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
     let place = columns.iter().position(|column| column.name == name);
     let place = place.ok_or_else(|| unknown(name, columns))?;
@@ -230,7 +229,6 @@ impl Swept {
         &self.values.column.name
     }
 
-    /// Whether its values are spaced logarithmically.
     pub fn is_logarithmic(&self) -> bool {
         let [least, .., largest] = self.distinct[..] else {
             return false;

@@ -68,7 +68,6 @@ impl<'a> Claims<'a> {
         self.generations.get(what).copied()
     }
 
-    /// How a claim stands among workers that live.
     pub fn standing<'l>(
         &self,
         what: &str,

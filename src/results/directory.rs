@@ -180,7 +180,6 @@ impl<'a> Results<'a> {
             .is_some_and(|last| last.sweep.text() == sweep.text())
     }
 
-    /// Differences of versions from those of this program.
     pub(super) fn version_differences(&self) -> Vec<String> {
         let all = self.records.iter().zip(&self.extensions);
         all.map(|(record, extension)| record.difference(&extension.sweep))

@@ -159,7 +159,6 @@ impl<'a> JoinedTable<'a> {
         own.fields().iter().chain(others).cloned().collect()
     }
 
-    /// A table with these of its columns.
     pub fn new(results: &'a Results<'a>, table: &'static str, columns: &[FieldRef]) -> Self {
         let recorded = recorded_schema(table, results.sweep().recording());
         let names = columns.iter().map(|field| field.name().clone());

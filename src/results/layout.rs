@@ -67,7 +67,6 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The folder of reduced data, and of what making them needs.
     fn reduced_root(&self) -> &Path {
         self.elsewhere.as_deref().unwrap_or(&self.root)
     }

@@ -114,7 +114,6 @@ pub struct RunReport {
     pub rounds: Option<RoundsSoFar>,
 }
 
-/// Most bytes of a line.
 const MAX_LINE: u64 = 1 << 24;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

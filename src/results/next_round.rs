@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 
 const LOCK: &str = "round";
 
-/// How far the rounds of a sweep are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RoundsSoFar {
     /// The round that was begun last, from 1.

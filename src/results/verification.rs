@@ -223,7 +223,6 @@ fn verify_part(
     Ok(true)
 }
 
-/// The ids of the jobs of a part, in order.
 fn ids(results: &Results<'_>, part: &Part) -> impl Iterator<Item = String> {
     (0..part.jobs.len()).map(|position| results.job_id(part, position))
 }

@@ -31,7 +31,6 @@ pub const MAX_THREADS: usize = 1024;
 #[error("{0}")]
 pub struct ThreadsError(String);
 
-/// A number of threads, and where it is from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Threads {
     /// `None`: one for each core.
@@ -174,7 +173,6 @@ const MIN_RESERVE: Duration = Duration::from_millis(500);
 /// More is set aside where commits are slow: this many times the slowest.
 const COMMITS_IN_RESERVE: u32 = 3;
 
-/// The time that a run has.
 pub(super) struct Walltime {
     /// When the run must have ended; `None`: at any time.
     end: Option<Instant>,

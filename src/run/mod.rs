@@ -245,7 +245,6 @@ impl Joined<'_> {
         Ok(())
     }
 
-    /// Sends the event of a run, or a round, that begins.
     fn report_begin(
         &self,
         results: &Results<'_>,

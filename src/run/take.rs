@@ -48,7 +48,6 @@ pub(super) struct Taken {
     pub begin: Instant,
 }
 
-/// A job of a part that is to be run.
 #[derive(Clone, Debug)]
 pub(super) struct PartJob {
     pub of: Arc<Taken>,
@@ -198,7 +197,6 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Takes the next part with jobs to run, if there is one.
     fn take_next(&mut self, is_busy: bool, is_ahead: bool) -> Result<(), ResultsError> {
         while !self.walltime.has_refused() {
             if self.must_wait(is_busy, is_ahead) {

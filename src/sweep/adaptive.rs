@@ -25,7 +25,6 @@ impl Sweep {
         }
     }
 
-    /// Number of the axis of seeds, if they have one.
     pub fn seed_axis(&self) -> Option<usize> {
         let mut axes = self.axes.iter();
         axes.position(|axis| axis.quantities() == [Quantity::SEED])
@@ -124,7 +123,6 @@ impl Sweep {
         (0..counts.iter().product()).filter_map(set).collect()
     }
 
-    /// What its rounds may add up to; `None` for a sweep without.
     pub fn bounds(&self) -> Option<Bounds> {
         let rounds = self.rounds.as_ref()?;
         let sets = self.first_sets().into_iter();

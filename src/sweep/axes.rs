@@ -100,7 +100,6 @@ impl Axis {
         }
     }
 
-    /// Moves a point to a row.
     pub fn apply(&self, row: u64, point: &mut Point) {
         match self {
             Self::Counted { symbol, first, .. } => {

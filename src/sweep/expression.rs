@@ -118,7 +118,6 @@ impl<N> Expression<N> {
         }
     }
 
-    /// The names in it, from the left.
     pub fn names(&self) -> Vec<&N> {
         match self {
             Self::Constant(_) => Vec::new(),

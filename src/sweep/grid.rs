@@ -93,7 +93,6 @@ impl Sweep {
         self.jobs_at(0..self.point_count())
     }
 
-    /// The jobs at these points, in order.
     pub fn jobs_at(&self, points: Range<u64>) -> impl Iterator<Item = Job> + Clone + Send + '_ {
         let count = self.point_count();
         let of_grid = self.admitted(points.start.min(count)..points.end.min(count));
@@ -304,7 +303,6 @@ impl Sweep {
         })
     }
 
-    /// The point of these rows, as the axes set it.
     pub(super) fn point(&self, rows: &[u64]) -> Point {
         let mut point = Point {
             parameters: self.base.clone(),

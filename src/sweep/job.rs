@@ -98,7 +98,6 @@ impl Identity {
         self.hash(parameters, &Symbol::ALL)
     }
 
-    /// The id of the set that such a job belongs to.
     pub fn set(&self, parameters: &Parameters) -> String {
         self.hash(parameters, AllButSeed::SYMBOLS)
     }

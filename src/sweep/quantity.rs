@@ -42,7 +42,6 @@ impl Quantity {
         Self::all().find(|quantity| quantity.key() == key)
     }
 
-    /// The quantity of a name in a condition.
     pub fn comparable(name: &str) -> Result<Self, String> {
         match Self::from_key(name) {
             Some(Self::BREAK_ON) => Err(
@@ -88,7 +87,6 @@ impl Quantity {
         matches!(self, Self::Parameter(symbol) if symbol.description().kind == Kind::Count)
     }
 
-    /// The allowed values, as an error message names them.
     pub fn allowed(self) -> String {
         match self {
             Self::Parameter(symbol) => symbol.description().allowed(),

@@ -152,7 +152,6 @@ fn read_section<'a, T: Default>(
     Ok(optional_section(file, title, read)?.unwrap_or_default())
 }
 
-/// The key of a table with this title.
 fn key_of(title: &str) -> &str {
     title.trim_matches(['[', ']'])
 }

@@ -297,7 +297,6 @@ fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Ref
     of_columns(table, columns.collect())
 }
 
-/// The axis of a zip or a sample.
 fn of_columns(table: &Section<'_>, columns: Vec<Column>) -> Result<Axis, Refused> {
     Axis::table(columns).map_err(|Repeated { earlier, later }| {
         let problem = format!(

@@ -113,7 +113,6 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Reports a mistake at a byte of the text.
     pub fn refuse(&self, at: usize, problem: impl Into<String>) -> Refused {
         self.mistakes.borrow_mut().push((at, problem.into()));
         Refused(())
@@ -248,7 +247,6 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// Refuses keys that are not allowed here.
     pub fn only(&self, allowed: &[&str]) -> Result<(), Refused> {
         let mut unknown = self.entries();
         unknown.retain(|entry| !allowed.contains(&entry.key));
@@ -268,7 +266,6 @@ pub(super) struct Entry<'a> {
 }
 
 impl<'a> Entry<'a> {
-    /// Reports a mistake in this value.
     pub fn refuse(&self, problem: impl AsRef<str>) -> Refused {
         let problem = problem.as_ref();
         let value = match self.node.get_ref() {
@@ -283,7 +280,6 @@ impl<'a> Entry<'a> {
         self.refuse(format!("must be {allowed}"))
     }
 
-    /// Reports a key that means nothing here.
     pub fn unknown(&self, title: &str, allowed: &[&str]) -> Refused {
         let hint = match self.key {
             "name" | "where" => format!("{} must stand above the first [section]", self.key),
@@ -349,7 +345,6 @@ impl<'a> Entry<'a> {
         self.number(&allowed, |number| number > 0.0)
     }
 
-    /// A whole number within bounds.
     pub fn count(&self, min: u64, max: u64) -> Result<u64, Refused> {
         match self.value().and_then(u64::from_value) {
             Some(count) if (min..=max).contains(&count) => Ok(count),

@@ -122,7 +122,6 @@ impl RowBuffer {
         }
     }
 
-    /// The same without the columns of these names.
     pub fn without(mut self, left_out: &[Cow<'static, str>]) -> Self {
         let mut fields = Vec::new();
         for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
@@ -148,7 +147,6 @@ impl RowBuffer {
         &self.schema
     }
 
-    /// Appends a row of the type that the buffer was made for.
     pub fn push<R: Row>(&mut self, row: &R) {
         let mut columns = self.cells.iter_mut();
         row.cells(&mut |cell| {
@@ -171,7 +169,6 @@ impl RowBuffer {
         Ok(())
     }
 
-    /// Takes all rows out as one batch.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
         let columns = self.cells.iter_mut().flatten().map(Cells::take);

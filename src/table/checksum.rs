@@ -8,7 +8,6 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 
-/// The footer's key of the checksum.
 pub const FOOTER_KEY: &str = "seal";
 /// What is in its place while the hash is taken.
 pub const PLACEHOLDER: &str = "0000000000000000000000000000000000000000000000000000000000000000";

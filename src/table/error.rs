@@ -23,7 +23,6 @@ pub enum ErrorKind {
     Disk(io::ErrorKind),
 }
 
-/// A results directory, or a file of it, that cannot be used, written or changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ResultsError {
     pub kind: ErrorKind,

@@ -53,7 +53,6 @@ impl Default for Footer {
     }
 }
 
-/// The footer's key of the place of a file.
 const PLACE: &str = "file";
 
 fn place(path: &Path) -> String {
@@ -81,7 +80,6 @@ impl Footer {
         self
     }
 
-    /// This footer for a file at this place.
     pub fn at(self, path: &Path) -> Self {
         self.with(PLACE, &place(path))
     }
@@ -166,7 +164,6 @@ impl<R: Row> TableWriter<R> {
         Ok(())
     }
 
-    /// Writes the buffered rows as a row group.
     fn flush(&mut self) -> Result<(), ResultsError> {
         let mut encode = || -> Result<(), ParquetError> {
             self.writer.write(&self.buffer.take()?)?;
@@ -238,7 +235,6 @@ pub struct RowCount {
 }
 
 impl RowCount {
-    /// Says what is wrong with this number of rows.
     pub fn check(self, rows: u64) -> Result<(), String> {
         let Self { least, may_exceed } = self;
         if rows == least || (may_exceed && rows > least) {

@@ -17,7 +17,6 @@ pub enum Format {
     Parquet,
     /// Plain text with a line of names; real numbers with as many digits as they have.
     Csv,
-    /// The file format of Arrow.
     Arrow,
 }
 

@@ -46,7 +46,6 @@ impl StoredFile {
             .map_err(StorageError::at("write", &self.path))
     }
 
-    /// Returns when all that was written is on the disk.
     pub fn sync(&mut self) -> Result<(), StorageError> {
         self.sink
             .sync()
@@ -54,7 +53,6 @@ impl StoredFile {
     }
 }
 
-/// As encoders write to it.
 impl Write for StoredFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.sink.write(bytes)
@@ -276,7 +274,6 @@ const fn disk(_: &Path) -> Option<()> {
     None
 }
 
-/// The file system of the operating system.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Disk;
 
