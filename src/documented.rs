@@ -5,7 +5,8 @@ use crate::model::{Description, Parameters, Symbol, Value};
 use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, TraceRow};
 use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, RoundOfSet, SetRow};
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
-use crate::table::columns::{Column, Kind, Row, Table};
+use crate::table::Table;
+use crate::table::columns::{Column, Kind, Row};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -8,7 +8,7 @@ use crate::observe::{
 };
 use crate::solver::{self, Observer, SimulationError};
 use crate::sweep::{Change, Job, Sweep};
-use crate::table::columns::tables;
+use crate::table::tables;
 use std::sync::atomic::AtomicBool;
 
 // The tables that one simulation writes on request.

@@ -3,7 +3,7 @@
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use stickslip::run::threads::ThreadsError;
+use stickslip::run::limits::ThreadsError;
 use stickslip::single_job::RequestError;
 
 create_exception!(

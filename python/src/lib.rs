@@ -58,7 +58,7 @@ mod _stickslip {
     #[pymodule_export]
     use super::{main, minimum_phase};
     #[pymodule_export]
-    const MAX_THREADS: usize = stickslip::run::threads::MAX_THREADS;
+    const MAX_THREADS: usize = stickslip::run::limits::MAX_THREADS;
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
 }

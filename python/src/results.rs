@@ -10,12 +10,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, renew};
-use stickslip::results::joined::{JoinedTable, with_columns};
+use stickslip::results::exported::{JoinedTable, with_columns};
 use stickslip::results::layout::Layout;
 use stickslip::results::tables::{JOBS, TABLES, recorded_schema};
 use stickslip::results::{Results, ResultsError};
+use stickslip::table::Table as TableRow;
 use stickslip::table::arrow::schema;
-use stickslip::table::columns::Table as TableRow;
 use stickslip::table::file::{Batch, Dataset};
 use stickslip::table::storage::Disk;
 

@@ -12,7 +12,7 @@ use stickslip::figure::{Format, Look, draw_all};
 use stickslip::observe::measure;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
-use stickslip::run::threads::Threads;
+use stickslip::run::limits::Threads;
 use stickslip::run::{Options, RunEvent, RunReport, Shard, Tally};
 use stickslip::table::storage::Disk;
 

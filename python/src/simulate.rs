@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stickslip::observe::ContactRow;
 use stickslip::results::tables::{
-    All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label, relabel,
+    All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label,
 };
 use stickslip::single_job::{self, Records, Request, only_job};
 use stickslip::sweep::{Change, Sweep};
@@ -94,7 +94,10 @@ pub fn simulate<'py>(
         |stop, _| {
             let (measured, records) = single_job::simulate(&sweep, &parameters, request, stop)?;
             let names = label::<DriveAndSeed>(&sweep, &parameters);
-            let row: JobRow = (relabel::<_, All>(&names), JobRecord::new(Ok(&measured)));
+            let row: JobRow = (
+                label::<All>(&sweep, &parameters),
+                JobRecord::new(Ok(&measured)),
+            );
             let Records {
                 trace: samples,
                 map: cells,

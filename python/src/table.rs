@@ -11,8 +11,8 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule, PyDict, PyTuple};
 use std::borrow::Cow;
+use stickslip::table::Table as TableRow;
 use stickslip::table::arrow::{DESCRIPTION, RowBuffer, UNIT};
-use stickslip::table::columns::Table as TableRow;
 
 /// A table with its units, in Arrow's memory layout.
 ///

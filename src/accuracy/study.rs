@@ -12,7 +12,7 @@ use super::{Cost, Method, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Recording, Slip, measure};
-use crate::run::threads;
+use crate::run::limits;
 use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate};
 use crate::table::columns::columns;
 use anyhow::{Context, Result, bail};
@@ -437,7 +437,7 @@ fn measured(
     recording: &Recording,
 ) -> Result<(f64, Measurements)> {
     let (cpu_seconds, measured) =
-        threads::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
+        limits::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
     Ok((
         cpu_seconds,
         measured.with_context(|| in_words(parameters, solver))?,

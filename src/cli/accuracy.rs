@@ -7,7 +7,7 @@ use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, shows_bias
 use crate::model::Parameters;
 use crate::model::theory::typical_interval;
 use crate::results::layout::Layout;
-use crate::run::threads::{self, Threads};
+use crate::run::limits::{self, Threads};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use crate::table::value::floored;
@@ -65,7 +65,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=MAX_COUNT))]
     slips: Option<u64>,
     /// Threads [default: those that the batch system grants, else all cores]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    #[arg(long, value_name = "N", value_parser = limits::parse_threads)]
     threads: Option<NonZeroUsize>,
     /// Print JSON
     #[arg(long)]

@@ -6,7 +6,7 @@ use super::output::{self, quoted};
 use super::sweep::{self, PresetFlag};
 use super::{Exit, UsageError};
 use crate::results::layout::Layout;
-use crate::run::threads;
+use crate::run::limits;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
@@ -44,7 +44,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N")]
     workers: NonZeroU32,
     /// Threads of each worker
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    #[arg(long, value_name = "N", value_parser = limits::parse_threads)]
     threads: NonZeroUsize,
     /// Time of each worker in the queue, such as 55m, 1h30m or 1:30:00; it stops a little earlier
     #[arg(long, value_name = "TIME", value_parser = time_in_queue)]

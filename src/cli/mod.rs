@@ -23,7 +23,7 @@ use crate::figure::BadOption;
 use crate::reduce::NoJobs;
 use crate::results::layout::Layout;
 use crate::results::{ErrorKind, ResultsError};
-use crate::run::threads::ThreadsError;
+use crate::run::limits::ThreadsError;
 use crate::solver::SimulationError;
 use crate::sweep::SweepError;
 use crate::table::storage::Disk;

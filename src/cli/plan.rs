@@ -5,8 +5,8 @@ use super::{Exit, output};
 use crate::results::layout::Layout;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
-use crate::run::threads::{self, Threads};
-use crate::run::{Overview, status};
+use crate::run::limits::{self, Threads};
+use crate::run::{MAX_FAILURES, Overview, status};
 use crate::sweep::{Bounds, Extension, Plan, Sweep};
 use crate::table::shown::{serialize_path, shown, shown_bytes};
 use crate::table::storage::{Disk, Storage};
@@ -94,7 +94,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         sweep::warn_of_partitions(root, &sweep);
     }
     let threads = Threads::choose(None, |variable| std::env::var_os(variable))?;
-    let threads = threads::or_all_cores(threads.count);
+    let threads = limits::or_all_cores(threads.count);
     let directory = root.map_or(Ok(None), |root| DirectoryState::of(&sweep, root))?;
     let forecast = Forecast::new(&sweep, threads, directory);
     if arguments.json {
@@ -187,7 +187,8 @@ impl DirectoryState {
             return Ok(None);
         }
         let layout = Layout::new(&Disk, &root);
-        let found = Results::preview(&layout, sweep).and_then(|results| status(&results));
+        let found =
+            Results::preview(&layout, sweep).and_then(|results| status(&results, MAX_FAILURES));
         let (refused, overview, rounds) = match found {
             Ok(status) => (None, Some(status.overview), status.rounds),
             Err(error) if error.kind == ErrorKind::Refused => (Some(error.to_string()), None, None),

@@ -8,7 +8,7 @@ use crate::figure::{
 use crate::reduce::{SetRow, renew};
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
-use crate::table::columns::Row;
+use crate::table::columns::Row as _;
 use crate::table::shown::shown;
 use anyhow::Result;
 use clap::Args;

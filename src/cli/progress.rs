@@ -1,7 +1,7 @@
 //! Progress of a run: a bar with an ETA on a terminal, plain lines otherwise; on standard error.
 
 use super::output;
-use crate::run::threads::Threads;
+use crate::run::limits::Threads;
 use crate::run::{MAX_FAILURES, Reasons, RunEvent, Tally};
 use crate::table::shown::shown_bytes;
 use crate::table::value::floored;

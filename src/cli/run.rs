@@ -10,7 +10,7 @@ use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::results::next_round::RoundsSoFar;
-use crate::run::threads::{self, Threads};
+use crate::run::limits::{self, Threads};
 use crate::run::{Joined, Options, RunReport, Shard};
 use crate::sweep::{Job, Sweep};
 use crate::table::shown::shown;
@@ -56,7 +56,7 @@ pub struct Arguments {
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads [default: those that the batch system grants, else all cores]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    #[arg(long, value_name = "N", value_parser = limits::parse_threads)]
     threads: Option<NonZeroUsize>,
     /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]

@@ -15,7 +15,7 @@ use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
 use crate::sets::Digits;
 use crate::single_job::{self, Records, Request};
 use crate::sweep::{Change, Sweep};
-use crate::table::columns::Table;
+use crate::table::Table;
 use crate::table::file::{Footer, TableWriter};
 use crate::table::shown::shown;
 use anyhow::Result;
@@ -252,7 +252,7 @@ impl Tables<'_> {
     fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
         Destination::new(path, Kind::PARQUET)?.write(catch_signals, |file| {
-            let mut writer = TableWriter::without(self.left_out, file, self.footer)?;
+            let mut writer = TableWriter::new(self.left_out, file, self.footer)?;
             for row in rows {
                 writer.push(&row)?;
             }

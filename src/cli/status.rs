@@ -2,7 +2,7 @@
 
 use super::{Exit, layout, output};
 use crate::results::Results;
-use crate::run::{Present, Status};
+use crate::run::{MAX_FAILURES, Present, Status};
 use crate::table::shown::shown_text;
 use anyhow::Result;
 use clap::Args;
@@ -30,7 +30,7 @@ const JSON_FORMAT: u32 = 3;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read_plan(&layout(&arguments.directory))?;
-    let status = crate::run::status(&results)?;
+    let status = crate::run::status(&results, MAX_FAILURES)?;
     let overview = status.overview;
     if arguments.json {
         output::json(JSON_FORMAT, &status)?;

@@ -44,7 +44,8 @@ use crate::results::ResultsError;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::sets::{Digits, label, symbol_of};
-use crate::table::columns::{FromRow, Table};
+use crate::table::Table;
+use crate::table::columns::FromRow;
 use anyhow::Result;
 use std::path::PathBuf;
 
@@ -237,14 +238,14 @@ mod tests {
     use super::quantity::tests::set;
     use super::*;
     use crate::reduce::{BackboneBin, HistogramBin, Point, SetRow};
-    use crate::table::columns::Table;
+    use crate::table::Table;
     use crate::table::file::{Footer, TableWriter};
     use crate::table::storage::{Disk, Storage};
     use std::fs;
 
     fn write_rows<R: Table>(layout: &Layout<'_>, rows: &[R]) {
         let file = Disk.create(&layout.reduced_file(R::NAME)).unwrap();
-        let mut writer = TableWriter::new(file, &Footer::default()).unwrap();
+        let mut writer = TableWriter::new(&[], file, &Footer::default()).unwrap();
         for row in rows {
             writer.push(row).unwrap();
         }

@@ -1,11 +1,11 @@
 //! The φ-η back-bone: phases pooled in logarithmic bins of η (Fig. 3e).
 
-use super::circular::unit;
-use super::sequence::{Centred, Estimate, add};
+use super::sequence::{Centred, Estimate, add, unit};
 use super::set::FinishedSet;
 use super::top_of_phases;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::table::columns::{columns, tables};
+use crate::table::columns::columns;
+use crate::table::tables;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -37,7 +37,6 @@ columns! {
 
 tables! { BackboneBin = "backbone", "One row per bin of eta that holds slips, four bins per decade"; }
 
-/// Pools the sets of each bin.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Backbone {
     bins: BTreeMap<i32, Bin>,
@@ -109,7 +108,6 @@ fn edge(bin: i32) -> f64 {
     libm::exp10(f64::from(bin) / f64::from(BINS_PER_DECADE))
 }
 
-/// The bin that holds an η > 0.
 fn bin_of(eta: f64) -> i32 {
     #[expect(
         clippy::cast_possible_truncation,

@@ -4,9 +4,12 @@
 //! Two things are added to Student's t: towards the side on which a sum is skewed, what the third moment says of rare events;
 //! and slips of a kind that was not seen at all, of which there may be [`MAX_UNSEEN`]. Errors on one side are combined by
 //! their squares (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693 (2008)).
+//!
+//! In a tongue, the intervals of a set are n periods each, up to a jitter. Few slips are off n there, and a small set may have
+//! seen none. Each would change its statistics much, so its intervals allow for some of them (`Unseen`). How much each would
+//! change is a choice by which intervals hold the true value as often as they say: docs/coverage.md.
 
-use super::circular::heading;
-use super::sequence::{Centred, Estimate};
+use super::sequence::{Centred, Estimate, heading};
 use crate::model::standard_normal_quantile;
 use crate::table::columns::Interval;
 use std::f64::consts::PI;
@@ -213,28 +216,87 @@ pub(crate) fn student_at(confidence: f64, freedom: f64) -> f64 {
 /// Integral of cos^(ν-1) from 0 to an angle, by Simpson's rule: with t = √ν tan θ, that of the density of t.
 fn cosine_integral(angle: f64, nu: f64) -> f64 {
     const STEPS: u32 = 32;
-    let step = angle / f64::from(STEPS);
-    let value = |index: u32| libm::pow(libm::cos(f64::from(index) * step), nu - 1.0);
-    simpson(STEPS, step, value)
+    let width = angle / f64::from(STEPS);
+    let weighted = |step: u32| {
+        let value = libm::pow(libm::cos(f64::from(step) * width), nu - 1.0);
+        match step {
+            0 | STEPS => value,
+            _ => value * f64::from(2 + 2 * (step % 2)),
+        }
+    };
+    width / 3.0 * (0..=STEPS).map(weighted).sum::<f64>()
 }
 
-/// Integral by Simpson's rule of a function that has these values at an even number of steps of this width.
-fn simpson(steps: u32, width: f64, value: impl Fn(u32) -> f64) -> f64 {
-    let weighted = |step| {
-        value(step)
-            * if step == 0 || step == steps {
-                1.0
+/// Standard deviation of intervals about whole numbers of periods, in periods, from which jitter alone puts slips off n.
+const MAX_JITTER: f64 = 0.1;
+
+/// What a slip off n takes from the sum of phases as unit vectors.
+pub(super) const OF_PHASES: f64 = 0.75;
+
+/// The same of the intervals in periods, as angles: those before and after it.
+pub(super) const OF_INTERVALS: f64 = 1.4;
+
+/// Periods that are missing after an interval shorter than n: most are followed by one that is as much longer.
+const OF_SHORTER: f64 = 0.4;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tongue {
+    /// Mean interval in periods.
+    mean: Option<f64>,
+    /// Periods beyond n, summed over all intervals.
+    beyond: f64,
+    has_shorter: bool,
+}
+
+impl Tongue {
+    /// Of intervals in periods, their median and mean; `None` if they are in no tongue with n >= 1.
+    pub(super) fn of(periods: &[f64], n: Option<u64>, mean: Option<f64>) -> Option<Self> {
+        let n = n.filter(|&n| n > 0)? as f64;
+        let count = periods.len() as f64;
+        let rest = periods.iter().map(|periods| periods - periods.round());
+        let mean_rest = rest.clone().sum::<f64>() / count;
+        let squares: f64 = rest
+            .map(|rest| (rest - mean_rest) * (rest - mean_rest))
+            .sum();
+        ((squares / count).sqrt() < MAX_JITTER).then(|| Self {
+            mean,
+            beyond: periods.iter().map(|periods| periods.round() - n).sum(),
+            has_shorter: periods.iter().any(|periods| periods.round() < n),
+        })
+    }
+
+    /// By how much a quantity that is proportional to the interval grows with each period.
+    fn step(&self, of: &Estimate<1>) -> f64 {
+        let means = of.value().zip(self.mean);
+        means.map_or(0.0, |(mean, periods)| mean / periods)
+    }
+
+    /// What slips off n change in the mean of a quantity that is proportional to the interval.
+    pub(super) fn of_mean(&self, of: &Estimate<1>) -> Unseen {
+        let step = self.step(of);
+        Unseen {
+            below: if self.has_shorter && self.beyond >= 0.0 {
+                OF_SHORTER * step
             } else {
-                f64::from(2 + 2 * (step % 2))
-            }
-    };
-    width / 3.0 * (0..=steps).map(weighted).sum::<f64>()
+                0.0
+            },
+            above: if self.beyond > 0.0 { 0.0 } else { step },
+        }
+    }
+
+    /// What they change in the squared deviations of such a quantity from its mean.
+    pub(super) fn of_squares(&self, of: &Estimate<1>) -> Unseen {
+        let step = self.step(of);
+        Unseen {
+            below: 0.0,
+            above: if self.beyond == 0.0 { step * step } else { 0.0 },
+        }
+    }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::circular::unit;
-    use super::super::sequence::Sequences;
+    use super::super::sequence::{Sequences, unit};
     use super::*;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};

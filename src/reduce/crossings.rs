@@ -18,7 +18,8 @@ use crate::model::selected::Selected;
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, Digits, Statistic, label};
 use crate::sweep::{Refinement, Sweep};
-use crate::table::columns::{Interval, columns, tables};
+use crate::table::columns::{Interval, columns};
+use crate::table::tables;
 use crate::table::value::floored;
 use crate::table::value::words;
 use std::collections::BTreeMap;
@@ -35,7 +36,6 @@ const LOOKS: f64 = 1.2;
 const MOVES: usize = 3;
 
 words! {
-    /// What ended the search for an edge.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Ended {
         Width = "width",
@@ -80,7 +80,7 @@ impl EdgeRow {
 }
 
 /// A statistic less its threshold, and what each group of seeds adds to it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Sample {
     pub(crate) excess: f64,
     /// Of the mean of independent values: the sums of their deviations from it, over their number.
@@ -111,6 +111,14 @@ impl Sample {
         Some(sample)
     }
 
+    fn add(&mut self, factor: f64, other: &Self) {
+        self.excess += factor * other.excess;
+        for (sum, influence) in self.influences.iter_mut().zip(other.influences) {
+            *sum += factor * influence;
+        }
+        self.concentration = self.concentration.max(other.concentration);
+    }
+
     /// Below the threshold, above it, or equal if that is not clear.
     pub(crate) fn side(&self) -> f64 {
         let variance = product(&self.influences, &self.influences);
@@ -139,7 +147,6 @@ fn product(left: &[f64; GROUPS], right: &[f64; GROUPS]) -> f64 {
 pub struct SetOfEdges {
     pub set_id: String,
     pub parameters: Parameters,
-    /// Seeds that it was given.
     pub seeds: u64,
     /// For each statistic; `None` if it has no value.
     pub samples: Vec<Option<Sample>>,
@@ -276,22 +283,6 @@ impl<'a> Edge<'a> {
     }
 }
 
-/// A sum of samples with factors.
-#[derive(Default)]
-struct Combination {
-    excess: f64,
-    influences: [f64; GROUPS],
-}
-
-impl Combination {
-    fn add(&mut self, factor: f64, sample: &Sample) {
-        self.excess += factor * sample.excess;
-        for (sum, influence) in self.influences.iter_mut().zip(sample.influences) {
-            *sum += factor * influence;
-        }
-    }
-}
-
 /// A line through the samples of sets.
 struct Fit {
     slope: f64,
@@ -308,17 +299,15 @@ fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
     let mean = points().map(|(x, weight)| weight * x).sum::<f64>() / total;
     let moments = points().map(|(x, weight)| weight * (x - mean) * (x - mean));
     let moment: f64 = moments.sum();
-    let mut begin = Combination::default();
-    let mut slope = Combination::default();
-    let mut concentration: f64 = 0.0;
+    let mut begin = Sample::default();
+    let mut slope = Sample::default();
     for (set, (x, weight)) in sets.iter().zip(points()) {
         let of_slope = weight * (x - mean) / moment;
         begin.add(weight / total - mean * of_slope, set.sample);
         slope.add(of_slope, set.sample);
-        concentration = concentration.max(set.sample.concentration);
     }
-    let factor = LOOKS * LOOKS * quantile(concentration);
-    let beyond_error = |left: &Combination, right: &Combination| {
+    let factor = LOOKS * LOOKS * quantile(slope.concentration);
+    let beyond_error = |left: &Sample, right: &Sample| {
         left.excess * right.excess - factor * product(&left.influences, &right.influences)
     };
     // All x at which the line is no more than so many standard deviations away: a + 2 b x + c x² <= 0.
@@ -351,11 +340,7 @@ pub fn lines<'a>(
     } else {
         refinement.to
     };
-    let scale = Scale::of(sweep, refinement).unwrap_or(Scale {
-        first: f64::NAN,
-        step: f64::NAN,
-        is_log: refinement.is_log,
-    });
+    let scale = Scale::of(sweep, refinement);
     let width = to / scale.step;
     let window = |place: f64| {
         let value = if scale.is_log {
@@ -365,41 +350,36 @@ pub fn lines<'a>(
         };
         floored((LARGEST_SHARE * value / scale.step).clamp(1.0, WINDOW)) as u64
     };
-    let line = |rows: &Vec<u64>, sets: &Vec<(u64, &'a SetOfEdges)>, statistic: usize| {
-        // Without a value, a set says nothing.
-        let sample = |&(row, set): &(u64, &'a SetOfEdges)| {
-            let sample = set.samples.get(statistic)?.as_ref()?;
-            Some(Placed {
-                row,
-                side: sample.side(),
-                sample,
-                set,
-            })
-        };
-        let known: Vec<Placed<'_>> = sets.iter().filter_map(sample).collect();
-        let mut clear: Vec<usize> = (0..known.len()).collect();
-        clear.retain(|&index| known[index].side != 0.0);
-        let is_opposite = |pair: &&[usize]| known[pair[0]].side != known[pair[1]].side;
-        let opposite = clear.windows(2).filter(is_opposite);
-        let edges = opposite
-            .filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window))
-            .collect();
-        Line {
-            rows: rows.clone(),
-            statistic: refinement.by[statistic],
-            sets: sets.clone(),
-            edges,
+    let mut lines = Vec::new();
+    for (rows, sets) in &rows_of {
+        for (number, &statistic) in refinement.by.iter().enumerate() {
+            // Without a value, a set says nothing.
+            let placed = |&(row, set): &(u64, &'a SetOfEdges)| {
+                let sample = set.samples.get(number)?.as_ref()?;
+                Some(Placed {
+                    row,
+                    side: sample.side(),
+                    sample,
+                    set,
+                })
+            };
+            let known: Vec<Placed<'_>> = sets.iter().filter_map(placed).collect();
+            let is_clear = |index: &usize| known[*index].side != 0.0;
+            let clear: Vec<usize> = (0..known.len()).filter(is_clear).collect();
+            let opposite = clear
+                .windows(2)
+                .filter(|pair| known[pair[0]].side != known[pair[1]].side);
+            let edges = opposite
+                .filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window));
+            lines.push(Line {
+                rows: rows.clone(),
+                statistic,
+                sets: sets.clone(),
+                edges: edges.collect(),
+            });
         }
-    };
-    let statistics = 0..refinement.by.len();
-    rows_of
-        .iter()
-        .flat_map(|(rows, sets)| {
-            statistics
-                .clone()
-                .map(move |number| line(rows, sets, number))
-        })
-        .collect()
+    }
+    lines
 }
 
 /// Where the rows of the refined axis lie.
@@ -411,20 +391,19 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(sweep: &Sweep, refinement: &Refinement) -> Option<Self> {
+    fn of(sweep: &Sweep, refinement: &Refinement) -> Self {
         let is_log = refinement.is_log;
         let place = |row: u64| {
-            let (_, value) = sweep.value_at(refinement.axis, row)?;
-            Some(if is_log { libm::log(value) } else { value })
+            let (_, value) = sweep.value_at(refinement.axis, row);
+            if is_log { libm::log(value) } else { value }
         };
         let last = sweep.row_counts()[refinement.axis] - 1;
-        let first = place(0)?;
-        let step = (place(last)? - first) / last as f64;
-        Some(Self {
+        let first = place(0);
+        Self {
             first,
-            step,
+            step: (place(last) - first) / last as f64,
             is_log,
-        })
+        }
     }
 
     /// The value of the parameter at a row, or a fraction of one.
@@ -434,24 +413,20 @@ impl Scale {
     }
 }
 
-/// The table of edges of a directory.
 pub(super) fn edge_rows(
     results: &Results<'_>,
     refinement: &Refinement,
 ) -> Result<Vec<EdgeRow>, ResultsError> {
     let sweep = results.sweep();
     let sets = sets_of_edges(results, refinement)?;
-    let Some(scale) = Scale::of(sweep, refinement) else {
-        return Ok(Vec::new());
-    };
+    let scale = Scale::of(sweep, refinement);
     let is_over = results.rounds_so_far().is_none_or(|rounds| rounds.is_over);
     let mut rows = Vec::new();
     for line in lines(sweep, refinement, &sets) {
         let key = line.statistic.key;
         for edge in &line.edges {
             let [low, high] = &edge.bracket;
-            let row = row_between(sweep, refinement, key, (low.row, low.set), high.row);
-            rows.extend(row.map(|row| EdgeRow {
+            rows.push(EdgeRow {
                 edge: Some(scale.value(edge.place)),
                 edge_interval: Some(Interval {
                     low: scale.value(edge.interval[0]),
@@ -460,17 +435,16 @@ pub(super) fn edge_rows(
                 rises: Some(high.side > 0.0),
                 jobs: edge.sets.iter().map(|set| set.set.seeds).sum(),
                 ended: edge.ended(sweep.seed_count(), is_over),
-                ..row
-            }));
+                ..row_between(sweep, refinement, key, (low.row, low.set), high.row)
+            });
         }
         if line.edges.is_empty()
             && let Some((first, last)) = line.sets.first().zip(line.sets.last())
         {
-            let row = row_between(sweep, refinement, key, *first, last.0);
-            rows.extend(row.map(|row| EdgeRow {
+            rows.push(EdgeRow {
                 jobs: line.sets.iter().map(|(_, set)| set.seeds).sum(),
-                ..row
-            }));
+                ..row_between(sweep, refinement, key, *first, last.0)
+            });
         }
     }
     Ok(rows)
@@ -483,10 +457,10 @@ fn row_between(
     key: &str,
     (first, set): (u64, &SetOfEdges),
     last: u64,
-) -> Option<EdgeRow> {
-    let (axis, bracket_low) = sweep.value_at(refinement.axis, first)?;
-    let (_, bracket_high) = sweep.value_at(refinement.axis, last)?;
-    Some(EdgeRow {
+) -> EdgeRow {
+    let (axis, bracket_low) = sweep.value_at(refinement.axis, first);
+    let (_, bracket_high) = sweep.value_at(refinement.axis, last);
+    EdgeRow {
         set_id: set.set_id.clone(),
         parameters: Selected::new(set.parameters.clone()),
         axis: axis.to_owned(),
@@ -498,7 +472,7 @@ fn row_between(
         bracket_low,
         bracket_high,
         ..EdgeRow::default()
-    })
+    }
 }
 
 /// The sets that the rounds of a directory have chosen, by their numbers.

@@ -5,11 +5,9 @@
 //! Phases and intervals of these passages go through the estimators of the slips. What is seen beyond them is due to the
 //! slider: the excess, of pairs of a job and its control.
 
-use super::circular::{Sum, unit};
-use super::confidence::{MIN_VALUES, ROUNDING, Unseen};
-use super::sequence::{Centred, Sequences};
+use super::confidence::{MIN_VALUES, OF_INTERVALS, OF_PHASES, ROUNDING, Unseen};
+use super::sequence::{Centred, Sequences, Sum, unit};
 use super::set::{Cycles, FinishedSet};
-use super::tongue::{OF_INTERVALS, OF_PHASES};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;
@@ -21,7 +19,6 @@ use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
 
 columns! {
-    /// What is read of a slip of a control.
     #[derive(Clone, Copy, Debug)]
     struct Onset {
         onset: f64;
@@ -34,7 +31,6 @@ columns! {
 pub(super) struct Controls(HashMap<String, BTreeMap<u64, Vec<Onset>>>);
 
 impl Controls {
-    /// Reads the slips of the controls of these sets.
     pub(super) fn read<'a>(
         slips: Dataset<'_>,
         plan: Plan<'_>,
@@ -78,7 +74,6 @@ pub(super) struct Explained {
 }
 
 impl Explained {
-    /// Adds to a set what is explained of its jobs.
     pub(super) fn add_to(&self, set: &mut FinishedSet) {
         set.row.is_control = self.is_control;
         let Some(passages) = &self.passages else {
@@ -103,7 +98,6 @@ impl Explained {
     }
 }
 
-/// The phases of passages, by their seeds.
 fn phases_of(
     passages: &BTreeMap<u64, Passage>,
     cycles: Option<Cycles>,
@@ -160,7 +154,6 @@ impl Beyond {
         }
     }
 
-    /// Of sums of jobs and of their controls.
     fn of_pairs(seen: &[Sum], alone: &[Sum], unseen: f64) -> Self {
         let ends = |excess: f64| {
             let slips = Sum::of_all(seen).weight;

@@ -6,11 +6,11 @@
 //! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 50 more for the jobs of
 //! [`MAX_SLIPS`] slips and 48 to 96 for each of these, and as much again for those of the set at hand; where the tables
 //! hold more, the slips are read again for the next sets.
+//!
+//! A sample of the slips becomes points of scatter figures.
 
 use super::drive_alone::{Controls, Explained};
-use super::jobs_of_set::{JobFacts, SetJobs};
-use super::sample::Point;
-use super::set::{FinishedSet, SetSlips};
+use super::set::{FinishedSet, JobFacts, SetJobs, SetSlips};
 use crate::model::selected::{Selected, Selection as _};
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::Slip;
@@ -20,13 +20,14 @@ use crate::sets::{AllButSeed, SetRow};
 use crate::sweep::Plan;
 use crate::table::columns::columns;
 use crate::table::file::Dataset;
+use crate::table::tables;
+use crate::table::value::words;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 
 /// Slips that are held at once: some 300 MB.
 pub(super) const MAX_SLIPS: u64 = 1 << 22;
 columns! {
-    /// The set of a job, and the job.
     pub(super) struct JobOfSet {
         set_id: String;
         facts: JobFacts;
@@ -97,7 +98,8 @@ impl<'a> Gathering<'a> {
             set.push(seed, &job.facts);
         })?;
         let mut sets: Vec<SetJobs> = sets.into_values().collect();
-        sets.sort_by(by_parameters);
+        // From a map: sets that agree in all parameters stay in the order of their ids.
+        sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
         let controls = Controls::read(slips.clone(), plan, sets.iter().map(|set| &set.parameters))?;
         Ok(Self {
             sets,
@@ -178,9 +180,10 @@ pub(super) fn each_job(
     Ok(())
 }
 
-fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
+/// The order of sets in every table.
+pub(super) fn by_parameters(left: &Parameters, right: &Parameters) -> Ordering {
     let order = |&symbol: &Symbol| {
-        let values = (left.parameters.get(symbol), right.parameters.get(symbol));
+        let values = (left.get(symbol), right.get(symbol));
         match values {
             (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
             (Value::Count(left), Value::Count(right)) => left.cmp(&right),
@@ -189,7 +192,7 @@ fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
     };
     let mut orders = AllButSeed::SYMBOLS.iter().map(order);
     let order = orders.find(|order| order.is_ne());
-    order.unwrap_or_else(|| left.set_id.cmp(&right.set_id))
+    order.unwrap_or(Ordering::Equal)
 }
 
 /// Cuts the sets where their slips would exceed the most.
@@ -227,7 +230,6 @@ impl Gathered {
         }
     }
 
-    /// The jobs with some of the seeds, and their slips.
     pub(super) fn only(&self, keeps: impl Fn(u64) -> bool) -> Self {
         let mut part = self.clone();
         part.jobs.averages.retain(|&seed, _| keeps(seed));
@@ -240,5 +242,88 @@ impl Gathered {
         let mut set = self.slips.finish(&self.jobs);
         explained.add_to(&mut set);
         (set, self.points)
+    }
+}
+
+/// Slips up to which all become points; of more, every k-th in table order remains.
+const MAX_POINTS: u64 = 20_000;
+
+words! {
+    /// A part of a run under a ramp of the modulation.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum RampStage {
+        /// On the way to the turning point.
+        Up = "up",
+        Down = "down",
+        After = "after",
+    }
+}
+
+impl RampStage {
+    /// The stage at a time in s, of a ramp that takes `ramp_time` s each way.
+    fn at(time: f64, ramp_time: f64) -> Self {
+        match time / ramp_time {
+            share if share < 1.0 => Self::Up,
+            share if share < 2.0 => Self::Down,
+            _ => Self::After,
+        }
+    }
+}
+
+columns! {
+    /// A slip as a point of a scatter figure.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Point {
+        drive_velocity as "V0": f64 = "m/s", "drive velocity";
+        amplitude as "Delta": f64 = "m", "amplitude of the modulation at the onset";
+        period as "T": Option<f64> = "s", "period of the modulation at the onset";
+        eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
+        ramp_stage: Option<RampStage> = "",
+            "where on the ramp of the modulation the onset lies: up, down, after; null without a ramp";
+        onset: f64 = "s", "time of the onset";
+        interval: Option<f64> = "s", "time since the previous onset";
+        periods: Option<u64> = "", "interval in periods T, rounded";
+        phase: Option<f64> = "rad", "phase of the onset against the modulation";
+        has_phase: bool = "", "whether the set of the slip has a phase";
+    }
+}
+
+impl Point {
+    /// A slip of a job with these parameters; whether its set has a phase is not known yet.
+    pub(super) fn of(parameters: &Parameters, slip: &Slip) -> Self {
+        let is_ramped = parameters.ramp_time > 0.0;
+        Self {
+            drive_velocity: parameters.drive_velocity,
+            amplitude: slip.modulation.amplitude,
+            period: slip.modulation.period,
+            eta: slip.modulation.eta(parameters.drive_velocity),
+            ramp_stage: is_ramped.then(|| RampStage::at(slip.onset, parameters.ramp_time)),
+            onset: slip.onset,
+            interval: slip.interval,
+            periods: slip.periods,
+            phase: slip.phase,
+            has_phase: false,
+        }
+    }
+}
+
+tables! { Point = "points", "Slips for scatter figures: all up to 20,000, or every k-th in table order"; }
+
+/// Distance k of the points among `slips` rows.
+pub(super) const fn spacing(slips: u64) -> u64 {
+    let spacing = slips.div_ceil(MAX_POINTS);
+    if spacing == 0 { 1 } else { spacing }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_points_are_kept_than_a_figure_bears() {
+        for slips in [0_u64, 1, 19_999, 20_000, 20_001, 40_000, 1_000_003] {
+            assert!(slips.div_ceil(spacing(slips)) <= MAX_POINTS, "{slips}");
+        }
+        assert_eq!((spacing(20_000), spacing(20_001)), (1, 2));
     }
 }

@@ -2,25 +2,16 @@
 //! of τ, and a sample of slips for scatter figures.
 
 mod backbone;
-mod circular;
 mod compare;
 mod confidence;
 mod crossings;
 mod drive_alone;
 mod gather;
-mod histogram;
-mod jobs_of_set;
 #[cfg(test)]
 mod pool;
-mod quantile;
-mod reduced;
 mod reduction;
-mod sample;
 mod sequence;
 mod set;
-mod set_writer;
-mod swept;
-mod tongue;
 mod values;
 
 pub use crate::sets::{FREQUENCY, SetRow};
@@ -33,20 +24,20 @@ pub(crate) use confidence::student_at;
 #[cfg(test)]
 pub(crate) use crossings::{Edge, GROUPS, Sample};
 pub use crossings::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
-pub use gather::reduce_chosen;
-pub use histogram::HistogramBin;
+pub use gather::{Point, RampStage, reduce_chosen};
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
-pub use quantile::quantile;
-pub use reduced::{Renewed, advise, read_reduced, read_sets, renew};
-pub(crate) use reduction::WRITER;
-pub use reduction::{NoJobs, ReductionSummary, reduce};
-pub use sample::{Point, RampStage};
 #[cfg(test)]
-pub(crate) use set_writer::RoundOfSet;
-pub use set_writer::{SetInRounds, error_over_target};
-pub use swept::{differing, has_even_steps, is_spread, swept};
-pub use values::{Values, ascending, is_same, sets_where};
+pub(crate) use reduction::RoundOfSet;
+pub(crate) use reduction::WRITER;
+pub use reduction::{
+    HistogramBin, NoJobs, ReductionSummary, Renewed, SetInRounds, advise, error_over_target,
+    read_reduced, read_sets, reduce, renew,
+};
+pub use sequence::quantile;
+pub use values::{
+    Values, ascending, differing, has_even_steps, is_same, is_spread, sets_where, swept,
+};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};

@@ -3,13 +3,14 @@
 use super::backbone::{Backbone, BackboneBin};
 use super::drive_alone::{Controls, Explained};
 use super::gather::{Gathered, JobOfSet, each_job};
-use super::jobs_of_set::{JobFacts, SetJobs};
-use super::set::{FinishedSet, SetRow};
+use super::set::FinishedSet;
+use super::set::{JobFacts, SetJobs};
 use crate::model::Parameters;
 use crate::observe::Slip;
 use crate::results::layout::Layout;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
+use crate::sets::SetRow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 

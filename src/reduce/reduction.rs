@@ -1,23 +1,33 @@
-//! The reduction of a results directory: four tables, committed together. Sets stand in the order of their parameters, so the
-//! same tables give the same bytes.
+//! The reduction of a results directory: sets, histograms of τ (Fig. 2), back-bone, points and edges, committed together.
+//! Sets stand in the order of their parameters, so the same tables give the same bytes. Sets of an adaptive sweep have
+//! further columns: the rounds in which a set ran, and whether it is as precise as is wanted.
+//!
+//! Reduced data are up to date by the content of the tables that they were made from, as a copied folder has other times.
 
 use super::backbone::{Backbone, BackboneBin};
 use super::crossings::{EdgeRow, edge_rows};
-use super::gather::{Gathering, MAX_SLIPS};
-use super::histogram::{HistogramBin, histogram};
-use super::reduced::{SOURCE, source};
-use super::sample::{Point, spacing};
-use super::set::SetRow;
-use super::set_writer::SetWriter;
-use crate::results::Results;
+use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
 use crate::results::commit::{Commit, exclusive_lock};
+use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
-use crate::table::columns::Table;
-use crate::table::file::TableWriter;
+use crate::results::{ErrorKind, Results, ResultsError};
+use crate::sets::SetRow;
+use crate::sweep::{Goal, Precision, Sweep, Target};
+use crate::table::checksum::hexadecimal;
+use crate::table::columns::{FromRow, Row, columns};
+use crate::table::file::{DataFile, Dataset, Footer, TableWriter};
 use crate::table::shown::shown;
+use crate::table::storage::StorageError;
+use crate::table::{Table, tables};
 use anyhow::{Result, bail};
 use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::io;
+use std::ops::Deref;
 use std::path::PathBuf;
+use tempfile::TempDir;
 
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
 pub const WRITER: &str = "reduce";
@@ -28,11 +38,9 @@ pub const WRITER: &str = "reduce";
     shown(tables)
 )]
 pub struct NoJobs {
-    /// Folder of the jobs table.
     tables: PathBuf,
 }
 
-/// What a reduction found, in brief.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReductionSummary {
     /// Jobs run to an end.
@@ -72,7 +80,7 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
 fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary)> {
     let layout = results.layout();
     // In this order: what is committed in between makes these data old.
-    let footer = &results.footer_of_all().with(SOURCE, &source(results)?);
+    let footer = results.footer_of_all().with(SOURCE, &source(results)?);
     let gathering = Gathering::of_jobs(results, &|_| true)?;
     let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
@@ -89,21 +97,20 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     };
 
     layout.ensure_folder(&layout.reduced())?;
-    let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
-    let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
-    let at = |name: &str| footer.clone().at(&layout.reduced_file(name));
-    let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, &at(SetRow::NAME))?;
-    let mut histogram_writer =
-        TableWriter::new(stage(HistogramBin::NAME)?, &at(HistogramBin::NAME))?;
-    let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, &at(BackboneBin::NAME))?;
-    let mut point_writer = TableWriter::new(stage(Point::NAME)?, &at(Point::NAME))?;
-
+    let mut staged = Staged {
+        layout,
+        commit: Commit::begin(layout, &layout.staging(WRITER))?,
+        footer,
+    };
+    let rounds = RoundsOfSets::of(results);
+    let mut set_writer = staged.begin::<SetInRounds>(&rounds.left_out())?;
+    let mut histogram_writer = staged.begin::<HistogramBin>(&[])?;
     let mut pooled = Backbone::default();
     let mut kept = Vec::new();
     gathering.each_set(max_slips, spacing(total), |set, explained| {
         let (set, points) = set.finish_with(explained);
         let row = &set.row;
-        set_writer.push(row)?;
+        set_writer.push(&(row.clone(), rounds.of_set(row)))?;
         if row.is_control {
             return Ok(());
         }
@@ -120,39 +127,298 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
         }
         Ok(())
     })?;
-    kept.sort_by_key(|(place, _)| *place);
-    summary.points = kept.len() as u64;
-    for (_, point) in &kept {
-        point_writer.push(point)?;
-    }
-    summary.backbone = pooled.finish();
-    for bin in &summary.backbone {
-        backbone_writer.push(bin)?;
-    }
-    if let Some(refinement) = results.sweep().refinement() {
-        let mut edge_writer = TableWriter::new(stage(EdgeRow::NAME)?, &at(EdgeRow::NAME))?;
-        for edge in edge_rows(results, refinement)? {
-            edge_writer.push(&edge)?;
-        }
-        edge_writer.finish()?;
-    }
     set_writer.finish()?;
     histogram_writer.finish()?;
-    backbone_writer.finish()?;
-    point_writer.finish()?;
-    Ok((commit, summary))
+    summary.backbone = pooled.finish();
+    staged.write(summary.backbone.iter().copied())?;
+    kept.sort_by_key(|(place, _)| *place);
+    summary.points = kept.len() as u64;
+    staged.write(kept.into_iter().map(|(_, point)| point))?;
+    if let Some(refinement) = results.sweep().refinement() {
+        staged.write(edge_rows(results, refinement)?)?;
+    }
+    Ok((staged.commit, summary))
+}
+
+/// Reduced tables on the way to their places.
+struct Staged<'r, 'a> {
+    layout: &'r Layout<'a>,
+    commit: Commit<'a>,
+    footer: Footer,
+}
+
+impl Staged<'_, '_> {
+    /// Begins a table without the columns of these names.
+    fn begin<R: Table>(
+        &mut self,
+        left_out: &[Cow<'static, str>],
+    ) -> Result<TableWriter<R>, ResultsError> {
+        let file = self.layout.reduced_file(R::NAME);
+        let footer = self.footer.clone().at(&file);
+        TableWriter::new(left_out, self.commit.stage(&file)?, &footer)
+    }
+
+    fn write<R: Table>(&mut self, rows: impl IntoIterator<Item = R>) -> Result<(), ResultsError> {
+        let mut writer = self.begin(&[])?;
+        for row in rows {
+            writer.push(&row)?;
+        }
+        writer.finish()
+    }
+}
+
+columns! {
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct RoundOfSet {
+        first_round: Option<u64> = "", "round in which the set began, from 1; null if the present sweep has not chosen it";
+        last_round: Option<u64> = "", "round that gave it its last seeds";
+        seeds: Option<u64> = "", "seeds that the rounds have given it";
+        target_met: Option<bool> = "",
+            "whether all statistics that are to be precise are so; null without any value of them";
+    }
+}
+
+tables! {
+    RoundOfSet = "sets of a sweep in rounds", "Further columns of `sets`, if the sweep has `[precision]` or `[refine]`";
+}
+
+pub type SetInRounds = (SetRow, RoundOfSet);
+
+tables! { SetInRounds = SetRow::NAME, SetRow::MEANING; }
+
+/// How the sets that the rounds of a sweep have chosen came about, by their numbers.
+struct RoundsOfSets<'a> {
+    sweep: &'a Sweep,
+    of_sets: HashMap<u64, RoundOfSet>,
+}
+
+impl<'a> RoundsOfSets<'a> {
+    fn of(results: &'a Results<'_>) -> Self {
+        let sweep = results.sweep();
+        let mut of_sets: HashMap<u64, RoundOfSet> = HashMap::new();
+        for (round, extension) in (1..).zip(results.rounds()) {
+            let rounds = extension.round.iter();
+            let points = rounds.flat_map(|round| round.points.iter().cloned().flatten());
+            for set in points.map(|point| sweep.set_of(point)) {
+                let of_set = of_sets.entry(set).or_default();
+                of_set.first_round.get_or_insert(round);
+                of_set.last_round = Some(round);
+                *of_set.seeds.get_or_insert(0) += 1;
+            }
+        }
+        Self { sweep, of_sets }
+    }
+
+    fn left_out(&self) -> Vec<Cow<'static, str>> {
+        match self.sweep.rounds() {
+            Some(_) => Vec::new(),
+            None => RoundOfSet::columns()
+                .into_iter()
+                .map(|column| column.name)
+                .collect(),
+        }
+    }
+
+    fn of_set(&self, row: &SetRow) -> RoundOfSet {
+        let Some(rounds) = self.sweep.rounds() else {
+            return RoundOfSet::default();
+        };
+        let number = self.sweep.set_with(&row.parameters);
+        let known = number.and_then(|set| self.of_sets.get(&set));
+        let mut of_set = known.cloned().unwrap_or_default();
+        if let Goal::Precision(precision) = &rounds.goal {
+            let error = error_over_target(row, precision);
+            of_set.target_met = error.map(|error| error <= 1.0);
+        }
+        of_set
+    }
+}
+
+/// The half-width of the interval of the least precise statistic over its target: 1 or less if all are as precise as is
+/// wanted. `None` if none of them has a value.
+pub fn error_over_target(row: &SetRow, precision: &Precision) -> Option<f64> {
+    let errors = precision.statistics.iter().filter_map(|statistic| {
+        let value = row.number(statistic.key)?;
+        let ends = ["low", "high"].map(|end| row.number(&format!("{}_{end}", statistic.key)));
+        let half = match ends {
+            [Some(low), Some(high)] => 0.5 * (high - low),
+            _ => f64::INFINITY,
+        };
+        let target = match precision.target {
+            Target::Relative(share) => share * value.abs(),
+            Target::Absolute(target) => target,
+        };
+        // Nothing is known better than exactly.
+        Some(if half == 0.0 { 0.0 } else { half / target })
+    });
+    errors.reduce(f64::max)
+}
+
+/// Bins per mean interval: 1.9 ms at the paper's standard case, where the peaks are 5 ms wide and 50 ms apart.
+const BINS_PER_MEAN: f64 = 60.0;
+
+columns! {
+    /// A bin of a histogram that holds at least one interval.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct HistogramBin {
+        set_id: String = "", "the set, a row of the sets table";
+        low: f64 = "s", "lower edge, included";
+        high: f64 = "s", "upper edge, excluded";
+        count: u64 = "", "intervals between slips";
+        density: f64 = "1/s", "share of the set's intervals per second";
+    }
+}
+
+tables! {
+    HistogramBin = "histograms",
+        "One row per bin of the intervals of a set, of a width of mean tau / 60; empty bins are left out";
+}
+
+/// The histogram of a set: bins of a width of mean τ/60, with an edge at 0; empty bins are left out.
+pub(super) fn histogram(set: &SetRow, sorted: &[f64]) -> Vec<HistogramBin> {
+    let width = set.tau_mean.unwrap_or_default() / BINS_PER_MEAN;
+    if width <= 0.0 {
+        return Vec::new();
+    }
+    let bin_of = |interval: f64| (interval / width).floor();
+    let row = |members: &[f64]| {
+        let bin = bin_of(members[0]);
+        HistogramBin {
+            set_id: set.set_id.clone(),
+            low: bin * width,
+            high: (bin + 1.0) * width,
+            count: members.len() as u64,
+            density: members.len() as f64 / (sorted.len() as f64 * width),
+        }
+    };
+    let bins = sorted.chunk_by(|&left, &right| bin_of(left) == bin_of(right));
+    bins.map(row).collect()
+}
+
+const SOURCE: &str = "reduced_from";
+
+/// A checksum of all sweeps of a directory, and of names and sizes of the committed files of jobs.
+fn source(results: &Results<'_>) -> Result<String, ResultsError> {
+    let mut digest = Sha256::new();
+    // All: which sets are controls follows from them.
+    for sweep in results.plan().sweeps() {
+        digest.update(sweep.text());
+    }
+    for path in results.dataset(JOBS)?.files() {
+        digest.update(path.file_name().unwrap_or_default().as_encoded_bytes());
+        digest.update(results.layout().storage.length(path)?.to_le_bytes());
+    }
+    Ok(hexadecimal(&digest.finalize()))
+}
+
+/// A directory whose reduced data are up to date. If nothing can be written there, they lie elsewhere as long as this lives.
+pub struct Renewed<'a> {
+    results: Results<'a>,
+    _elsewhere: Option<TempDir>,
+}
+
+impl<'a> Deref for Renewed<'a> {
+    type Target = Results<'a>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.results
+    }
+}
+
+/// Reduces the tables if the reduced data are out of date, and there are tables.
+pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
+    let renewed = Renewed {
+        results: results.clone(),
+        _elsewhere: None,
+    };
+    let layout = results.layout();
+    let is_there = layout.storage.exists(&layout.reduced_file(SetRow::NAME))?;
+    if is_there && !layout.storage.exists(&layout.table(JOBS))? {
+        return Ok(renewed);
+    }
+    let source = Footer::empty().with(SOURCE, &source(results)?);
+    let is_current = |table| {
+        let file = DataFile::with_footer(layout.reduced_file(table), source.clone());
+        file.check(layout.storage).is_ok()
+    };
+    if is_current(SetRow::NAME)
+        && is_current(HistogramBin::NAME)
+        && is_current(BackboneBin::NAME)
+        && is_current(Point::NAME)
+    {
+        return Ok(renewed);
+    }
+    match reduce(results) {
+        Ok(_) => Ok(renewed),
+        Err(error) if is_read_only(&error) => {
+            let elsewhere = tempfile::tempdir()?;
+            let results = results.reduced_to(elsewhere.path());
+            reduce(&results)?;
+            Ok(Renewed {
+                results,
+                _elsewhere: Some(elsewhere),
+            })
+        }
+        Err(error) if is_there => Err(error.context("the reduced data are out of date")),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether something failed because writing is not permitted.
+fn is_read_only(error: &anyhow::Error) -> bool {
+    let of_storage = error.downcast_ref().map(StorageError::kind);
+    let of_results = error.downcast_ref().map(|error: &ResultsError| error.kind);
+    let kind = of_storage.map(ErrorKind::Disk).or(of_results);
+    let Some(ErrorKind::Disk(kind)) = kind else {
+        return false;
+    };
+    matches!(
+        kind,
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
+    )
+}
+
+/// An error of a table, with what to do.
+pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
+    move |error| {
+        let advised = format!("{error}; {advice}");
+        anyhow::Error::new(error).context(advised)
+    }
+}
+
+/// The rows of a reduced table, such as [`Point`].
+pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
+    let file = layout.reduced_file(R::NAME);
+    let batches = Dataset::new(layout.storage, vec![file]).rows();
+    let batches: Vec<Vec<R>> = batches.collect::<Result<_, _>>()?;
+    Ok(batches.into_iter().flatten().collect())
+}
+
+/// The rows of the reduced sets, controls left out, in order.
+pub fn read_sets<'a>(
+    layout: &Layout<'a>,
+) -> impl Iterator<Item = Result<SetRow, ResultsError>> + use<'a> {
+    let file = layout.reduced_file(SetRow::NAME);
+    let batches = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
+    let rows = batches.flat_map(|batch| match batch {
+        Ok(rows) => rows.into_iter().map(Ok).collect(),
+        Err(error) => vec![Err(error)],
+    });
+    rows.filter(|row| !matches!(row, Ok(row) if row.is_control))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::read_reduced;
+    use super::super::set::SetSlips;
+    use super::super::set::tests::{jobs, slip};
     use super::*;
     use crate::model::Parameters;
     use crate::model::selected::Selected;
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{
-        DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, SlipRow, relabel,
+        All, DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, SlipRow,
     };
     use crate::results::workers::tests::open;
     use crate::solver::Summary;
@@ -243,7 +509,7 @@ mod tests {
             let path = layout.table("slips").join(&name);
             let file = Disk.create(&path).unwrap();
             let mut slip_writer =
-                TableWriter::<SlipRow<'_>>::new(file, &Footer::default()).unwrap();
+                TableWriter::<SlipRow<'_>>::new(&[], file, &Footer::default()).unwrap();
             let labels: Vec<JobLabel<DriveAndSeed>> = (0..3)
                 .map(|set| label(set, seed, [0.0, 1e-6, 2e-6][set as usize]))
                 .collect();
@@ -261,7 +527,16 @@ mod tests {
             if part < 2 {
                 let path = layout.table("jobs").join(&name);
                 let file = Disk.create(&path).unwrap();
-                let mut job_writer = TableWriter::<JobRow>::new(file, &Footer::default()).unwrap();
+                let mut job_writer =
+                    TableWriter::<JobRow>::new(&[], file, &Footer::default()).unwrap();
+                let relabel = |(names, selected, loading): &JobLabel<DriveAndSeed>| {
+                    let label: JobLabel<All> = (
+                        names.clone(),
+                        Selected::new(selected.parameters.clone()),
+                        *loading,
+                    );
+                    label
+                };
                 for (job, result) in labels.iter().zip(&measured) {
                     job_writer
                         .push(&(relabel(job), JobRecord::new(Ok(result))))
@@ -349,5 +624,26 @@ mod tests {
         let (_root, results) = without_jobs();
         let error = reduce(&results).unwrap_err();
         assert!(error.to_string().contains("holds no jobs"), "{error}");
+    }
+
+    #[test]
+    fn a_histogram_counts_every_interval_once_and_its_density_integrates_to_one() {
+        let mut set = SetSlips::default();
+        for step in 0..500_u32 {
+            set.push(0, &slip(Some(0.1 + 0.001 * f64::from(step % 37)), None));
+        }
+        let set = set.finish(&jobs(0.0, 1.0));
+        let bins = histogram(&set.row, &set.intervals);
+        assert_eq!(bins.iter().map(|bin| bin.count).sum::<u64>(), 500);
+        let integral: f64 = bins
+            .iter()
+            .map(|bin| bin.density * (bin.high - bin.low))
+            .sum();
+        assert!((integral - 1.0).abs() < 1e-12);
+        assert!(
+            bins.windows(2)
+                .all(|pair| pair[0].high <= pair[1].low * (1.0 + 1e-12))
+        );
+        assert!(histogram(&set.row, &[]).is_empty());
     }
 }

@@ -4,7 +4,13 @@
 //! which are independent whatever the correlation within them: n values in m jobs with the sums S_j of the deviations from the
 //! mean have m/(m-1) Σ_j S_j²/n² with m - 1 degrees of freedom. It is the jackknife over jobs of any function of means, to
 //! first order. Of fewer than [`MIN_STRETCHES`] jobs, each is cut into equal stretches that count as jobs (batch means). What
-//! that costs where stretches are no longer than the memory of slips is in docs/coverage.md.
+//! that costs where stretches are no longer than the memory of slips is in docs/coverage.md. Quantiles are of sorted values.
+//!
+//! Angles are unit vectors: their mean has a direction and a resultant length. What each job adds to a length is the jackknife
+//! over jobs, to first order.
+
+use crate::table::value::floored;
+use std::f64::consts::TAU;
 
 /// Stretches of slips whose sums make a variance, at least: it is then known to 27 %.
 const MIN_STRETCHES: usize = 8;
@@ -17,7 +23,6 @@ pub(super) struct Sequences<const D: usize> {
 }
 
 impl<const D: usize> Sequences<D> {
-    /// From the values of each job.
     pub(super) fn of<Job: IntoIterator<Item = [f64; D]>>(
         jobs: impl IntoIterator<Item = Job>,
     ) -> Self {
@@ -44,7 +49,6 @@ impl<const D: usize> Sequences<D> {
             .map(|(&start, end)| &self.values[start..end])
     }
 
-    /// Their mean and its covariance.
     pub(super) fn estimate(self) -> Estimate<D> {
         self.centred().mean
     }
@@ -144,7 +148,6 @@ fn rare<const D: usize>(deviations: &[[f64; D]]) -> [f64; D] {
     })
 }
 
-/// The mean of a quantity with D components.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate<const D: usize> {
     count: u64,
@@ -214,10 +217,107 @@ impl<const D: usize> Estimate<D> {
     }
 }
 
+/// Quantile of sorted values, interpolated linearly (NumPy's default); `None` without values.
+pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    at_rank(sorted, share.clamp(0.0, 1.0) * last as f64)
+}
+
+/// The value at a rank from 0, interpolated linearly; `None` beyond the last.
+pub(super) fn at_rank(sorted: &[f64], rank: f64) -> Option<f64> {
+    let below = floored(rank);
+    let value = *sorted.get(below)?;
+    let part = rank - below as f64;
+    if part == 0.0 {
+        return Some(value);
+    }
+    Some(value + part * (sorted.get(below + 1)? - value))
+}
+
+/// The unit vector of an angle in rad.
+pub(super) fn unit(angle: f64) -> [f64; 2] {
+    [libm::cos(angle), libm::sin(angle)]
+}
+
+/// The unit vector along a vector; along x if that has no length.
+pub(super) fn heading([x, y]: [f64; 2]) -> [f64; 2] {
+    let length = libm::hypot(x, y);
+    if length > 0.0 {
+        [x / length, y / length]
+    } else {
+        [1.0, 0.0]
+    }
+}
+
+/// A sum of vectors, or of numbers as vectors along x, and of their weights.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sum {
+    pub(super) vector: [f64; 2],
+    pub(super) weight: f64,
+}
+
+impl Sum {
+    pub(super) fn push(&mut self, vector: [f64; 2], weight: f64) {
+        add(&mut self.vector, &vector);
+        self.weight += weight;
+    }
+
+    pub(super) fn of_all(sums: &[Self]) -> Self {
+        let mut total = Self::default();
+        for sum in sums {
+            total.push(sum.vector, sum.weight);
+        }
+        total
+    }
+
+    /// Length of the mean; `None` without values.
+    pub(super) fn length(&self) -> Option<f64> {
+        let [x, y] = self.vector;
+        (self.weight > 0.0).then(|| libm::hypot(x, y) / self.weight)
+    }
+
+    /// What each of these adds to the length of their mean, times their number.
+    pub(super) fn added(sums: &[Self]) -> Vec<f64> {
+        let total = Self::of_all(sums);
+        let length = libm::hypot(total.vector[0], total.vector[1]);
+        let [x, y] = heading(total.vector);
+        let of_one = |sum: &Self| {
+            let along = x * sum.vector[0] + y * sum.vector[1];
+            sums.len() as f64 * (along - length / total.weight * sum.weight) / total.weight
+        };
+        sums.iter().map(of_one).collect()
+    }
+}
+
+impl Estimate<2> {
+    /// Resultant length |<exp(iφ)>| of unit vectors, 0 to 1; `None` without any.
+    pub(super) fn resultant_length(&self) -> Option<f64> {
+        self.mean().map(|[x, y]| libm::hypot(x, y).min(1.0))
+    }
+
+    /// Mean direction, in rad, as the representative in (`top` - 2π, `top`]; `None` without unit vectors.
+    pub(super) fn direction(&self, top: f64) -> Option<f64> {
+        self.mean().map(|[x, y]| wrap(libm::atan2(y, x), top))
+    }
+}
+
+/// The representative of an angle in (`top` - 2π, `top`], in rad.
+pub fn wrap(angle: f64, top: f64) -> f64 {
+    let wrapped = angle - TAU * ((angle - top) / TAU).ceil();
+    // Rounding may end just outside.
+    if wrapped <= top - TAU {
+        wrapped + TAU
+    } else {
+        wrapped.min(top)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::confidence::tests::Draws;
+    use super::super::sequence::Sequences;
     use super::*;
+    use std::f64::consts::PI;
 
     /// How often of 100 the interval of a mean of 0 holds it, for jobs of such values.
     fn covered(jobs: usize, mut values: impl FnMut(&mut Draws) -> Vec<f64>) -> f64 {
@@ -290,5 +390,59 @@ mod tests {
         let equal = Sequences::of([[[0.5]; 3]]).estimate();
         assert_eq!(equal.variance(&[1.0]), 0.0);
         assert_eq!(Sequences::<2>::default().estimate().mean(), None);
+    }
+
+    #[test]
+    fn quantiles_lie_between_neighbours() {
+        let values = [0.0, 1.0, 2.0, 10.0];
+        assert_eq!(quantile(&values, 0.0), Some(0.0));
+        assert_eq!(quantile(&values, 0.5), Some(1.5));
+        assert_eq!(quantile(&values, 1.0), Some(10.0));
+        assert_eq!(quantile(&[7.0], 0.3), Some(7.0));
+        assert_eq!(quantile(&[], 0.3), None);
+    }
+
+    #[test]
+    fn there_is_nothing_beyond_the_last_rank() {
+        let ranks = [0.0, 0.5, 1.0, 1.5, 2.0];
+        let found = ranks.map(|rank| at_rank(&[1.0, 2.0], rank));
+        assert_eq!(found, [Some(1.0), Some(1.5), Some(2.0), None, None]);
+    }
+
+    fn of(angles: &[f64]) -> Estimate<2> {
+        Sequences::of([angles.iter().map(|&angle| unit(angle))]).estimate()
+    }
+
+    #[test]
+    fn opposite_angles_cancel_and_equal_angles_add() {
+        assert!(of(&[0.0, PI]).resultant_length().unwrap() < 1e-15);
+        let equal = of(&[-3.0; 7]);
+        assert!((equal.resultant_length().unwrap() - 1.0).abs() < 1e-15);
+        assert!((equal.direction(PI).unwrap() + 3.0).abs() < 1e-15);
+        assert!((equal.direction(-4.0).unwrap() + 3.0 + TAU).abs() < 1e-14);
+        assert_eq!(of(&[]).resultant_length(), None);
+    }
+
+    #[test]
+    fn mean_direction_does_not_jump_at_the_seam() {
+        let seam = of(&[PI - 0.1, -PI + 0.1, PI - 0.2, -PI + 0.2]);
+        assert!((seam.direction(1.5 * PI).unwrap() - PI).abs() < 1e-14);
+    }
+
+    #[test]
+    fn wrapped_angles_lie_in_the_half_open_window() {
+        for top in [PI, 0.1, -2.0] {
+            for step in -1000..1000 {
+                let angle = f64::from(step) * 0.1 * PI;
+                let wrapped = wrap(angle, top);
+                assert!(
+                    wrapped > top - TAU && wrapped <= top,
+                    "{angle} -> {wrapped}"
+                );
+                assert!((libm::sin(angle) - libm::sin(wrapped)).abs() < 1e-12);
+            }
+        }
+        assert_eq!(wrap(PI, PI), PI);
+        assert_eq!(wrap(-PI, PI), PI);
     }
 }

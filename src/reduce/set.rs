@@ -1,15 +1,15 @@
-//! The table of sets, a row for each with all seeds together: intervals, locking and phase statistics.
+//! The table of sets, a row for each with all seeds together: what the jobs table says (outcomes, averages over the time of
+//! each job), and from the slips, statistics of intervals, locking and phases.
 
-use super::circular::unit;
-use super::jobs_of_set::SetJobs;
-use super::quantile::at_rank;
-use super::sequence::{Centred, Estimate, Sequences};
-use super::tongue::{OF_INTERVALS, OF_PHASES, Tongue};
+use super::confidence::{OF_INTERVALS, OF_PHASES, Tongue};
+use super::sequence::{Centred, Estimate, Sequences, at_rank, unit};
 use super::top_of_phases;
 use crate::model::Parameters;
-use crate::observe::Slip;
-pub use crate::sets::SetRow;
-use crate::table::columns::Interval;
+use crate::model::selected::Selected;
+use crate::observe::{Regime, Slip};
+use crate::results::tables::JobOutcome;
+use crate::sets::SetRow;
+use crate::table::columns::{Interval, columns};
 use crate::table::value::floored;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -19,13 +19,13 @@ const WHOLE_TURN: f64 = 1.5 * PI;
 
 /// The numbers of a slip that are kept until its set is complete. Missing values are NaN, so that a slip takes 48 bytes.
 #[derive(Clone, Copy, Debug)]
-struct SlipStats {
+pub(super) struct SlipStats {
     onset: f64,
     /// Interval before it, in s.
-    interval: f64,
+    pub(super) interval: f64,
     /// The interval in periods of the modulation at its end.
     periods: f64,
-    phase: f64,
+    pub(super) phase: f64,
     /// In N.
     peak_force: f64,
     /// Stress drop, in N.
@@ -48,12 +48,10 @@ impl SlipStats {
     }
 }
 
-/// A value that is not missing.
-fn non_nan(value: f64) -> Option<f64> {
+pub(super) fn non_nan(value: f64) -> Option<f64> {
     (!value.is_nan()).then_some(value)
 }
 
-/// Gathers the slips of a set.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SetSlips {
     /// By their seeds.
@@ -64,6 +62,10 @@ impl SetSlips {
     pub(super) fn push(&mut self, seed: u64, slip: &Slip) {
         let job = self.jobs.entry(seed).or_default();
         job.push(SlipStats::of(slip));
+    }
+
+    pub(super) fn of_job(&self, seed: u64) -> &[SlipStats] {
+        self.jobs.get(&seed).map_or(&[], Vec::as_slice)
     }
 
     /// Leaves the slips of other seeds out.
@@ -110,7 +112,6 @@ impl SetSlips {
     }
 }
 
-/// Stress drops and peak forces.
 fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) {
     let drops = estimate(jobs, |slip| Some([slip.drop]));
     // A longer interval ends at a force that is higher by the additional drop.
@@ -245,7 +246,7 @@ impl<'a> Intervals<'a> {
         estimate(self.jobs, |slip| non_nan((self.length)(slip)).map(&value))
     }
 
-    /// A quantile of all intervals; `None` if it is one that still ran.
+    /// A quantile of all intervals; `None` if that interval still ran.
     fn quantile(&self, share: f64) -> Option<f64> {
         let last = (self.sorted.len() + self.running.len()).checked_sub(1)?;
         at_rank(&self.sorted, share.clamp(0.0, 1.0) * last as f64)
@@ -312,10 +313,130 @@ pub(super) struct FinishedSet {
     pub(super) cycles: Option<Cycles>,
 }
 
+columns! {
+    /// What a reduction takes from the jobs table beside set and parameters.
+    #[derive(Clone, Debug)]
+    pub(super) struct JobFacts {
+        outcome: JobOutcome;
+        slips: Option<u64>;
+        averaged_time: Option<f64>;
+        mean_friction: Option<f64>;
+        slip_share: Option<f64>;
+        regime: Option<Regime>;
+        running_interval: Option<f64>;
+    }
+}
+
+impl JobFacts {
+    fn averages(&self) -> Option<JobAverages> {
+        Some(JobAverages {
+            time: self.averaged_time?,
+            friction: self.mean_friction?,
+            slip_share: self.slip_share?,
+        })
+    }
+}
+
+/// What the jobs table says about a set.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct SetJobs {
+    /// Id of the set, 32 hexadecimal characters.
+    pub set_id: String,
+    /// Its parameters; the seed is that of any of its jobs.
+    pub parameters: Parameters,
+    /// Jobs that were run to an end.
+    pub finished: u64,
+    pub failed: u64,
+    /// Slips that the jobs recorded.
+    pub slips: u64,
+    /// Jobs that gave up, since no slip came.
+    pub without_slips: u64,
+    /// Averages over the time of each job, by its seed.
+    pub averages: BTreeMap<u64, JobAverages>,
+    /// Jobs that `max_time` ended.
+    pub cut: u64,
+    /// Seeds of jobs that gave up after a slip, and the time since it, in s.
+    pub running: Vec<(u64, f64)>,
+    /// How the slider moved in the jobs; mixed if they differ.
+    pub regime: Option<Regime>,
+}
+
+/// Averages over the time of a job, in s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct JobAverages {
+    pub time: f64,
+    /// In N.
+    pub friction: f64,
+    pub slip_share: f64,
+}
+
+impl SetJobs {
+    /// A job of the set has ended.
+    pub(super) fn push(&mut self, seed: u64, job: &JobFacts) {
+        if job.outcome == JobOutcome::Failed {
+            self.failed += 1;
+            return;
+        }
+        self.finished += 1;
+        self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
+        self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
+        self.cut += u64::from(job.outcome == JobOutcome::TimeLimit);
+        self.averages
+            .extend(job.averages().map(|of_job| (seed, of_job)));
+        // Earlier versions also wrote one for jobs that `max_time` ended.
+        if job.outcome == JobOutcome::NoSlips {
+            let running = job.running_interval.map(|interval| (seed, interval));
+            self.running.extend(running);
+        }
+        self.regime = match (self.regime, job.regime) {
+            (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
+            (regime, other) => other.or(regime),
+        };
+    }
+
+    /// The row of the set with all that does not need its slips.
+    pub(super) fn row(&self) -> SetRow {
+        let slip_share = self.over_time(|job| job.slip_share);
+        let friction = self.over_time(|job| job.friction);
+        let coefficient = self.over_time(|job| job.friction / self.parameters.normal_force);
+        SetRow {
+            set_id: self.set_id.clone(),
+            parameters: Selected::new(self.parameters.clone()),
+            frequency: self.parameters.frequency(),
+            eta: self.parameters.eta(),
+            finished_jobs: self.finished,
+            failed_jobs: self.failed,
+            jobs_without_slips: self.without_slips,
+            jobs_cut: Some(self.cut),
+            regime: self.regime,
+            slip_share: slip_share.value(),
+            slip_share_interval: slip_share.interval().map(|ends| Interval {
+                low: ends.low.max(0.0),
+                high: ends.high.min(1.0),
+            }),
+            mean_friction: friction.value(),
+            mean_friction_interval: friction.interval(),
+            friction_coefficient: coefficient.value(),
+            friction_coefficient_interval: coefficient.interval(),
+            ..SetRow::default()
+        }
+    }
+
+    /// An average over the time of all jobs: by pseudo-values, one for each job, which weigh it by its time.
+    pub(super) fn over_time(&self, of: impl Fn(&JobAverages) -> f64) -> Estimate<1> {
+        let sum = |of: &dyn Fn(&JobAverages) -> f64| self.averages.values().map(of).sum::<f64>();
+        let time = sum(&|job| job.time);
+        let average = sum(&|job| job.time * of(job)) / time;
+        let weight = self.averages.len() as f64 / time;
+        let jobs = self.averages.values();
+        let pseudo = jobs.map(|job| [average + (of(job) - average) * job.time * weight]);
+        Sequences::independent(pseudo.collect()).estimate()
+    }
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::confidence::tests::Draws;
-    use super::super::jobs_of_set::JobFacts;
     use super::*;
     use crate::observe::Modulation;
     use crate::results::tables::JobOutcome;

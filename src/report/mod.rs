@@ -19,8 +19,8 @@ use crate::reduce::{WRITER, advise, renew};
 use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
-use crate::run::{RunEvent, status_with};
-use crate::sweep::{PLAN_VERSION, Sweep};
+use crate::run::{RunEvent, status};
+use crate::sweep::{PLAN_VERSION, Rounds, Sweep};
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
@@ -93,7 +93,7 @@ fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<Json> {
         "directory": shown(layout.root()).to_string(),
         // Set during a run; times in s, `written` since 1970 UTC.
         "live": refresh.map(|refresh| json!({ "refresh": refresh.as_secs_f64(), "written": written })),
-        "status": status_with(results, MAX_FAILURES)?,
+        "status": status(results, MAX_FAILURES)?,
         "asked": asked(sweep),
         // Keys that each axis moves, and its number of values.
         "axes": sweep.axes().collect::<Vec<_>>(),
@@ -116,12 +116,8 @@ fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<Json> {
 
 /// The statistics by which an adaptive sweep chooses its next round.
 fn asked(sweep: &Sweep) -> Vec<&'static str> {
-    let precision = sweep.rounds().and_then(|rounds| rounds.precision.as_ref());
-    let refinement = sweep.refinement().map(|refinement| &refinement.by);
-    let asked = precision
-        .map(|precision| &precision.statistics)
-        .or(refinement);
-    let statistics = asked.into_iter().flatten();
+    let rounds = sweep.rounds().into_iter();
+    let statistics = rounds.flat_map(Rounds::statistics);
     statistics.map(|statistic| statistic.key).collect()
 }
 

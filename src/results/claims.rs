@@ -3,13 +3,25 @@
 //! `run/claims/<what>.<generation>` is a link to a file with the worker's name: of several workers that make it, one wins.
 //! A worker that finds the winner dead makes the next generation. A claim stays while any worker runs, as a worker that
 //! looked earlier may not know yet what became of it. A worker that has lost some claims lists them all again.
+//!
+//! Deaths: a worker keeps a note of each part that it has taken, in its staging folder, until the part is done. The worker that
+//! removes the folder of a dead worker moves its notes to `run/deaths/<part>.<worker>`. So a job that ends its process can
+//! be named, and does not stop the others. No job fails for a mark: kills, power cuts and queues leave marks, too.
+//! A run that ends in order removes the marks of parts that are done.
 
-use crate::results::layout::is_hidden;
-use crate::results::workers::{Living, Member};
+use crate::results::layout::{Layout, claim};
+use crate::results::tables;
+use crate::results::workers::{Living, Member, PREFIX};
+use crate::sweep::PartName;
 use crate::table::error::ResultsError;
-use crate::table::storage::StorageError;
+use crate::table::shown::shown_bytes;
+use crate::table::storage::{StorageError, gone_is_fine};
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::ffi::OsStr;
+use std::ffi::OsString;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 #[derive(Debug)]
 pub struct Claims<'a> {
@@ -17,13 +29,6 @@ pub struct Claims<'a> {
     /// The last generation of each.
     generations: HashMap<String, u64>,
     own: HashSet<String>,
-}
-
-/// What is claimed by a file of this name, and the generation; `None` if it is not a claim.
-pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
-    let (what, generation) = name.to_str()?.rsplit_once('.')?;
-    let generation = generation.parse().ok()?;
-    (!is_hidden(name)).then_some((what, generation))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +68,6 @@ impl<'a> Claims<'a> {
         self.generations.get(what).copied()
     }
 
-    /// How a claim stands among workers that live.
     pub fn standing<'l>(
         &self,
         what: &str,
@@ -105,5 +109,108 @@ impl<'a> Claims<'a> {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
             name => Ok(String::from_utf8_lossy(&name?).into_owned()),
         }
+    }
+}
+
+/// The deaths at each part, each with a name.
+pub(super) type Deaths = HashMap<PartName, Vec<OsString>>;
+
+/// A missing part at which workers died.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Marked {
+    pub part: String,
+    pub deaths: usize,
+    pub jobs: usize,
+    /// Most memory that one of its jobs is predicted to take, in bytes.
+    pub memory: f64,
+    /// Commands that do the same as its first job and its last.
+    pub commands: Vec<String>,
+}
+
+impl fmt::Display for Marked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: deaths of workers: {}; jobs: {}; predicted memory of a job: {}\n  {}",
+            self.part,
+            self.deaths,
+            self.jobs,
+            shown_bytes(self.memory),
+            self.commands.join("\n  to ")
+        )
+    }
+}
+
+impl Member<'_> {
+    pub fn begin_part(&self, part: PartName) -> Result<(), StorageError> {
+        self.layout().storage.create(&self.note(part)).map(drop)
+    }
+
+    pub fn end_part(&self, part: PartName) -> Result<(), StorageError> {
+        gone_is_fine(self.layout().storage.remove(&self.note(part)))
+    }
+
+    fn note(&self, part: PartName) -> PathBuf {
+        self.staging().join(part.to_string())
+    }
+}
+
+impl Layout<'_> {
+    /// Makes marks of the notes in the staging folder of a dead worker.
+    pub(super) fn mark_deaths(&self, worker: &str) -> Result<(), StorageError> {
+        for note in self.notes(worker)? {
+            self.ensure_folder(&self.deaths())?;
+            let mark = self.deaths().join(format!("{note}.{worker}"));
+            let note = self.staging(worker).join(note.to_string());
+            gone_is_fine(self.storage.rename(&note, &mark))?;
+        }
+        Ok(())
+    }
+
+    /// The parts that a worker has taken.
+    fn notes(&self, worker: &str) -> Result<Vec<PartName>, StorageError> {
+        let names = self.storage.list(&self.staging(worker))?;
+        let names = names.iter().filter_map(|name| name.to_str());
+        Ok(names.filter_map(PartName::parse).collect())
+    }
+
+    pub(super) fn marks(&self) -> Result<Deaths, StorageError> {
+        let mut marks = Deaths::new();
+        for name in self.storage.list(&self.deaths())? {
+            let part = Path::new(&name).file_stem().and_then(|part| part.to_str());
+            if let Some(part) = part.and_then(PartName::parse) {
+                marks.entry(part).or_default().push(name);
+            }
+        }
+        Ok(marks)
+    }
+
+    /// The same, with the notes of dead workers that are no marks yet.
+    pub(super) fn marks_and_notes(&self) -> Result<Deaths, StorageError> {
+        // In this order: a worker that begins in between is not in the list.
+        let workers = self.storage.list(&self.staging(""))?;
+        let living = self.living(SystemTime::now())?;
+        let mut marks = self.marks()?;
+        let workers = workers.iter().filter_map(|worker| worker.to_str());
+        let is_dead = |worker: &&str| worker.starts_with(PREFIX) && !living.contains_key(*worker);
+        for worker in workers.filter(is_dead) {
+            for part in self.notes(worker)? {
+                marks.entry(part).or_default().push(worker.into());
+            }
+        }
+        Ok(marks)
+    }
+
+    pub fn tidy_deaths(&self) -> Result<(), StorageError> {
+        let marks = self.marks()?;
+        if marks.is_empty() {
+            return Ok(());
+        }
+        let done = self.parts_in(&self.table(tables::JOBS))?;
+        let of_done = marks.into_iter().filter(|(part, _)| done.contains(part));
+        for mark in of_done.flat_map(|(_, marks)| marks) {
+            self.remove(&self.deaths().join(mark))?;
+        }
+        Ok(())
     }
 }

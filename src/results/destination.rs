@@ -37,7 +37,6 @@ impl Kind {
         Self { name, signs }
     }
 
-    /// The kind of a file with this ending.
     pub fn of_name(file: &Path) -> Option<Self> {
         match file.extension()?.to_str()? {
             "parquet" => Some(Self::PARQUET),
@@ -57,7 +56,6 @@ impl Kind {
     }
 }
 
-/// Where a command writes a file.
 #[derive(Debug)]
 pub struct Destination {
     path: PathBuf,
@@ -108,7 +106,6 @@ impl Destination {
         Ok(destination(place, false))
     }
 
-    /// Refuses two names of one file.
     pub fn refuse_same(all: &[Self]) -> Result<(), ResultsError> {
         for (number, one) in all.iter().enumerate() {
             if let Some(other) = all[..number].iter().find(|other| one.is_same(other)) {

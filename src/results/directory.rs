@@ -3,10 +3,10 @@
 use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
-use crate::results::layout::{DoneParts, Layout, PartName, RUN, RUN_FOLDERS, is_hidden};
+use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden};
 use crate::results::tables::{TABLES, tables_of};
 use crate::results::workers::{self, Member};
-use crate::sweep::{Extension, Part, Plan, Round, Sweep};
+use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::{DataFile, Dataset, Footer};
 use crate::table::storage::StorageError;
@@ -165,7 +165,7 @@ impl<'a> Results<'a> {
         if self.is_of(sweep) {
             return Ok(());
         }
-        let done = self.done_parts()?.0;
+        let done = self.done_parts()?;
         let has_results = |number| done.iter().any(|part| part.extension == number);
         let mut known = (0..self.extensions.len()).filter(|number| has_results(*number));
         match known.find_map(|number| sweep.twin_of(&self.extensions[number].sweep)) {
@@ -174,14 +174,12 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Whether this is the current sweep.
     pub(super) fn is_of(&self, sweep: &Sweep) -> bool {
         self.extensions
             .last()
             .is_some_and(|last| last.sweep.text() == sweep.text())
     }
 
-    /// Differences of versions from those of this program.
     pub(super) fn version_differences(&self) -> Vec<String> {
         let all = self.records.iter().zip(&self.extensions);
         all.map(|(record, extension)| record.difference(&extension.sweep))
@@ -201,9 +199,10 @@ impl<'a> Results<'a> {
     }
 
     /// The same with this sweep after the others, which keep their finished parts. Walks through the plan.
-    fn extended(&self, sweep: &Sweep, done: &DoneParts) -> Self {
+    fn extended(&self, sweep: &Sweep, done: &BTreeSet<PartName>) -> Self {
         let last = self.extensions.len().checked_sub(1);
-        let kept = last.map(|last| Plan::new(&self.extensions).ranges(last, |part| done.has(part)));
+        let kept = last
+            .map(|last| Plan::new(&self.extensions).ranges(last, |part| done.contains(&part.name)));
         self.followed_by(sweep, sweep.first_round(), kept)
     }
 
@@ -288,7 +287,6 @@ impl<'a> Results<'a> {
         Ok(parts)
     }
 
-    /// The files of all parts in a table.
     pub fn dataset(&self, table: &str) -> Result<Dataset<'a>, ResultsError> {
         let tables = self.layout.tables();
         let parts = self.parts_of(table)?.into_iter();
@@ -310,9 +308,9 @@ impl<'a> Results<'a> {
         }
     }
 
-    pub fn done_parts(&self) -> Result<DoneParts, ResultsError> {
+    pub fn done_parts(&self) -> Result<BTreeSet<PartName>, ResultsError> {
         if self.extensions.is_empty() {
-            return Ok(DoneParts::default());
+            return Ok(BTreeSet::new());
         }
         // The jobs first: a part that has its jobs had its other files before.
         let mut done: Option<BTreeSet<PartName>> = None;
@@ -320,11 +318,11 @@ impl<'a> Results<'a> {
             let parts = self.parts_of(table)?;
             done = Some(done.map_or(parts.clone(), |done| &done & &parts));
         }
-        Ok(DoneParts(done.unwrap_or_default()))
+        Ok(done.unwrap_or_default())
     }
 
     /// Removes what earlier runs left of unfinished parts: files of some of their tables, and spilled jobs.
-    fn remove_unfinished(&self, done: &DoneParts) -> Result<(), StorageError> {
+    fn remove_unfinished(&self, done: &BTreeSet<PartName>) -> Result<(), StorageError> {
         let layout = &self.layout;
         let spill = layout.spill();
         for above in [layout.tables(), spill.clone()] {
@@ -332,7 +330,7 @@ impl<'a> Results<'a> {
                 let mut parts = layout.parts_in(&folder)?;
                 // A worker that begins the same sweep now may run parts of the next extension.
                 parts.retain(|part| part.extension < self.extensions.len());
-                parts.retain(|part| above == spill || !done.0.contains(part));
+                parts.retain(|part| above == spill || !done.contains(part));
                 for part in &parts {
                     layout.remove(&folder.join(part.file()))?;
                 }
@@ -412,7 +410,7 @@ impl<'a> Results<'a> {
     }
 
     pub fn job_id(&self, part: &Part, position: usize) -> String {
-        self.extensions[part.extension]
+        self.extensions[part.name.extension]
             .sweep
             .job_id(&part.jobs[position].parameters)
     }
@@ -441,7 +439,7 @@ impl<'a> Results<'a> {
     }
 }
 
-/// Whether a directory holds nothing, or no more than what a run leaves that was killed before its first extension.
+/// Whether a directory is empty, or holds only what a run leaves that was killed before its first extension.
 pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
     let storage = layout.storage;
     let holds_only = |folder: &Path, known: &[&str]| -> Result<bool, StorageError> {

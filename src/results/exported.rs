@@ -3,17 +3,30 @@
 //! Rows stand in the order of the plan, extensions one after another, so the bytes depend on what is done alone and not on
 //! how it came to that. Every row has all swept parameters, so that no table need be joined. Nothing of the directory is
 //! changed. Memory: one part, and one row group.
+//!
+//! Exports and the Python module read joined tables, part by part. They have columns that their files lack: those of the jobs
+//! of their rows, and whether a row belongs to a control.
 
+use crate::model::selected::Selected;
 use crate::results::destination::{NewFolder, refuse_stopped};
 use crate::results::directory::Results;
-use crate::results::joined::{CONTROL, JoinedTable};
-use crate::results::tables::{self, recorded_schema};
+use crate::results::parts::row_count;
+use crate::results::tables::{All, JOBS, JobRow, recorded_schema};
+use crate::sweep::PartName;
+use crate::table::arrow::{schema, schema_of};
+use crate::table::columns::columns;
 use crate::table::error::ResultsError;
+use crate::table::file::{Batch, Dataset};
 use crate::table::formats::{Format, RowWriter};
-use arrow_schema::FieldRef;
+use arrow_array::cast::AsArray;
+use arrow_array::{ArrayRef, BooleanArray, RecordBatch, StringArray, UInt32Array, new_null_array};
+use arrow_schema::{ArrowError, FieldRef, SchemaRef};
+use arrow_select::concat::concat_batches;
+use arrow_select::take::take;
 use serde::Serialize;
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 #[derive(Clone, Debug, Default, Serialize)]
@@ -58,7 +71,7 @@ impl Results<'_> {
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
         let storage = self.layout().storage;
-        let parts = self.parts_of(tables::JOBS)?;
+        let parts = self.parts_of(JOBS)?;
         let overview = self.overview()?;
         let mut exported = Exported {
             parts: parts.len() as u64,
@@ -86,7 +99,7 @@ impl Results<'_> {
                 done += 1;
             }
             writer.finish()?;
-            if table == tables::JOBS {
+            if table == JOBS {
                 exported.jobs = rows;
             }
             let bytes = storage.length(&path)?;
@@ -110,4 +123,209 @@ impl Results<'_> {
         });
         columns
     }
+}
+
+/// The column by which rows are joined with those of the jobs.
+const JOB_ID: &str = "job_id";
+/// The column that no file has: it depends on all sweeps of the directory.
+pub const CONTROL: &str = "control";
+
+columns! {
+    struct OfSet {
+        is_control as "control": bool = "", "whether its set was run as a control alone (`control = true`)";
+    }
+}
+
+/// Columns of a table: its own, and those of the jobs of its rows.
+pub struct JoinedTable<'a> {
+    results: &'a Results<'a>,
+    table: &'static str,
+    schema: SchemaRef,
+    /// Columns of the table that are read.
+    own: Vec<String>,
+    /// Columns of the jobs that are read.
+    of_jobs: Vec<String>,
+    /// Whether `control` is wanted and may be true.
+    has_controls: bool,
+}
+
+impl<'a> JoinedTable<'a> {
+    /// All columns that a table can have: its own, those of the jobs, and `control`.
+    pub fn columns(results: &Results<'_>, table: &str) -> Vec<FieldRef> {
+        let own = recorded_schema(table, results.sweep().recording());
+        let others = [schema::<JobRow>(), schema::<OfSet>()];
+        let others = others.iter().flat_map(|schema| schema.fields());
+        let others = others.filter(|field| own.field_with_name(field.name()).is_err());
+        own.fields().iter().chain(others).cloned().collect()
+    }
+
+    pub fn new(results: &'a Results<'a>, table: &'static str, columns: &[FieldRef]) -> Self {
+        let recorded = recorded_schema(table, results.sweep().recording());
+        let names = columns.iter().map(|field| field.name().clone());
+        let (mut own, mut of_jobs): (Vec<_>, Vec<_>) =
+            names.partition(|name| recorded.field_with_name(name).is_ok());
+        let wants_control = of_jobs.iter().any(|name| name == CONTROL);
+        of_jobs.retain(|name| name != CONTROL);
+        let has_controls =
+            wants_control && (results.plan().sweeps()).any(|sweep| sweep.recording().control);
+        if has_controls {
+            let parameters = schema::<Selected<All>>();
+            of_jobs.extend(parameters.fields().iter().map(|field| field.name().clone()));
+        }
+        own.push(JOB_ID.to_owned());
+        Self {
+            results,
+            table,
+            schema: schema_of(columns),
+            own,
+            of_jobs,
+            has_controls,
+        }
+    }
+
+    /// The parts that count: those with jobs.
+    pub fn parts(&self) -> Result<BTreeSet<PartName>, ResultsError> {
+        self.results.parts_of(JOBS)
+    }
+
+    pub const fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    /// Passes the rows of a part on, batch by batch. A part without one of its files is damaged.
+    pub fn visit(
+        &self,
+        part: PartName,
+        visit: impl FnMut(RecordBatch) -> Result<(), ResultsError>,
+    ) -> Result<(), ResultsError> {
+        self.visit_batches(part, visit)
+            .map_err(|error| match error.damage() {
+                Ok((path, problem)) => ResultsError::damaged(&path, problem),
+                Err(error) => error,
+            })
+    }
+
+    fn visit_batches(
+        &self,
+        part: PartName,
+        mut visit: impl FnMut(RecordBatch) -> Result<(), ResultsError>,
+    ) -> Result<(), ResultsError> {
+        let layout = self.results.layout();
+        let jobs = self.read_jobs(part)?;
+        let mut file = (self.results).file_in(&layout.tables(), self.table, part);
+        if self.table != JOBS {
+            let jobs = self.results.dataset_of(JOBS, part);
+            file.rows = Some(row_count(jobs, self.table)?);
+        }
+        for batch in Dataset::of(layout.storage, vec![file]).columns(&self.own) {
+            let Batch { path, rows } = batch?;
+            let joined = self.join(&rows, jobs.as_ref());
+            visit(joined.map_err(ResultsError::damage_at(&path))?)?;
+        }
+        Ok(())
+    }
+
+    /// The columns of the jobs of a part; `None` if no row needs them.
+    fn read_jobs(&self, part: PartName) -> Result<Option<Jobs>, ResultsError> {
+        if self.of_jobs.is_empty() {
+            return Ok(None);
+        }
+        let mut names = self.of_jobs.clone();
+        names.push(JOB_ID.to_owned());
+        let mut batches = Vec::new();
+        let mut controls = Vec::new();
+        for batch in self.results.dataset_of(JOBS, part).columns(&names) {
+            let batch = batch?;
+            if self.has_controls {
+                let jobs: Vec<Selected<All>> = batch.rows_of()?;
+                let plan = self.results.plan();
+                controls.extend(jobs.iter().map(|job| plan.is_control(&job.parameters)));
+            }
+            batches.push(batch.rows);
+        }
+        let columns = batches
+            .first()
+            .map_or_else(schema::<JobRow>, RecordBatch::schema);
+        let jobs = concat_batches(&columns, &batches)
+            .and_then(|columns| Jobs::new(columns, controls.into()));
+        let path = (self.results).file_in(&self.results.layout().tables(), JOBS, part);
+        jobs.map(Some).map_err(ResultsError::damage_at(&path.path))
+    }
+
+    fn join(&self, rows: &RecordBatch, jobs: Option<&Jobs>) -> Result<RecordBatch, ArrowError> {
+        let places = jobs.map(|jobs| jobs.places(rows)).transpose()?;
+        let jobs = jobs.zip(places.as_ref());
+        with_columns(rows, &self.schema, |name| {
+            if name == CONTROL && !self.has_controls {
+                let controls = BooleanArray::from(vec![false; rows.num_rows()]);
+                return Some(Ok(Arc::new(controls)));
+            }
+            let (jobs, places) = jobs?;
+            if name == CONTROL {
+                return Some(take(&jobs.controls, places, None));
+            }
+            let column = jobs.columns.column_by_name(name)?;
+            Some(take(column, places, None))
+        })
+    }
+}
+
+/// Rows with the columns of a schema: their own, or others by name; null for a column that another version did not have.
+pub fn with_columns(
+    rows: &RecordBatch,
+    schema: &SchemaRef,
+    other: impl Fn(&str) -> Option<Result<ArrayRef, ArrowError>>,
+) -> Result<RecordBatch, ArrowError> {
+    let column = |field: &FieldRef| {
+        let name = field.name();
+        if let Some(column) = rows.column_by_name(name) {
+            return Ok(Arc::clone(column));
+        }
+        match other(name) {
+            Some(column) => column,
+            None if field.is_nullable() => Ok(new_null_array(field.data_type(), rows.num_rows())),
+            None => Err(missing(name)),
+        }
+    };
+    let columns = schema.fields().iter().map(column);
+    RecordBatch::try_new(SchemaRef::clone(schema), columns.collect::<Result<_, _>>()?)
+}
+
+struct Jobs {
+    columns: RecordBatch,
+    /// Whether each is a control; empty if no sweep has controls.
+    controls: BooleanArray,
+    by_id: HashMap<String, u32>,
+}
+
+impl Jobs {
+    fn new(columns: RecordBatch, controls: BooleanArray) -> Result<Self, ArrowError> {
+        let ids = ids(&columns)?.iter().zip(0..);
+        let by_id = ids.filter_map(|(id, place)| Some((id?.to_owned(), place)));
+        let by_id = by_id.collect();
+        Ok(Self {
+            columns,
+            controls,
+            by_id,
+        })
+    }
+
+    /// Where the job of each row stands.
+    fn places(&self, rows: &RecordBatch) -> Result<UInt32Array, ArrowError> {
+        let place = |id: Option<&str>| self.by_id.get(id?).copied();
+        let places: Option<Vec<u32>> = ids(rows)?.iter().map(place).collect();
+        let others = || ArrowError::SchemaError("it has rows of other jobs".to_owned());
+        places.map(UInt32Array::from).ok_or_else(others)
+    }
+}
+
+fn ids(rows: &RecordBatch) -> Result<&StringArray, ArrowError> {
+    let ids = rows
+        .column_by_name(JOB_ID)
+        .and_then(|column| column.as_string_opt());
+    ids.ok_or_else(|| missing(JOB_ID))
+}
+
+fn missing(column: &str) -> ArrowError {
+    ArrowError::SchemaError(format!("there is no column {column}"))
 }

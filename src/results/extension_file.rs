@@ -45,11 +45,9 @@ pub(super) struct Record {
     part_cost: f64,
     /// The points that the extension before keeps from when this one began; all, if this is the next round of its sweep.
     kept_before: Option<Vec<RangeInclusive<u64>>>,
-    /// The round of an adaptive sweep.
     round: Option<Round>,
     /// Checksum of the file before.
     before: Option<String>,
-    /// The text of the sweep file.
     pub sweep: String,
 }
 
@@ -164,38 +162,18 @@ impl Record {
             return Err(ResultsError::refused(path, problem));
         }
         let record: Self = serde_json::from_str(&text).map_err(unreadable)?;
-        match record.problem(number) {
-            Some(problem) => Err(damaged(problem.to_owned())),
-            None => Ok(record),
+        if record.before.is_some() != (number > 0) {
+            return Err(damaged("it is that of another extension".to_owned()));
         }
+        Ok(record)
     }
 
     /// Whether it is that of the extension after this one.
     fn follows(&self, before: &Self) -> bool {
         self.before == Some(checksum::of_text(&before.text()))
     }
-
-    /// Why no program can have written this as the file of the extension with this number.
-    fn problem(&self, number: usize) -> Option<&'static str> {
-        let is_ordered = |ranges: &Vec<RangeInclusive<u64>>| {
-            let mut pairs = ranges.windows(2);
-            ranges.iter().all(|range| range.start() <= range.end())
-                && pairs.all(|pair| pair[0].end() < pair[1].start())
-        };
-        let points = self.round.as_ref().map(|round| &round.points);
-        if self.before.is_some() != (number > 0) {
-            Some("it is that of another extension")
-        } else if !(self.part_cost.is_finite() && self.part_cost >= 0.0) {
-            Some("the cost of a part makes no sense")
-        } else if !self.kept_before.iter().chain(points).all(is_ordered) {
-            Some("its points are not in order")
-        } else {
-            None
-        }
-    }
 }
 
-/// What the files of the extensions of a directory say.
 #[derive(Default)]
 pub(super) struct Records {
     /// In order; none if there is no file.
@@ -260,7 +238,6 @@ fn first_whole(
     Ok(whole)
 }
 
-/// The extensions that these records say.
 pub(super) fn extensions(
     layout: &Layout<'_>,
     records: &[Record],

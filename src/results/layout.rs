@@ -14,7 +14,7 @@
 //! EEE is the number of the extension, FFFFFF that of the part in it. Staging lies on the same file system as the tables,
 //! so that a rename moves a whole file at once, but outside their folders: a stray file there breaks some reader.
 
-use crate::sweep::{Outline, Sweep};
+use crate::sweep::{PartName, Sweep};
 use crate::table::error::ResultsError;
 use crate::table::file::FILE_EXTENSION;
 use crate::table::shown::shown;
@@ -28,7 +28,6 @@ use std::time::{Duration, Instant};
 
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
-/// Default folder of results directories.
 const RESULTS: &str = "results";
 pub const RUN_FOLDERS: [&str; 8] = [
     "staging", "lock", "log", "workers", "claims", "spill", "batch", "deaths",
@@ -68,7 +67,6 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The folder of reduced data, and of what making them needs.
     fn reduced_root(&self) -> &Path {
         self.elsewhere.as_deref().unwrap_or(&self.root)
     }
@@ -118,7 +116,6 @@ impl<'a> Layout<'a> {
         Ok(names)
     }
 
-    /// The parts that have a file in a folder.
     pub(super) fn parts_in(&self, folder: &Path) -> Result<BTreeSet<PartName>, StorageError> {
         let names = self.names_in(folder)?.into_iter();
         Ok(names
@@ -203,6 +200,13 @@ pub(super) fn is_table_file(name: &OsStr) -> bool {
     !is_hidden(name) && extension.is_some_and(|extension| extension == FILE_EXTENSION)
 }
 
+/// What is claimed by a file of this name, and the generation; `None` if it is not a claim.
+pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
+    let (what, generation) = name.to_str()?.rsplit_once('.')?;
+    let generation = generation.parse().ok()?;
+    (!is_hidden(name)).then_some((what, generation))
+}
+
 fn extension_name(number: usize) -> String {
     format!("{EXTENSION}{number:03}.json")
 }
@@ -230,7 +234,6 @@ places! {
     tables = "tables";
     figures = "figures";
     report = "report.html";
-    /// Everything that is no result.
     run = RUN;
     claims = "run/claims";
     /// The parts that dead workers were at.
@@ -243,14 +246,6 @@ places! {
     /// What a stopped run had finished of parts that are not done.
     spill = "run/spill";
     workers = "run/workers";
-}
-
-/// Name of a part, which is that of its file in every table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PartName {
-    pub extension: usize,
-    /// Number of the part within its extension.
-    pub index: u64,
 }
 
 impl PartName {
@@ -275,32 +270,12 @@ impl PartName {
     }
 }
 
-impl From<&Outline> for PartName {
-    fn from(part: &Outline) -> Self {
-        Self {
-            extension: part.extension,
-            index: part.index,
-        }
-    }
-}
-
 impl fmt::Display for PartName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "part-{:03}-{:06}", self.extension, self.index)
     }
 }
 
-/// The parts that are done: those that have a file in every table.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DoneParts(pub(super) BTreeSet<PartName>);
-
-impl DoneParts {
-    pub fn has(&self, part: &Outline) -> bool {
-        self.0.contains(&part.into())
-    }
-}
-
-/// A duration that is shorter in tests.
 pub const fn shorter_in_tests(usual: Duration, in_tests: Duration) -> Duration {
     if cfg!(test) { in_tests } else { usual }
 }

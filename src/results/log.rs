@@ -3,8 +3,8 @@
 //! The log is lines of JSON in `run/log/`, one file for each run, so that no two hosts write into one file. Tables never
 //! depend on it.
 
+use crate::results::claims::Marked;
 use crate::results::commit::own_number;
-use crate::results::deaths::Marked;
 use crate::results::directory::Results;
 use crate::results::layout::is_hidden;
 use crate::results::next_round::RoundsSoFar;
@@ -31,7 +31,6 @@ pub enum RunEvent {
         jobs_there: u64,
         predicted_cost: f64,
     },
-    /// The next round of an adaptive sweep has begun.
     RoundBegun {
         jobs: u64,
         predicted_cost: f64,
@@ -78,9 +77,8 @@ pub enum RunEvent {
     },
     /// The run was asked to stop, or its time is over; jobs in flight are interrupted.
     Stopping,
-    /// Not all parts would end in time; those that have begun do.
+    /// Not all parts would end in time; the parts that have begun do.
     OutOfTime,
-    /// The run ends by itself.
     Finished(RunReport),
     Error {
         error: String,
@@ -116,7 +114,6 @@ pub struct RunReport {
     pub rounds: Option<RoundsSoFar>,
 }
 
-/// Most bytes of a line.
 const MAX_LINE: u64 = 1 << 24;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

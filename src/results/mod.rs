@@ -9,23 +9,20 @@
 //!   parts.rs                  the rows of a part, in all tables at once
 //!   pending.rs                what runs again
 //!   next_round.rs             what an adaptive sweep runs next
-//!   workers.rs, claims.rs     running workers, and the parts that they run
-//!   deaths.rs                 parts at which workers died
+//!   workers.rs                running workers
+//!   claims.rs                 the parts that they run, and those at which they died
 //!   log.rs                    events of runs, and their log
 //!   verification.rs           damage, and its repair
-//!   joined.rs                 tables with columns of their jobs
-//!   exported.rs               a few large files for other tools
+//!   exported.rs               tables with columns of their jobs, as a few large files for other tools
 //! destination.rs              files and folders outside of the data, which a command writes
 //! ```
 
 pub mod claims;
 pub mod commit;
-pub mod deaths;
 pub mod destination;
 pub mod directory;
 pub mod exported;
 mod extension_file;
-pub mod joined;
 pub mod layout;
 pub mod log;
 pub mod next_round;

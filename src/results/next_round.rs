@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 
 const LOCK: &str = "round";
 
-/// How far the rounds of a sweep are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RoundsSoFar {
     /// The round that was begun last, from 1.
@@ -82,7 +81,10 @@ impl Results<'_> {
         let done = current.done_parts()?;
         // Another worker was first, or a repair has moved a part away.
         if current.extensions().len() > self.extensions().len()
-            || current.plan().outlines().any(|part| !done.has(&part))
+            || current
+                .plan()
+                .outlines()
+                .any(|part| !done.contains(&part.name))
         {
             return Ok(Some(current));
         }

@@ -7,14 +7,14 @@
 use crate::observe::Measurements;
 use crate::results::commit::Commit;
 use crate::results::directory::Results;
-use crate::results::layout::PartName;
 use crate::results::tables::{
     self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
-    label, relabel,
+    label,
 };
 use crate::results::workers::Member;
-use crate::sweep::{Outline, Part};
-use crate::table::columns::{Table, columns};
+use crate::sweep::{Outline, Part, PartName};
+use crate::table::Table;
+use crate::table::columns::columns;
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
 use crate::table::storage::StorageError;
@@ -51,7 +51,7 @@ impl<'a> Results<'a> {
     }
 
     pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
-        self.layout().table(table).join(PartName::from(part).file())
+        self.layout().table(table).join(part.name.file())
     }
 
     /// Spills the outcomes of some jobs of a part, beside those at the positions that are spilled already.
@@ -101,7 +101,7 @@ impl<'a> Results<'a> {
         }
         let done = self.done_parts()?;
         for part in parts {
-            if spilled.contains(&PartName::from(part)) && done.has(part) {
+            if spilled.contains(&part.name) && done.contains(&part.name) {
                 self.remove_spilled(part)?;
             }
         }
@@ -111,7 +111,7 @@ impl<'a> Results<'a> {
     fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
         // Jobs first: without them the other files do not count.
         self.tables().rev().try_for_each(|table| {
-            let file = self.file_in(&self.layout().spill(), table, part.into());
+            let file = self.file_in(&self.layout().spill(), table, part.name);
             self.layout().remove(&file.path)
         })
     }
@@ -125,12 +125,13 @@ impl<'a> Results<'a> {
         is_written: impl Fn(&usize) -> bool,
         places: (Option<&PathBuf>, &PathBuf),
     ) -> Result<(), ResultsError> {
-        let sweep = &self.extensions()[part.extension].sweep;
-        let label = |position: usize| label(sweep, &part.jobs[position].parameters);
+        let sweep = &self.extensions()[part.name.extension].sweep;
         let positions = (0..part.jobs.len()).filter(is_written);
-        let jobs: Jobs<'_> = positions
-            .map(|position| (label(position), outcomes.get(&position)))
-            .collect();
+        let job = |position: usize| {
+            let parameters = &part.jobs[position].parameters;
+            (label(sweep, parameters), outcomes.get(&position))
+        };
+        let jobs: Jobs<'_> = positions.map(job).collect();
         let mut commit = member.commit();
         self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             let mut slips = outcome.iter().flat_map(|measured| &measured.slips);
@@ -150,7 +151,7 @@ impl<'a> Results<'a> {
         }
         self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
-            writer.push(&(relabel(job), record))
+            writer.push(&(label(sweep, &job.1.parameters), record))
         })?;
         self.publish(commit)
     }
@@ -169,7 +170,7 @@ impl<'a> Results<'a> {
         ) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
-        let file = |place: &PathBuf| self.file_in(place, R::NAME, PartName::from(&**part));
+        let file = |place: &PathBuf| self.file_in(place, R::NAME, part.name);
         let target = file(to).path;
         // A run makes the folder of the tables when it begins.
         let top = if *to == self.layout().spill() {
@@ -179,10 +180,10 @@ impl<'a> Results<'a> {
         };
         storage.ensure_folder_below(top, &to.join(R::NAME))?;
         let kept = KeptRows::read(Dataset::of(storage, from.map(file).into_iter().collect()))?;
-        let sweep = &self.extensions()[part.extension].sweep;
+        let sweep = &self.extensions()[part.name.extension].sweep;
         let left_out = sweep.recording().left_out();
-        let footer = self.footer(part.extension, &target);
-        let mut writer = TableWriter::without(&left_out, commit.stage(&target)?, &footer)?;
+        let footer = self.footer(part.name.extension, &target);
+        let mut writer = TableWriter::new(&left_out, commit.stage(&target)?, &footer)?;
         for (job, outcome) in jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,

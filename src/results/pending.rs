@@ -6,21 +6,22 @@
 //! | extensions | which extension has a job: the first that keeps it, else the last | `sweep/plan.rs` | `what_is_taken_out_of_the_sweep_is_kept_if_done_and_else_not_run` |
 //! | parts | a part is done if all its files are there | [`Results::done_parts`] | `a_damaged_part_is_named_with_the_way_out_which_works` |
 //! | retries | of a part that is done, jobs that failed, that needed more memory than was allowed, or that a shorter `max_time` cut off | [`Pending::runs_again`] | `failing_and_panicking_jobs_become_rows_others_continue_and_a_retry_mends_them`, `a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others` |
-//! | spill | of one that is not, all jobs but those that a stopped run has finished | [`Pending::spilled`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
+//! | spill | of a part that is not done, all jobs except those that a stopped run has finished | [`Pending::spilled`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
 //!
 //! Which worker runs it is decided in `claims.rs` and `run/take.rs`.
 
-use crate::results::deaths::Deaths;
+use crate::results::claims::{Deaths, Marked};
 use crate::results::directory::Results;
-use crate::results::layout::{DoneParts, PartName, settled};
+use crate::results::layout::settled;
 use crate::results::tables::{self, JobOutcome, RowOfJob};
-use crate::sweep::{Extension, Job, LARGE, Outline, Part, certain_memory};
+use crate::sweep::{Extension, Job, LARGE, Outline, Part, PartName, certain_memory};
 use crate::table::columns::columns;
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::Dataset;
 use crate::table::shown::shown_bytes;
 use serde::Serialize;
 use std::cell::RefCell;
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::io;
 
@@ -51,7 +52,6 @@ pub struct Overview {
 /// Why a job of a finished part may run again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Again {
-    /// It failed, for this reason.
     Failed(String),
     /// A shorter `max_time` than the present one ended it.
     CutOff,
@@ -64,6 +64,9 @@ pub struct Retry {
     pub memory: f64,
 }
 
+/// Parts that [`Pending::marked`] lists, at most.
+const MAX_MARKED: usize = 10;
+
 /// The beginning of the reason of a job that failed for lack of memory.
 const MEMORY: &str = "memory: ";
 
@@ -74,7 +77,7 @@ pub struct Pending<'a> {
     /// In plan order.
     pub parts: &'a [Outline],
     pub retry: Retry,
-    pub done: DoneParts,
+    pub done: BTreeSet<PartName>,
     /// Looked up again, as workers die.
     deaths: RefCell<Deaths>,
     /// Looked up again, as stopped workers spill.
@@ -96,7 +99,7 @@ impl<'a> Pending<'a> {
         results: &'a Results<'a>,
         parts: &'a [Outline],
         retry: Retry,
-        done: DoneParts,
+        done: BTreeSet<PartName>,
     ) -> Result<Self, ResultsError> {
         let pending = Self {
             results,
@@ -129,7 +132,7 @@ impl<'a> Pending<'a> {
 
     pub fn deaths(&self, part: &Outline) -> usize {
         let deaths = self.deaths.borrow();
-        deaths.get(&part.into()).map_or(0, Vec::len)
+        deaths.get(&part.name).map_or(0, Vec::len)
     }
 
     pub fn part(&self, outline: &Outline) -> Part {
@@ -170,7 +173,7 @@ impl<'a> Pending<'a> {
 
     /// Positions of the finished jobs of an unfinished part.
     pub fn spilled(&self, part: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
-        if self.spilled.borrow().contains(&part.into()) {
+        if self.spilled.borrow().contains(&part.name) {
             self.results.spilled(part)
         } else {
             Ok(BTreeSet::new())
@@ -186,7 +189,7 @@ impl<'a> Pending<'a> {
     ) -> Result<Overview, ResultsError> {
         let mut overview = Overview::default();
         for outline in self.parts {
-            if self.done.has(outline) {
+            if self.done.contains(&outline.name) {
                 overview.parts_done += 1;
                 overview.jobs_done += outline.job_count as u64;
                 overview.predicted_cost_done += outline.cost;
@@ -200,7 +203,6 @@ impl<'a> Pending<'a> {
         Ok(overview)
     }
 
-    /// Counts an unfinished part.
     fn count_missing(&self, part: &Outline, overview: &mut Overview) -> Result<(), ResultsError> {
         let spilled = self.spilled(part)?;
         let mut spilled_cost = 0.0;
@@ -246,6 +248,29 @@ impl<'a> Pending<'a> {
         }
         Ok(())
     }
+
+    /// The missing parts with the most deaths.
+    pub fn marked(&self) -> Vec<Marked> {
+        let may_run = |part: &Outline| !self.done.contains(&part.name) || self.may_run_again(part);
+        let is_marked = |part: &&Outline| self.deaths(part) > 0 && may_run(part);
+        let mut parts: Vec<&Outline> = self.parts.iter().filter(is_marked).collect();
+        parts.sort_by_key(|part| Reverse(self.deaths(part)));
+        parts.truncate(MAX_MARKED);
+        let marked = parts.into_iter().map(|outline| {
+            let jobs = self.part(outline).jobs;
+            let ends = [&jobs[0], &jobs[jobs.len() - 1]];
+            let mut commands = Vec::from(ends.map(|job| self.results.sweep().command(job)));
+            commands.dedup();
+            Marked {
+                part: outline.name.to_string(),
+                deaths: self.deaths(outline),
+                jobs: jobs.len(),
+                memory: outline.memory,
+                commands,
+            }
+        });
+        marked.collect()
+    }
 }
 
 columns! {
@@ -276,7 +301,7 @@ impl Results<'_> {
         let is_cut_off = |time: f64| time < max_time * (1.0 - SAME_TIME);
         let mut again = BTreeMap::new();
         let mut rows = 0;
-        let jobs = self.dataset_of(tables::JOBS, part.into());
+        let jobs = self.dataset_of(tables::JOBS, part.name);
         for batch in jobs.rows::<OutcomeRow>() {
             for row in batch? {
                 let is_cut_off = row.simulated_time.is_some_and(is_cut_off);
@@ -297,7 +322,7 @@ impl Results<'_> {
             let problem = format!("{rows} jobs where the plan has {}", part.job_count);
             return Err(ResultsError::damaged(&file, problem));
         }
-        if !again.is_empty() && part.extension + 1 < self.extensions().len() {
+        if !again.is_empty() && part.name.extension + 1 < self.extensions().len() {
             let jobs = self.plan().part(part).jobs;
             again.retain(|&position, _| self.sweep().contains(&jobs[position].parameters));
         }
@@ -331,7 +356,7 @@ impl Results<'_> {
         outline: &Outline,
         table: &str,
     ) -> Result<Option<Result<HashSet<String>, Lost>>, ResultsError> {
-        let file = self.file_in(&self.layout().spill(), table, outline.into());
+        let file = self.file_in(&self.layout().spill(), table, outline.name);
         let mut ids = HashSet::new();
         for batch in Dataset::of(self.layout().storage, vec![file]).rows::<RowOfJob>() {
             match batch {
@@ -339,7 +364,7 @@ impl Results<'_> {
                 Err(error) if error.kind == ErrorKind::Damaged => return Ok(Some(Err(Lost))),
                 Err(error) if error.kind == ErrorKind::Disk(io::ErrorKind::NotFound) => {
                     // Another worker that has just committed the part has removed the file.
-                    let is_listed = self.spilled_parts(table)?.contains(&outline.into());
+                    let is_listed = self.spilled_parts(table)?.contains(&outline.name);
                     return Ok((!is_listed).then_some(Err(Lost)));
                 }
                 Err(error) => return Err(error),

@@ -7,8 +7,9 @@ use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
 use crate::sweep::Sweep;
 use crate::table::arrow::RowBuffer;
-use crate::table::columns::{Table, columns, tables};
+use crate::table::columns::columns;
 use crate::table::value::words;
+use crate::table::{Table, tables};
 use arrow_schema::SchemaRef;
 
 words! {
@@ -19,7 +20,6 @@ words! {
         TimeLimit = "time limit",
         /// It gave up, since no slip came within `give_up_after`.
         NoSlips = "no slips",
-        /// It could not be finished.
         Failed = "failed",
     }
 }
@@ -104,7 +104,6 @@ pub fn recorded_schema(table: &str, recording: &Recording) -> SchemaRef {
     SchemaRef::clone(buffer.without(&recording.left_out()).schema())
 }
 
-/// The label of a job of a sweep.
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> JobLabel<S> {
     (
         Names {
@@ -113,16 +112,6 @@ pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> JobLabel<S> {
         },
         Selected::new(parameters.clone()),
         Loading::of(parameters),
-    )
-}
-
-/// The same label with other parameters.
-pub fn relabel<S, T>(label: &JobLabel<S>) -> JobLabel<T> {
-    let (names, selected, loading) = label;
-    (
-        names.clone(),
-        Selected::new(selected.parameters.clone()),
-        *loading,
     )
 }
 

@@ -6,11 +6,11 @@
 use crate::results::commit::Commit;
 use crate::results::directory::{Results, STRANGER};
 use crate::results::extension_file;
-use crate::results::layout::{DoneParts, Layout, PartName, is_table_file};
+use crate::results::layout::{Layout, is_table_file};
 use crate::results::parts::RowsOfJob;
 use crate::results::pending::{Pending, Retry};
 use crate::results::tables::{self, RowOfJob};
-use crate::sweep::{Outline, Part};
+use crate::sweep::{Outline, Part, PartName};
 use crate::table::error::ResultsError;
 use crate::table::file::{DataFile, Footer};
 use crate::table::shown::{serialize_path, shown};
@@ -29,7 +29,6 @@ pub struct Verification {
     pub problems: Vec<Problem>,
     /// Other files among tables and reduced data, which no command reads: paths, as messages show them.
     pub passed_over: Vec<String>,
-    /// Table files that are intact.
     pub files: u64,
     pub bytes: u64,
     /// Parts that are done and intact.
@@ -163,16 +162,16 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
     }
     let mut planned = BTreeSet::new();
     let mut sound: Vec<Outline> = Vec::new();
-    let mut done = DoneParts::default();
+    let mut done = BTreeSet::new();
     for part in results.plan().parts() {
-        let name = PartName::from(&*part);
+        let name = part.name;
         planned.insert(name);
         let is_there = |table: &&str| there[table].contains(&results.part_file(table, &part));
         let tables: Vec<&'static str> = results.tables().filter(is_there).collect();
         if verify_part(results, &part, &tables, found)? {
             sound.push((*part).clone());
             if tables.contains(&tables::JOBS) {
-                done.0.insert(name);
+                done.insert(name);
             }
         }
     }
@@ -196,7 +195,7 @@ fn verify_part(
     tables: &[&'static str],
     found: &mut Verification,
 ) -> Result<bool, ResultsError> {
-    let name = PartName::from(&**part).to_string();
+    let name = part.name.to_string();
     let mut damage = damage_of(results, part, tables)?;
     if !damage.is_empty() {
         // A retry of failed jobs may have been replacing its files.
@@ -224,7 +223,6 @@ fn verify_part(
     Ok(true)
 }
 
-/// The ids of the jobs of a part, in order.
 fn ids(results: &Results<'_>, part: &Part) -> impl Iterator<Item = String> {
     (0..part.jobs.len()).map(|position| results.job_id(part, position))
 }
@@ -239,7 +237,7 @@ fn damage_of(
     let has_jobs = tables.contains(&tables::JOBS);
     let mut damage = Vec::new();
     for table in results.tables() {
-        let file = results.file_in(&layout.tables(), table, PartName::from(&**part));
+        let file = results.file_in(&layout.tables(), table, part.name);
         if tables.contains(&table) {
             // Files that a killed run left are intact, too, as other programs read them.
             damage.extend(damage_in(file.check(layout.storage))?);
@@ -259,7 +257,7 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
     let path = results.part_file(tables::JOBS, part);
     let damaged = |problem: String| Err(ResultsError::damaged(&path, problem));
     let mut jobs: Vec<RowsOfJob> = Vec::new();
-    let dataset = results.dataset_of(tables::JOBS, PartName::from(&**part));
+    let dataset = results.dataset_of(tables::JOBS, part.name);
     for batch in dataset.rows() {
         jobs.extend(batch?);
     }
@@ -288,7 +286,7 @@ fn check_counts(
     let path = results.part_file(table, part);
     let mut counts = vec![0; jobs.len()];
     let mut at = 0;
-    let dataset = results.dataset_of(table, PartName::from(&**part));
+    let dataset = results.dataset_of(table, part.name);
     for batch in dataset.rows::<RowOfJob>() {
         for RowOfJob { job_id } in batch? {
             // Rows stand in the order of the jobs.

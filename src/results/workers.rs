@@ -8,9 +8,8 @@
 //! sweep, removes the dead worker's folder first. So a suspended worker that wakes commits nothing, and reports why. All
 //! living workers run the same sweep: of two that join for different sweeps at once, one at least sees the other, and leaves.
 
-use crate::results::claims;
 use crate::results::commit::{Commit, own_number};
-use crate::results::layout::{Layout, shorter_in_tests};
+use crate::results::layout::{Layout, claim, shorter_in_tests};
 use crate::sweep::Sweep;
 use crate::table::checksum;
 use crate::table::error::{ErrorKind, ResultsError};
@@ -241,7 +240,6 @@ impl Layout<'_> {
         Ok(living)
     }
 
-    /// The text of a worker's file, and when it was written.
     fn read_beat(&self, path: &Path) -> Result<(Vec<u8>, SystemTime), StorageError> {
         let read = || Ok((self.storage.read(path)?, self.storage.modified(path)?));
         read().or_else(|error: StorageError| match error.kind() {
@@ -409,7 +407,7 @@ impl<'a> Member<'a> {
         }
         if others.is_empty() {
             layout.refuse_link(&layout.claims().join("any"))?;
-            for claim in claims.iter().filter(|name| claims::claim(name).is_some()) {
+            for claim in claims.iter().filter(|name| claim(name).is_some()) {
                 gone_is_fine(storage.remove(&layout.claims().join(claim)))?;
             }
         }

@@ -1,7 +1,7 @@
 //! How often intervals hold the true value: what stopping by looking does to that, and the intervals of all statistics with
 //! the model.
 
-use super::precision::{need, seeds_for};
+use super::{need, seeds_for};
 use crate::model::Parameters;
 use crate::reduce::{Pool, PooledJob, SetRow, error_over_target, mean_of, quantile};
 use crate::results::layout::Layout;

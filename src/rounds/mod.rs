@@ -1,47 +1,57 @@
 //! Rounds: what an adaptive sweep runs next.
 //!
 //! ```text
-//! chosen jobs that are committed -> sets, reduced -> more seeds (precision.rs), or sets and seeds at edges (refinement.rs)
+//! chosen jobs that are committed -> sets, reduced -> more seeds, or sets and seeds at edges
 //! ```
 //!
 //! Contract: a round is a pure function of the sweep and of the committed rows of the jobs that its earlier rounds chose: the
 //! same for any threads, workers, kills and order, and for a directory that has had other sweeps.
+//!
+//! With `[precision]`, a set gets seeds until every statistic is known to the target, or the set has the most. The half-width
+//! h of an interval of n seeds falls as 1/√n, so n (h/target)² seeds are predicted to do. A set gets these, but a quarter more
+//! than it has at least, since the prediction is as uncertain as h, and at most twice as many, so that a poor one costs little.
+//!
+//! With `[refine]`, an edge gets a set between its neighbours, until these are close; then seeds of the sets near it, equally
+//! many, until its interval is as narrow as is wanted, by the same rule. All edges share the jobs.
+//!
+//! Looking again and again until an interval is short prefers those that are short by chance, and their sets hold the true
+//! value less often than 95 of 100 times: the more so, the fewer seeds it is when a set may end, and the more skewed its
+//! values are. No set ends with fewer than [`MIN_SEEDS`] seeds. What that does to coverage is measured in `docs/rounds.md`.
+
+use crate::reduce::{
+    Line, SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges,
+};
+use crate::results::{Results, ResultsError};
+use crate::sweep::{Goal, MIN_SEEDS, Precision, Refinement, Round, Standing, Sweep};
+use crate::table::value::floored;
+use std::collections::BTreeMap;
 
 #[cfg(test)]
 mod coverage;
-mod precision;
-mod refinement;
 #[cfg(test)]
 mod tests;
-
-use crate::reduce::{SetRow, reduce_chosen, sets_of_edges};
-use crate::results::{Results, ResultsError};
-use crate::sweep::{Precision, Round, Standing, Sweep};
-use std::collections::BTreeMap;
 
 /// The round after those that a directory has, all of whose jobs must be done. A round that chooses no new point would repeat
 /// for ever, so it is the end.
 pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
     let sweep = results.sweep();
-    let mut round = Round::default();
-    if let Some(rounds) = sweep.rounds() {
-        if let Some(refinement) = &rounds.refinement {
-            let sets = sets_of_edges(results, refinement)?;
-            round = refinement::decide(sweep, refinement, &sets);
-        } else if let Some(precision) = &rounds.precision {
-            round = decide(sweep, precision, &reduce_chosen(results)?);
+    let round = match sweep.rounds().map(|rounds| &rounds.goal) {
+        None => Round::default(),
+        Some(Goal::Precision(precision)) => more_seeds(sweep, precision, &reduce_chosen(results)?),
+        Some(Goal::Edges(refinement)) => {
+            at_edges(sweep, refinement, &sets_of_edges(results, refinement)?)
         }
-    }
+    };
     Ok(round.beyond(&results.chosen()))
 }
 
-/// The round after these sets, by their numbers.
-fn decide(sweep: &Sweep, precision: &Precision, sets: &BTreeMap<u64, SetRow>) -> Round {
+/// The round that makes these sets, by their numbers, more precise.
+fn more_seeds(sweep: &Sweep, precision: &Precision, sets: &BTreeMap<u64, SetRow>) -> Round {
     let mut standing = Standing::default();
     let mut points = Vec::new();
     for (&number, row) in sets {
         let jobs = row.finished_jobs + row.failed_jobs;
-        match precision::need(precision, jobs, sweep.seed_count(), row) {
+        match need(precision, jobs, sweep.seed_count(), row) {
             None => standing.sets_done += 1,
             Some(seeds) if seeds <= jobs => standing.sets_capped += 1,
             Some(seeds) => {
@@ -52,6 +62,90 @@ fn decide(sweep: &Sweep, precision: &Precision, sets: &BTreeMap<u64, SetRow>) ->
     }
     Round {
         points: sweep.with_controls(points),
+        standing,
+    }
+}
+
+/// The seeds that a set with `seeds` seeds and these statistics is to have next: the same number if it has the most. `None` if
+/// every statistic is known to the target, or if no job has a value.
+fn need(precision: &Precision, seeds: u64, most: u64, row: &SetRow) -> Option<u64> {
+    seeds_for(seeds, error_over_target(row, precision)?, MIN_SEEDS, most)
+}
+
+/// The seeds that a set with `seeds` seeds gets next, if its half-width is `error` times the target; `None` if it needs no more.
+/// It ends with `least` at least, and with `most` at most.
+fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option<u64> {
+    let least = least.min(most);
+    if error <= 1.0 && seeds >= least {
+        return None;
+    }
+    let now = seeds as f64;
+    // NaN is no prediction, and gets the most.
+    let predicted = (now * error * error).ceil().max(least as f64);
+    let few = (1.25 * now).ceil();
+    let many = 2.0 * now;
+    let next = if predicted <= few {
+        few
+    } else if predicted <= many {
+        predicted
+    } else {
+        many
+    };
+    let next = floored(next) as u64;
+    Some(next.max(seeds + 1).min(most))
+}
+
+/// The round that looks for edges between these sets, by their numbers.
+fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEdges>) -> Round {
+    let rounds = sweep.rounds();
+    let from = rounds.map_or(MIN_SEEDS, |rounds| *rounds.seeds.start());
+    let had = |set: u64| sets.get(&set).map_or(0, |set| set.seeds);
+    let jobs = sets.values().map(|set| set.seeds).sum();
+    let mut room = refinement.max_jobs.saturating_sub(jobs);
+    let mut wanted = BTreeMap::new();
+    let mut standing = Standing::default();
+    for line in lines(sweep, refinement, sets) {
+        let Line {
+            mut rows, edges, ..
+        } = line;
+        for edge in edges.iter().filter(|edge| !edge.is_done()) {
+            let [fewest, most] = edge.seeds();
+            let seeds = match edge.wanted_row {
+                Some(_) => from,
+                None if fewest < most => most,
+                None => seeds_for(most, edge.error, MIN_SEEDS, sweep.seed_count()).unwrap_or(most),
+            };
+            let at = match edge.wanted_row {
+                Some(row) => vec![row],
+                None => edge.sets.iter().map(|set| set.row).collect(),
+            };
+            let set = |row: u64| {
+                rows[refinement.axis] = row;
+                sweep.set_at(&rows).filter(|&set| had(set) < seeds)
+            };
+            let new: Vec<u64> = at.into_iter().filter_map(set).collect();
+            let more = |set: &u64| {
+                let known = wanted.get(set).copied();
+                seeds.saturating_sub(known.unwrap_or_else(|| had(*set)))
+            };
+            let jobs: u64 = new.iter().map(more).sum();
+            if new.is_empty() || jobs > room {
+                standing.edges_capped += 1;
+                continue;
+            }
+            room -= jobs;
+            for set in new {
+                let known = wanted.entry(set).or_default();
+                *known = seeds.max(*known);
+            }
+        }
+    }
+    standing.sets_open = wanted.len() as u64;
+    standing.sets_done = sets.keys().filter(|set| !wanted.contains_key(set)).count() as u64;
+    let points = wanted.iter();
+    let points = points.flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds));
+    Round {
+        points: sweep.with_controls(points.collect()),
         standing,
     }
 }

@@ -1,11 +1,12 @@
 //! Rounds of sweeps that look for edges, from the first to the end, with responses whose edges are known.
 
-use super::refinement::decide;
-use crate::reduce::{Edge, GROUPS, Line, Sample, SetOfEdges, lines};
-use crate::sweep::{Round, Sweep};
+use super::*;
+use crate::reduce::{Edge, GROUPS, Interval, Sample};
+use crate::sets::Statistic;
+use crate::sweep::Target;
+use proptest::prelude::*;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -70,7 +71,7 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
                 let rows = sweep.rows(number);
                 let value = |key: &str| {
                     (0..rows.len())
-                        .filter_map(|axis| sweep.value_at(axis, rows[axis]))
+                        .map(|axis| sweep.value_at(axis, rows[axis]))
                         .find(|found| found.0 == key)
                 };
                 let had = sets.get(&number).map_or(0, |set| set.seeds);
@@ -78,7 +79,7 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
                     ["Delta", "V0"].map(|key| value(key).map_or(0.0, |found| found.1));
                 sets.insert(number, self.set(number, had + more, amplitude, velocity));
             }
-            rounds.push(decide(sweep, sweep.refinement().unwrap(), &sets));
+            rounds.push(at_edges(sweep, sweep.refinement().unwrap(), &sets));
             assert!(rounds.len() < 100, "no end");
         }
         (rounds, sets)
@@ -88,7 +89,7 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
 /// Where on a linear axis the edges of each row lie, with their intervals, and whether these are as narrow as is wanted.
 fn found(sweep: &Sweep, sets: &BTreeMap<u64, SetOfEdges>) -> Vec<Vec<([f64; 3], bool)>> {
     let axis = sweep.refinement().unwrap().axis;
-    let [first, second] = [0, 1].map(|row| sweep.value_at(axis, row).unwrap().1);
+    let [first, second] = [0, 1].map(|row| sweep.value_at(axis, row).1);
     let of_edge = |edge: &Edge<'_>| {
         let [low, high] = edge.interval;
         (
@@ -399,4 +400,98 @@ fn each_row_has_its_edges_and_points_that_are_no_jobs_are_passed_over() {
             .all(|set| jobs.iter().any(|job| job.point == *set))
     );
     assert_eq!(jobs.iter().map(|job| job.parameters.seed).min(), Some(1000));
+}
+
+fn statistic(key: &str) -> Statistic {
+    Statistic::from_key(key).unwrap()
+}
+
+fn precision(keys: &[&str], target: Target) -> Precision {
+    Precision {
+        statistics: keys.iter().map(|key| statistic(key)).collect(),
+        target,
+    }
+}
+
+fn row(mean: f64, half: f64) -> SetRow {
+    let interval = Some(Interval {
+        low: mean - half,
+        high: mean + half,
+    });
+    SetRow {
+        tau_mean: Some(mean),
+        tau_interval: interval,
+        ..SetRow::default()
+    }
+}
+
+#[test]
+fn a_set_gets_the_predicted_seeds_within_bounds_until_its_target_is_met() {
+    let relative = precision(&["tau_mean"], Target::Relative(0.01));
+    let seeds = |seeds, half| need(&relative, seeds, 256, &row(2.0, half));
+    // The target is 0.02.
+    assert_eq!(seeds(40, 0.0199), None);
+    assert_eq!(seeds(40, 0.024), Some(58));
+    assert_eq!(seeds(40, 0.0201), Some(50));
+    assert_eq!(seeds(40, 0.2), Some(80));
+    assert_eq!(seeds(200, 0.2), Some(256));
+    assert_eq!(seeds(256, 0.2), Some(256));
+    assert_eq!(seeds(256, 0.0199), None);
+    // However good it looks.
+    assert_eq!(seeds(4, 1e-6), Some(8));
+    assert_eq!(seeds(20, 1e-6), Some(25));
+    assert_eq!(seeds(16, 1e-6), Some(MIN_SEEDS));
+    assert_eq!(seeds(MIN_SEEDS, 1e-6), None);
+    let absolute = precision(&["tau_mean"], Target::Absolute(0.05));
+    assert_eq!(need(&absolute, 40, 256, &row(2.0, 0.0499)), None);
+    assert_eq!(need(&absolute, 40, 256, &row(1e-3, 0.06)), Some(58));
+}
+
+#[test]
+fn the_worst_of_several_statistics_counts_and_one_without_value_does_not() {
+    let both = precision(&["tau_mean", "drop_mean"], Target::Relative(0.01));
+    let row = SetRow {
+        drop_mean: Some(1.0),
+        ..row(2.0, 0.01)
+    };
+    assert_eq!(
+        need(&both, 40, 256, &row),
+        Some(80),
+        "a value without interval"
+    );
+    let interval = Some(Interval {
+        low: 0.995,
+        high: 1.005,
+    });
+    assert_eq!(
+        need(
+            &both,
+            40,
+            256,
+            &SetRow {
+                drop_interval: interval,
+                ..row
+            }
+        ),
+        None
+    );
+    // A slider that slides has no intervals between slips, and never will.
+    assert_eq!(need(&both, 4, 256, &SetRow::default()), None);
+}
+
+proptest! {
+    #[test]
+    fn seeds_grow_by_a_quarter_at_least_and_double_at_most(
+        seeds in 2_u64..1000, error in prop_oneof![0.0..4.0, Just(f64::INFINITY), Just(f64::NAN)], most in 2_u64..2000
+    ) {
+        let seeds = seeds.min(most);
+        match seeds_for(seeds, error, MIN_SEEDS, most) {
+            None => prop_assert!(error <= 1.0 && seeds >= MIN_SEEDS.min(most)),
+            Some(next) if seeds == most => prop_assert_eq!(next, most),
+            Some(next) => {
+                prop_assert!(next > seeds && next <= (2 * seeds).min(most));
+                prop_assert!(next == most || 4 * next >= 5 * seeds);
+            }
+        }
+    }
 }

@@ -1,13 +1,13 @@
 //! The collector hands jobs to the threads, puts their outcomes together into parts, and commits them. Only it uses the disk.
 
 use crate::results::ResultsError;
-use crate::results::layout::{PartName, shorter_in_tests};
+use crate::results::layout::shorter_in_tests;
 use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
 use crate::run::take::{PartJob, Taken, Work};
-use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, memory_limits, threads};
+use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, limits};
 use crate::solver::SimulationError;
-use crate::sweep::Job;
+use crate::sweep::{Job, PartName};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -43,16 +43,14 @@ struct JobTime {
     wall: f64,
 }
 
-/// A job that a thread runs.
 struct UnderWay {
     job: PartJob,
     begin: Instant,
-    /// When it counts as long.
     long_after: Duration,
 }
 
-/// The jobs under way, by extension, part and position.
-type AllUnderWay = Mutex<BTreeMap<(usize, u64, usize), UnderWay>>;
+/// The jobs under way, by part and position.
+type AllUnderWay = Mutex<BTreeMap<(PartName, usize), UnderWay>>;
 
 /// The jobs that were handed out and have not ended.
 #[derive(Default)]
@@ -60,9 +58,18 @@ struct Out {
     jobs: usize,
     cost: f64,
     memory: f64,
+    /// Memory that all jobs together may take, in bytes.
+    free: f64,
+    /// Whether it has been reported that memory limits the jobs.
+    was_short: bool,
 }
 
 impl Out {
+    fn has_room(&self, threads: usize) -> bool {
+        self.jobs < threads
+            || (self.jobs < threads * MAX_AHEAD && self.cost < threads as f64 * AHEAD)
+    }
+
     fn add(&mut self, job: &PartJob) {
         self.jobs += 1;
         self.cost += job.job().cost;
@@ -75,7 +82,8 @@ impl Out {
         self.memory -= job.memory;
         if self.jobs == 0 {
             // Without rounding errors, or what infinity leaves.
-            *self = Self::default();
+            self.cost = 0.0;
+            self.memory = 0.0;
         }
     }
 }
@@ -94,7 +102,7 @@ pub(super) struct Collector<'a, 'e> {
     pending: &'a Pending<'a>,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
-    open: BTreeMap<(usize, u64), OpenPart>,
+    open: BTreeMap<PartName, OpenPart>,
     /// Number and predicted cost of the jobs of the parts that it has committed, spilled ones included.
     own: (u64, f64),
 }
@@ -186,10 +194,11 @@ impl<'a, 'e> Collector<'a, 'e> {
         under_way: &AllUnderWay,
         interrupt: &AtomicBool,
     ) -> Result<bool, ResultsError> {
-        let mut out = Out::default();
-        let mut free = self.joined.memory();
+        let mut out = Out {
+            free: self.joined.memory(),
+            ..Out::default()
+        };
         let mut is_out_of_time = false;
-        let mut is_short_of_memory = false;
         let [mut last_tick, mut last_look] = [Instant::now(); 2];
         loop {
             if last_look.elapsed() >= LOOK_AT_OTHERS {
@@ -198,7 +207,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             }
             if last_tick.elapsed() >= TICK {
                 last_tick = Instant::now();
-                free = self.joined.memory();
+                out.free = self.joined.memory();
                 self.report_long_jobs(under_way)?;
                 self.events.send(&RunEvent::Tick)?;
             }
@@ -206,34 +215,8 @@ impl<'a, 'e> Collector<'a, 'e> {
                 self.events.send(&RunEvent::Stopping)?;
             }
             let is_interrupted = interrupt.load(Ordering::Relaxed);
-            let has_room = |out: &Out| {
-                out.jobs < threads
-                    || (out.jobs < threads * MAX_AHEAD && out.cost < threads as f64 * AHEAD)
-            };
-            while !is_interrupted
-                && !self.joined.must_end()
-                && has_room(&out)
-                && let Some(job) = work.next(out.jobs > 0, out.jobs >= threads)?
-            {
-                if let Some(reason) = self.pending.refusal(job.job()) {
-                    self.take(&job, Err(reason), JobTime::default())?;
-                    continue;
-                }
-                if out.memory + memory_limits::beside_threads(job.memory, threads) > free {
-                    let is_limit = out.jobs < threads && job.memory.is_finite();
-                    if is_limit && !std::mem::replace(&mut is_short_of_memory, true) {
-                        let allowed = free - out.memory;
-                        let needed = job.memory;
-                        self.events
-                            .send(&RunEvent::ShortOfMemory { allowed, needed })?;
-                    }
-                    if out.jobs > 0 {
-                        work.put_back(job);
-                        break;
-                    }
-                }
-                out.add(&job);
-                hand_out(job);
+            if !is_interrupted {
+                self.fill(&mut out, &mut work, threads, &hand_out)?;
             }
             if !is_out_of_time && self.joined.walltime.has_refused() {
                 is_out_of_time = true;
@@ -250,6 +233,41 @@ impl<'a, 'e> Collector<'a, 'e> {
                 }
             }
         }
+    }
+
+    /// Hands out jobs as long as threads wait for them and memory is free.
+    fn fill(
+        &mut self,
+        out: &mut Out,
+        work: &mut Work<'_>,
+        threads: usize,
+        hand_out: &impl Fn(PartJob),
+    ) -> Result<(), ResultsError> {
+        while !self.joined.must_end()
+            && out.has_room(threads)
+            && let Some(job) = work.next(out.jobs > 0, out.jobs >= threads)?
+        {
+            if let Some(reason) = self.pending.refusal(job.job()) {
+                self.take(&job, Err(reason), JobTime::default())?;
+                continue;
+            }
+            if out.memory + limits::beside_threads(job.memory, threads) > out.free {
+                let is_limit = out.jobs < threads && job.memory.is_finite();
+                if is_limit && !std::mem::replace(&mut out.was_short, true) {
+                    self.events.send(&RunEvent::ShortOfMemory {
+                        allowed: out.free - out.memory,
+                        needed: job.memory,
+                    })?;
+                }
+                if out.jobs > 0 {
+                    work.put_back(job);
+                    break;
+                }
+            }
+            out.add(&job);
+            hand_out(job);
+        }
+        Ok(())
     }
 
     fn report_long_jobs(&mut self, under_way: &AllUnderWay) -> Result<(), ResultsError> {
@@ -297,7 +315,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             },
         };
         self.events.send(&event)?;
-        let key = (part.extension, part.index);
+        let key = part.name;
         let open = self.open.entry(key).or_insert_with(|| OpenPart {
             of: Arc::clone(&of.of),
             outcomes: Outcomes::new(),
@@ -324,7 +342,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         self.pending
             .results
             .commit(self.joined.member, part, &whole.outcomes, spilled)?;
-        let name = PartName::from(&**part);
+        let name = part.name;
         self.joined.member.end_part(name)?;
         let took = whole.of.begin.elapsed();
         self.joined.walltime.committed(took, begin.elapsed());
@@ -353,7 +371,7 @@ impl<'a, 'e> Collector<'a, 'e> {
     }
 }
 
-fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(usize, u64, usize), UnderWay>> {
+fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(PartName, usize), UnderWay>> {
     // Nothing panics while it is held.
     under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -379,9 +397,9 @@ fn run_job(
         begin,
         long_after: long_after.unwrap_or(Duration::MAX).max(LONG),
     };
-    let key = (job.of.part.extension, job.of.part.index, job.position);
+    let key = (job.of.part.name, job.position);
     locked(under_way).insert(key, long);
-    let (cpu, outcome) = threads::timed(|| outcome(task, kernel, interrupt));
+    let (cpu, outcome) = limits::timed(|| outcome(task, kernel, interrupt));
     locked(under_way).remove(&key);
     let wall = begin.elapsed().as_secs_f64();
     let time = JobTime { cpu, wall };

@@ -1,7 +1,7 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
-//! take.rs     outlines of missing parts, claimed -> their jobs (walltime.rs: while there is time)
+//! take.rs     outlines of missing parts, claimed -> their jobs while there is time (limits.rs)
 //! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
@@ -13,19 +13,16 @@
 //! job in flight.
 
 mod collect;
-mod memory_limits;
-mod shard;
+pub mod limits;
 mod state;
 mod take;
 #[cfg(test)]
 mod tests;
-pub mod threads;
-mod walltime;
 
 pub use crate::results::log::{RunEvent, RunReport};
 pub use crate::results::pending::Overview;
-pub use shard::Shard;
-pub use state::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status, status_with};
+pub use state::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status};
+pub use take::Shard;
 
 use crate::observe::Measurements;
 use crate::results::claims::{ClaimState, Claims};
@@ -36,8 +33,8 @@ use crate::results::workers::{Member, host};
 use crate::results::{Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
+use crate::run::limits::Walltime;
 use crate::run::take::{LOOK, Left};
-use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
 use crate::table::file::PROGRAM;
@@ -61,9 +58,7 @@ pub struct Options<'a> {
     pub threads: Option<NonZeroUsize>,
     /// Ends the run when it turns true: jobs in flight are interrupted, whole parts are kept.
     pub stop: &'a AtomicBool,
-    /// Whether to run failed jobs again.
     pub retry_failed: bool,
-    /// The share of the parts to run.
     pub shard: Shard,
     /// Ends within this time after the run's beginning, and takes no part for which it is too short.
     pub walltime: Option<Duration>,
@@ -103,7 +98,7 @@ pub fn join<T, E: From<ResultsError>>(
     body: impl FnOnce(&Joined<'_>) -> Result<T, E>,
 ) -> Result<T, E> {
     let begin = Instant::now();
-    let threads = threads::or_all_cores(options.threads);
+    let threads = limits::or_all_cores(options.threads);
     if sweep.rounds().is_some() && options.shard != Shard::default() {
         let problem = "a sweep with [precision] or [refine] has no shards: each round needs all results of the one before; \
                        run it on a common disk, started as often as you like";
@@ -121,7 +116,7 @@ pub fn join<T, E: From<ResultsError>>(
             begin,
             walltime: Walltime::new(begin, options.walltime),
             threads,
-            allowed_memory: memory_limits::allowed(),
+            allowed_memory: limits::allowed_memory(),
             options,
         })?;
         member
@@ -191,7 +186,7 @@ impl Joined<'_> {
 
     /// Memory that all jobs together may take now, in bytes.
     fn memory(&self) -> f64 {
-        self.allowed_memory.min(memory_limits::available())
+        self.allowed_memory.min(limits::available_memory())
     }
 
     /// Runs the parts of the rounds so far.
@@ -250,7 +245,6 @@ impl Joined<'_> {
         Ok(())
     }
 
-    /// Sends the event of a run, or a round, that begins.
     fn report_begin(
         &self,
         results: &Results<'_>,
@@ -339,15 +333,4 @@ impl Joined<'_> {
         let generation = claims.last(REDUCTION).unwrap_or_default();
         Ok(is_taken.then_some((claims, generation)))
     }
-}
-
-/// Runs the jobs of a sweep that are not yet in a directory: a [`Joined`] of this alone.
-pub fn run(
-    layout: &Layout<'_>,
-    sweep: &Sweep,
-    options: Options<'_>,
-    kernel: &Kernel<'_>,
-    display: &mut dyn FnMut(&RunEvent),
-) -> Result<RunReport, ResultsError> {
-    join(layout, sweep, options, |joined| joined.run(kernel, display))
 }

@@ -1,6 +1,6 @@
 //! How far a directory is, and how far a run is: jobs done and missing, failures by reason, time left.
 
-use crate::results::deaths::Marked;
+use crate::results::claims::Marked;
 use crate::results::log::RunEvent;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::pending::{Again, Overview, Pending, Retry};
@@ -14,7 +14,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::time::SystemTime;
 
-/// Failed jobs that [`status`] lists one by one, at most.
+/// Failed jobs that people are shown one by one, at most.
 pub const MAX_FAILURES: u64 = 10;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -90,19 +90,16 @@ impl Cut {
 /// Jobs of finished parts that the current sweep does not have.
 fn jobs_kept(pending: &Pending<'_>) -> u64 {
     let last = pending.results.extensions().len() - 1;
-    let is_earlier = |part: &&Outline| part.extension < last && pending.done.has(part);
+    let is_earlier =
+        |part: &&Outline| part.name.extension < last && pending.done.contains(&part.name);
     let parts = pending.parts.iter().filter(is_earlier);
     let jobs = parts.flat_map(|part| pending.part(part).jobs);
     let kept = jobs.filter(|job| !pending.results.sweep().contains(&job.parameters));
     kept.count() as u64
 }
 
-pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
-    status_with(results, MAX_FAILURES)
-}
-
-/// The same, with another number of failed jobs.
-pub fn status_with(results: &Results<'_>, max_failures: u64) -> Result<Status, ResultsError> {
+/// How far a directory is, with this many failed jobs at most.
+pub fn status(results: &Results<'_>, max_failures: u64) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
     let mut failure_reasons = Reasons::default();
     let parts: Vec<Outline> = results.plan().outlines().collect();

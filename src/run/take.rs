@@ -4,16 +4,25 @@
 //! takes unclaimed parts. The second takes the parts of dead workers, until living workers have all that are left. Parts
 //! that may not fit in memory come later, and parts at which workers died last; after some deaths they run alone, as a job
 //! that ends its process must not end others.
+//!
+//! Shards: a share of the parts for each of several runs without a common disk.
+//!
+//! Parts are dealt in the order of the plan, each to the shard with the least predicted cost so far. Contract: a
+//! function of the plan alone, so each part belongs to one shard of N whatever the others do; an extension deals on,
+//! and changes nothing that was dealt before; no two shards differ by more than the costliest part.
 
 use crate::results::claims::{ClaimState, Claims};
-use crate::results::layout::{PartName, shorter_in_tests};
+use crate::results::layout::shorter_in_tests;
 use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
-use crate::run::memory_limits;
-use crate::run::walltime::Walltime;
+use crate::run::limits::{Walltime, beside_threads};
 use crate::sweep::{Job, Outline, Part, predicted_memory};
-use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap, HashMap, VecDeque};
+use std::fmt;
+use std::num::NonZeroU64;
+use std::str::FromStr;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 use std::vec::IntoIter;
@@ -39,7 +48,6 @@ pub(super) struct Taken {
     pub begin: Instant,
 }
 
-/// A job of a part that is to be run.
 #[derive(Clone, Debug)]
 pub(super) struct PartJob {
     pub of: Arc<Taken>,
@@ -69,7 +77,7 @@ impl Pending<'_> {
     /// Number and predicted cost of the jobs of parts that were finished since they were looked up.
     pub(super) fn done_since(&self) -> Result<(u64, f64), ResultsError> {
         let done = self.results.done_parts()?;
-        let is_new = |part: &&Outline| done.has(part) && !self.done.has(part);
+        let is_new = |part: &&Outline| done.contains(&part.name) && !self.done.contains(&part.name);
         let mut jobs = 0;
         let mut cost = 0.0;
         for part in self.parts.iter().filter(is_new) {
@@ -85,9 +93,9 @@ impl Pending<'_> {
         let claims = Claims::list(member)?;
         let done = self.results.done_parts()?;
         let mut left = Left::default();
-        for part in self.parts.iter().filter(|part| !done.has(part)) {
+        for part in self.parts.iter().filter(|part| !done.contains(&part.name)) {
             left.jobs += part.job_count as u64;
-            match claims.standing(&PartName::from(part).to_string(), &others)? {
+            match claims.standing(&part.name.to_string(), &others)? {
                 ClaimState::Taken(owner) => {
                     left.hosts.insert(others[owner].worker.host.clone());
                 }
@@ -128,16 +136,21 @@ impl<'a> Work<'a> {
     ) -> Result<Self, ResultsError> {
         let others = member.others()?;
         let claims = Claims::list(member)?;
-        let is_left = |part: &&Outline| !pending.done.has(part) || pending.may_run_again(part);
+        let is_left =
+            |part: &&Outline| !pending.done.contains(&part.name) || pending.may_run_again(part);
         let mut pass: Vec<&Outline> = pending.parts.iter().filter(is_left).collect();
         if !others.is_empty() && !pass.is_empty() {
             let place = member.number() % pass.len() as u64;
             pass.rotate_left(usize::try_from(place).unwrap_or_default());
         }
         pass.sort_by_key(|part| {
-            let needed = memory_limits::beside_threads(part.memory, threads);
+            let needed = beside_threads(part.memory, threads);
             let may_not_fit = needed > pending.retry.memory;
-            (pending.deaths(part), may_not_fit, pending.done.has(part))
+            (
+                pending.deaths(part),
+                may_not_fit,
+                pending.done.contains(&part.name),
+            )
         });
         Ok(Self {
             pending,
@@ -184,7 +197,6 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Takes the next part with jobs to run, if there is one.
     fn take_next(&mut self, is_busy: bool, is_ahead: bool) -> Result<(), ResultsError> {
         while !self.walltime.has_refused() {
             if self.must_wait(is_busy, is_ahead) {
@@ -219,8 +231,8 @@ impl<'a> Work<'a> {
 
     /// Takes a part in the first pass: unclaimed, or finished with jobs that may run again and no worker that runs them.
     fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
-        let name = PartName::from(outline).to_string();
-        if !self.pending.done.has(outline) {
+        let name = outline.name.to_string();
+        if !self.pending.done.contains(&outline.name) {
             return Ok(self.claims.last(&name).is_none() && self.take_part(outline, 0)?);
         }
         match self.claims.standing(&name, &self.others)? {
@@ -238,8 +250,13 @@ impl<'a> Work<'a> {
         let done = self.pending.results.done_parts()?;
         let mut is_certain = true;
         let mut free = Vec::new();
-        for part in self.pending.parts.iter().filter(|part| !done.has(part)) {
-            let name = PartName::from(part).to_string();
+        for part in self
+            .pending
+            .parts
+            .iter()
+            .filter(|part| !done.contains(&part.name))
+        {
+            let name = part.name.to_string();
             match self.claims.standing(&name, &others)? {
                 ClaimState::Own => (),
                 ClaimState::Taken(owner) => {
@@ -268,7 +285,7 @@ impl<'a> Work<'a> {
 
     /// Takes what is to be run of a part.
     fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
-        if !self.pending.done.has(outline) {
+        if !self.pending.done.contains(&outline.name) {
             let spilled = self.pending.spilled(outline)?;
             let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
             let jobs = left.map(|position| (position, false)).collect();
@@ -297,7 +314,7 @@ impl<'a> Work<'a> {
         if !self.walltime.admits_part() {
             return Ok(false);
         }
-        let name = PartName::from(&*part);
+        let name = part.name;
         if !self.claims.take(&name.to_string(), generation)? {
             self.losses += 1;
             if self.losses == LOSSES {
@@ -308,7 +325,7 @@ impl<'a> Work<'a> {
         }
         self.member.begin_part(name)?;
         let is_alone = self.pending.deaths(&part) >= DEATHS;
-        let again = self.pending.done.has(&part);
+        let again = self.pending.done.contains(&part.name);
         let taken = Arc::new(Taken {
             part,
             spilled,
@@ -330,5 +347,132 @@ impl<'a> Work<'a> {
             });
         }
         Ok(true)
+    }
+}
+
+/// Shard number K of N, written `K/N` with 1 <= K <= N.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    number: u64,
+    count: NonZeroU64,
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self {
+            number: 1,
+            count: NonZeroU64::MIN,
+        }
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parsed = text.split_once('/').and_then(|(number, count)| {
+            let number: u64 = number.parse().ok()?;
+            let count: NonZeroU64 = count.parse().ok()?;
+            (1..=count.get())
+                .contains(&number)
+                .then_some(Self { number, count })
+        });
+        parsed.ok_or_else(|| {
+            format!("{text:?}: must be K/N with whole numbers 1 <= K <= N, such as 2/8")
+        })
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.count)
+    }
+}
+
+impl Shard {
+    /// The parts of a plan that belong to this shard. Memory: a few bytes for each of the N.
+    pub fn parts<P: Iterator<Item = Outline>>(
+        self,
+        plan: P,
+    ) -> impl Iterator<Item = Outline> + use<P> {
+        // Costs are >= 0, so their bits have their order.
+        let mut loads: BinaryHeap<Reverse<(u64, u64)>> = BinaryHeap::new();
+        plan.filter(move |part| {
+            let dealt = loads.len() as u64;
+            let (load, number) = match loads.peek() {
+                Some(&Reverse((bits, number))) if dealt == self.count.get() => {
+                    loads.pop();
+                    (f64::from_bits(bits), number)
+                }
+                _ => (0.0, dealt + 1),
+            };
+            loads.push(Reverse(((load + part.cost).to_bits(), number)));
+            number == self.number
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::PartName;
+    use proptest::prelude::*;
+
+    fn plan(costs: &[f64]) -> impl Iterator<Item = Outline> {
+        let part = |(index, &cost): (usize, &f64)| {
+            let point = index as u64;
+            Outline {
+                name: PartName {
+                    extension: index / 7,
+                    index: point,
+                },
+                points: point..=point,
+                job_count: 1,
+                cost,
+                memory: 0.0,
+            }
+        };
+        costs
+            .iter()
+            .enumerate()
+            .map(part)
+            .collect::<Vec<_>>()
+            .into_iter()
+    }
+
+    fn shards(count: u64) -> impl Iterator<Item = Shard> {
+        (1..=count).map(move |number| format!("{number}/{count}").parse().unwrap())
+    }
+
+    proptest! {
+        #[test]
+        fn shards_are_disjoint_complete_balanced_and_kept_by_an_extension(
+            costs in proptest::collection::vec(prop_oneof![0.0..10.0, Just(5.0), 100.0..200.0], 0..60),
+            count in 1_u64..12,
+            before in 0_usize..60,
+        ) {
+            let before = &costs[..before.min(costs.len())];
+            let (mut all, mut loads) = (Vec::new(), Vec::new());
+            for shard in shards(count) {
+                let own: Vec<Outline> = shard.parts(plan(&costs)).collect();
+                let earlier: Vec<Outline> = shard.parts(plan(before)).collect();
+                prop_assert!(own.starts_with(&earlier));
+                loads.push(own.iter().map(|part| part.cost).sum::<f64>());
+                all.extend(own);
+            }
+            all.sort_by_key(|part| part.name.index);
+            prop_assert_eq!(all, plan(&costs).collect::<Vec<_>>());
+            let spread = loads.iter().copied().fold(0.0, f64::max) - loads.iter().copied().fold(f64::INFINITY, f64::min);
+            // Sums in another order differ by roundings.
+            prop_assert!(spread <= costs.iter().copied().fold(0.0, f64::max) + 1e-9, "{loads:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_shard_is_refused() {
+        for text in ["0/3", "4/3", "1/0", "1", "a/b", "-1/3", ""] {
+            assert!(text.parse::<Shard>().unwrap_err().contains("K/N"), "{text}");
+        }
+        assert_eq!("2/8".parse::<Shard>().unwrap().to_string(), "2/8");
     }
 }

@@ -10,7 +10,8 @@ pub use label::{
 use crate::model::Symbol;
 use crate::model::selected::{Selected, Selection};
 use crate::observe::Regime;
-use crate::table::columns::{Column, Interval, Kind, Row, columns, tables};
+use crate::table::columns::{Column, Interval, Kind, Row, columns};
+use crate::table::tables;
 use std::borrow::Cow;
 use std::sync::LazyLock;
 

@@ -7,7 +7,7 @@
 use super::axes::Axis;
 use super::grid::{Sweep, find_rows};
 use super::quantity::{Point, Quantity};
-use super::rounds::{Bounds, Refinement, Round, Rounds, Standing};
+use super::rounds::{Bounds, Goal, Refinement, Round, Rounds, Standing};
 use crate::model::Parameters;
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
@@ -18,18 +18,18 @@ impl Sweep {
         self.rounds.as_ref()
     }
 
-    /// Where it looks for edges, if it does.
     pub fn refinement(&self) -> Option<&Refinement> {
-        self.rounds.as_ref()?.refinement.as_ref()
+        match &self.rounds.as_ref()?.goal {
+            Goal::Edges(refinement) => Some(refinement),
+            Goal::Precision(_) => None,
+        }
     }
 
-    /// Number of the axis of seeds, if they have one.
     pub fn seed_axis(&self) -> Option<usize> {
         let mut axes = self.axes.iter();
         axes.position(|axis| axis.quantities() == [Quantity::SEED])
     }
 
-    /// Number of seeds of a set in the grid.
     pub fn seed_count(&self) -> u64 {
         self.seed_axis().map_or(1, |axis| self.axes[axis].len())
     }
@@ -47,27 +47,21 @@ impl Sweep {
         rows
     }
 
-    /// The number of rows of each axis.
     pub fn row_counts(&self) -> Vec<u64> {
         self.axes.iter().map(Axis::len).collect()
     }
 
-    /// Key and value of an axis of one quantity at a row; `None` for a word, or for several quantities.
-    pub fn value_at(&self, axis: usize, row: u64) -> Option<(&'static str, f64)> {
+    /// Key and value of the first quantity of an axis at a row; NaN for a word.
+    pub fn value_at(&self, axis: usize, row: u64) -> (&'static str, f64) {
         let mut point = Point {
             parameters: self.base.clone(),
             fixes_period: None,
         };
         self.axes[axis].apply(row, &mut point);
-        let [quantity] = self.axes[axis].quantities()[..] else {
-            return None;
-        };
-        let value = match (point.fixes_period, quantity) {
-            (Some((_, value)), _) => Some(value),
-            (None, Quantity::Parameter(symbol)) => point.parameters.get(symbol).number(),
-            _ => None,
-        };
-        Some((quantity.key(), value?))
+        let quantity = self.axes[axis].quantities()[0];
+        let period = point.fixes_period.map(|(_, value)| value);
+        let value = period.unwrap_or_else(|| point.number(quantity));
+        (quantity.key(), value)
     }
 
     pub fn set_of(&self, point: u64) -> u64 {
@@ -81,7 +75,10 @@ impl Sweep {
 
     /// The set of a job with these canonical parameters, whatever its seed.
     pub fn set_with(&self, parameters: &Parameters) -> Option<u64> {
-        self.find_set(parameters).map(|point| self.set_of(point))
+        let control =
+            || Some(self.point_count() + self.controls.as_ref()?.find_set_in_grid(parameters)?);
+        let point = self.find_set_in_grid(parameters).or_else(control)?;
+        Some(self.set_of(point))
     }
 
     /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ in
@@ -126,7 +123,6 @@ impl Sweep {
         (0..counts.iter().product()).filter_map(set).collect()
     }
 
-    /// What its rounds may add up to; `None` for a sweep without.
     pub fn bounds(&self) -> Option<Bounds> {
         let rounds = self.rounds.as_ref()?;
         let sets = self.first_sets().into_iter();
@@ -134,9 +130,9 @@ impl Sweep {
         let costs: Vec<f64> = jobs.map(|job| job.cost).collect();
         let largest = costs.iter().copied().fold(0.0, f64::max);
         let known = costs.len() as u64;
-        let (seeds, jobs) = match &rounds.refinement {
-            None => (self.seed_count(), known * self.seed_count()),
-            Some(refinement) => (*rounds.seeds.start(), refinement.max_jobs),
+        let (seeds, jobs) = match &rounds.goal {
+            Goal::Precision(_) => (self.seed_count(), known * self.seed_count()),
+            Goal::Edges(refinement) => (*rounds.seeds.start(), refinement.max_jobs),
         };
         let sets = jobs / seeds;
         let predicted_cost =
@@ -150,7 +146,6 @@ impl Sweep {
         })
     }
 
-    /// The first round; `None` for a sweep without.
     pub fn first_round(&self) -> Option<Round> {
         let seeds = *self.rounds.as_ref()?.seeds.start();
         let sets = self.first_sets();

@@ -3,21 +3,24 @@
 //! Single values were checked where they were read. What is left are rules between parameters (`N N_s`, `dfs <= fs`, the
 //! period behind η, a whole ramp), checked at every point. No rule reads the seed, so the points of one seed stand for all;
 //! where one of them is invalid, all are walked through, since a condition may drop it.
+//!
+//! Twins are two values of a quantity that agree in twelve digits but not in all, such as 30 and 29.999999999999996. Both
+//! would be sets with the same realisations, counted twice where rows are grouped by a column.
 
 use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
-use super::rounds::{MAX_SETS, Rounds};
+use super::rounds::{Goal, MAX_SETS, Rounds};
 use super::source::{Refused, Section, Source};
-use crate::model::Symbol;
 use crate::model::theory::typical_interval;
+use crate::model::{Symbol, Value};
 use crate::observe::Recording;
 use crate::sets::Statistic;
 use crate::solver::{Resolve, Solver};
 use crate::table::value::Shortest;
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
-/// Where each quantity is set.
 pub(super) struct Places<'a> {
     source: &'a Source<'a>,
     set: Vec<Place>,
@@ -64,7 +67,7 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// Reports a mistake where a quantity is set, or the one that bounds it, or at the head of the file.
+    /// Reports a mistake where a quantity is set, else where its bound is set, else at the head of the file.
     fn refuse(&self, quantity: Quantity, problem: String) -> Refused {
         let bound = match quantity {
             Quantity::Parameter(Symbol::Dfs) => Quantity::Parameter(Symbol::Fs),
@@ -89,41 +92,60 @@ pub(super) fn whole(
     places: &Places<'_>,
     is_new: bool,
 ) -> Result<(), Refused> {
-    let mut rows = sweep.axes.iter().map(Axis::len);
-    let points = rows.try_fold(1_u64, u64::checked_mul);
-    if points.is_none_or(|points| points > MAX_POINTS) {
-        let points = match points {
-            Some(points) => format!("{points} points"),
-            None => "2^64 points or more".to_owned(),
-        };
-        let problem = format!(
-            "[axes]: {points}; a sweep has at most {MAX_POINTS}, before conditions. Take fewer, or a sample \
-             ([axes.sobol]), or several sweeps"
-        );
-        return Err(file.source.refuse(file.place_of("axes"), problem));
-    }
+    size(sweep, file)?;
     modulation(sweep, file, places)?;
     if let Some((quantity, problem)) = sweep.twins().filter(|_| is_new) {
         return Err(places.refuse(quantity, problem));
     }
-    let problem_at = |point: &Point| {
-        invalid(point).or_else(|| too_slow(point, &sweep.recording).filter(|_| is_new))
-    };
-    if sweep
-        .points_of_one_seed()
-        .any(|point| problem_at(&point).is_some())
-        && let Some(((quantity, problem), point)) = sweep
-            .admitted(0..sweep.point_count())
-            .find_map(|(_, point)| Some((problem_at(&point)?, point)))
-    {
-        return Err(places.refuse(quantity, problem + &place(sweep, &point)));
-    }
+    points(sweep, places, is_new)?;
     let Some((_, first)) = sweep.admitted(0..sweep.point_count()).next() else {
         return Err(file.source.refuse(
             file.place_of("where"),
             "where: drops every point; relax it, or extend the axes",
         ));
     };
+    recording(sweep, file)?;
+    // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others continue.
+    let solver = file
+        .entry("solver")
+        .and_then(|entry| entry.section("[solver]"));
+    let time_step = solver.map_or(0, |solver| solver.place_of("dt"));
+    let checked = sweep.solver.check(&first.parameters);
+    checked.map_err(|error| file.source.refuse(time_step, error.to_string()))
+}
+
+fn size(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
+    let mut rows = sweep.axes.iter().map(Axis::len);
+    let points = match rows.try_fold(1_u64, u64::checked_mul) {
+        Some(..=MAX_POINTS) => return Ok(()),
+        Some(points) => format!("{points} points"),
+        None => "2^64 points or more".to_owned(),
+    };
+    let problem = format!(
+        "[axes]: {points}; a sweep has at most {MAX_POINTS}, before conditions. Take fewer, or a sample ([axes.sobol]), \
+         or several sweeps"
+    );
+    Err(file.source.refuse(file.place_of("axes"), problem))
+}
+
+/// Every job is valid and, in a new sweep, so fast that its times are resolved.
+fn points(sweep: &Sweep, places: &Places<'_>, is_new: bool) -> Result<(), Refused> {
+    let problem_at = |point: &Point| {
+        invalid(point).or_else(|| too_slow(point, &sweep.recording).filter(|_| is_new))
+    };
+    let mut of_one_seed = sweep.points_of_one_seed();
+    if !of_one_seed.any(|point| problem_at(&point).is_some()) {
+        return Ok(());
+    }
+    let mut admitted = sweep.admitted(0..sweep.point_count());
+    let found = admitted.find_map(|(_, point)| Some((problem_at(&point)?, point)));
+    found.map_or(Ok(()), |((quantity, problem), point)| {
+        Err(places.refuse(quantity, problem + &place(sweep, &point)))
+    })
+}
+
+/// What is recorded comes within the longest time, and from the solver.
+fn recording(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
     let Recording { time, max_time, .. } = sweep.recording;
     if let Some((time, max_time)) = time.zip(max_time)
         && max_time <= time
@@ -141,13 +163,7 @@ pub(super) fn whole(
         let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
         return Err(file.source.refuse(file.place_of("record"), problem));
     }
-    // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others continue.
-    let solver = file
-        .entry("solver")
-        .and_then(|entry| entry.section("[solver]"));
-    let time_step = solver.map_or(0, |solver| solver.place_of("dt"));
-    let checked = sweep.solver.check(&first.parameters);
-    checked.map_err(|error| file.source.refuse(time_step, error.to_string()))
+    Ok(())
 }
 
 /// An adaptive sweep has not too many sets, and jobs for its first round.
@@ -166,11 +182,8 @@ pub(super) fn rounds(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
     let refine = file
         .entry("refine")
         .and_then(|refine| refine.section("[refine]"));
-    match (
-        &rounds.refinement,
-        refine.and_then(|refine| refine.entry("jobs")),
-    ) {
-        (Some(refinement), Some(jobs)) if refinement.max_jobs < min_jobs => {
+    match (&rounds.goal, refine.and_then(|refine| refine.entry("jobs"))) {
+        (Goal::Edges(refinement), Some(jobs)) if refinement.max_jobs < min_jobs => {
             Err(jobs.must_be(&format!("at least the {min_jobs} of the first round")))
         }
         _ => Ok(()),
@@ -247,16 +260,12 @@ fn modulation(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<
 
 /// Statistics of what the drive alone explains are refused in a sweep without controls.
 fn without_controls(rounds: &Rounds, file: &Section<'_>) -> Result<(), Refused> {
-    let precise = rounds.precision.iter();
-    let precise = precise.flat_map(|precision| &precision.statistics);
-    let refined = rounds.refinement.iter();
-    let refined = refined.flat_map(|refinement| &refinement.by);
-    let section = if rounds.refinement.is_some() {
-        "refine"
-    } else {
-        "precision"
+    let section = match rounds.goal {
+        Goal::Precision(_) => "precision",
+        Goal::Edges(_) => "refine",
     };
-    match precise.chain(refined).find(|by| by.needs_control()) {
+    let mut statistics = rounds.statistics().iter();
+    match statistics.find(|statistic| statistic.needs_control()) {
         None => Ok(()),
         Some(Statistic { key, .. }) => {
             let problem =
@@ -317,4 +326,193 @@ fn place(sweep: &Sweep, point: &Point) -> String {
         ", at the point {}; change the axes, or drop it by a where",
         moved.join(", ")
     )
+}
+
+/// Largest relative distance of twins: half of what two values with twelve digits differ by.
+const CLOSE: f64 = 5e-13;
+const PERIOD: Quantity = Quantity::Parameter(Symbol::T);
+
+fn are_twins(a: f64, b: f64) -> bool {
+    a != b && (a - b).abs() <= CLOSE * a.abs().max(b.abs())
+}
+
+/// What is wrong with a value of a quantity, and its twin to be written in its place.
+fn problem(quantity: Quantity, value: f64, twin: f64) -> String {
+    let key = quantity.key();
+    let [value, twin] = [value, twin].map(Shortest);
+    format!(
+        "{key} = {value}: agrees with {twin} in twelve digits but not in all, so both would be sets of the same \
+         realisations; write {key} = {twin}"
+    )
+}
+
+impl Sweep {
+    /// What is wrong with twins among the values of an axis; the shorter of the two is to be written.
+    pub(super) fn twins(&self) -> Option<(Quantity, String)> {
+        let is_set = |quantity: &Quantity| *quantity != PERIOD || self.fixes_period_by().is_none();
+        Quantity::all().filter(is_set).find_map(|quantity| {
+            let values = self.reals(quantity);
+            let pair = values.windows(2).find(|pair| are_twins(pair[0], pair[1]))?;
+            let mut pair = [pair[0], pair[1]];
+            pair.sort_by_key(|value| Shortest(*value).to_string().len());
+            Some((quantity, problem(quantity, pair[1], pair[0])))
+        })
+    }
+
+    /// What is wrong with a value whose twin an earlier sweep of a directory has.
+    pub fn twin_of(&self, earlier: &Self) -> Option<String> {
+        let is_mixed = self.fixes_period_by() != earlier.fixes_period_by();
+        let quantities = Quantity::all().filter(|quantity| is_mixed || *quantity != PERIOD);
+        quantities.into_iter().find_map(|quantity| {
+            let known = earlier.reals(quantity);
+            self.reals(quantity).into_iter().find_map(|value| {
+                let at = known.partition_point(|other| *other < value);
+                let around = &known[at.saturating_sub(1)..known.len().min(at + 1)];
+                let twin = around.iter().find(|other| are_twins(value, **other))?;
+                (!around.contains(&value)).then(|| problem(quantity, value, *twin))
+            })
+        })
+    }
+
+    fn fixes_period_by(&self) -> Option<Quantity> {
+        let mut quantities = self.axes.iter().flat_map(Axis::quantities);
+        quantities.find(|quantity| matches!(quantity, Quantity::Eta | Quantity::Frequency))
+    }
+
+    /// The values of a quantity, each once, ascending, also of the period where another quantity fixes it; empty for whole
+    /// numbers and words.
+    fn reals(&self, quantity: Quantity) -> Vec<f64> {
+        let of_axes = self.axes.iter().find_map(|axis| axis.values_of(quantity));
+        let values = match (of_axes, quantity) {
+            (Some(values), _) => values.to_vec(),
+            (None, PERIOD) if self.fixes_period_by().is_some() => {
+                let points = self.points_of_one_seed();
+                let periods = points.filter_map(|point| point.parameters.modulation_period);
+                let bits: BTreeSet<u64> = periods.map(f64::to_bits).collect();
+                return bits.into_iter().map(f64::from_bits).collect();
+            }
+            (None, Quantity::Parameter(symbol)) => vec![self.base.get(symbol)],
+            (None, _) => Vec::new(),
+        };
+        let real = |value| match value {
+            Value::Real(real) => Some(real),
+            _ => None,
+        };
+        let mut reals: Vec<f64> = values.into_iter().filter_map(real).collect();
+        reals.sort_unstable_by(f64::total_cmp);
+        reals.dedup();
+        reals
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::value::Kind;
+    use std::path::Path;
+
+    fn read(axes: &str) -> Result<Sweep, String> {
+        let text = format!("name = \"a\"\n[axes]\n{axes}\n");
+        Sweep::parse(&text, Path::new("a.toml")).map_err(|error| error.to_string())
+    }
+
+    fn twin(axes: &str, earlier: &str) -> Option<String> {
+        read(axes).unwrap().twin_of(&read(earlier).unwrap())
+    }
+
+    /// Axes without which a value of this quantity has no effect.
+    fn beside(quantity: Quantity) -> &'static str {
+        match quantity {
+            Quantity::Parameter(Symbol::Delta) => "T = [0.03]",
+            Quantity::Parameter(Symbol::T) | Quantity::Eta | Quantity::Frequency => {
+                "Delta = [1e-6]"
+            }
+            Quantity::Parameter(Symbol::TTo | Symbol::DeltaTo) => {
+                "Delta = [1e-6]\nT = [0.03]\nramp_time = [0.1]"
+            }
+            Quantity::Parameter(Symbol::RampTime) => "Delta = [1e-6]\nT = [0.03]\nT_to = [0.02]",
+            Quantity::Parameter(_) => "",
+        }
+    }
+
+    #[test]
+    fn twins_of_any_quantity_and_axis_are_refused_at_its_line_with_the_value_to_write() {
+        let mut tried = 0;
+        for quantity in Quantity::all() {
+            let key = quantity.key();
+            if matches!(quantity, Quantity::Parameter(symbol) if symbol.description().kind != Kind::Real)
+            {
+                continue;
+            }
+            tried += 1;
+            let value = 0.007_f64;
+            let beside = beside(quantity);
+            let twin = value.next_up();
+            for list in [
+                format!("{key} = [{value}, 0.008, {twin}]"),
+                format!("{key} = {{ linear = [{value}, {twin}], points = 2 }}"),
+                format!("{key} = {{ log = [{value}, {twin}], points = 2 }}"),
+                format!("zip = [{{ {key} = [{value}, {twin}], N = [70, 71] }}]"),
+                format!("sobol = {{ {key} = {{ linear = [{value}, {twin}] }}, points = 8 }}"),
+            ] {
+                let problem = read(&format!("{list}\n{beside}")).unwrap_err();
+                let is_repeated = problem.contains("repeats row");
+                let names_both = problem.contains(&format!(
+                    "a.toml:3: {key} = {twin}: agrees with {value} in twelve digits"
+                ));
+                assert!(is_repeated || names_both, "{list}: {problem}");
+            }
+        }
+        assert!(tried > 15, "{tried}");
+    }
+
+    #[test]
+    fn values_that_differ_in_the_twelfth_digit_are_two() {
+        for list in [
+            "[0.3, 0.300000000001]",
+            "[9.99999999999e-5, 1e-4]",
+            "[2e-4, 2.00000000001e-4]",
+        ] {
+            read(&format!("V0 = {list}")).unwrap();
+        }
+        read("V0 = { linear = [1e-4, 1.0000001e-4], points = 10001 }").unwrap();
+    }
+
+    #[test]
+    fn a_twin_of_a_value_of_the_directory_is_found_whatever_set_it() {
+        let frequency = "frequency = [10, 30]\nDelta = [1e-6]\nseed = { count = 3 }";
+        let found = twin(
+            "frequency = [29.999999999999996]\nDelta = [2e-6]",
+            frequency,
+        )
+        .unwrap();
+        assert!(found.ends_with("write frequency = 30"), "{found}");
+        assert_eq!(
+            twin("frequency = [30, 30.0000001]\nDelta = [1e-6]", frequency),
+            None
+        );
+        // The default of the model, and a value of an axis that is gone.
+        assert!(twin("Kd = [4.000000000000001e7]", "V0 = [1e-4]").is_some());
+        assert!(twin("V0 = [1e-4]", "Kd = [4.000000000000001e7]").is_some());
+        // Periods by other means, whatever the seeds.
+        let seeds = "Delta = [1e-6]\nseed = { first = 7, count = 2 }";
+        let period = |period: f64| format!("T = [{period:?}]\n{seeds}");
+        let thirtieth = 1.0 / 30.0_f64;
+        assert!(twin(&period(thirtieth.next_up()), frequency).is_some());
+        assert_eq!(twin(&period(thirtieth), frequency), None);
+        let own = twin(frequency, &period(thirtieth.next_up())).unwrap();
+        assert!(
+            own.ends_with(&format!("write T = {}", thirtieth.next_up())),
+            "{own}"
+        );
+        let eta = "eta = [0.5, 2]\nV0 = [1e-4, 2e-4]\nDelta = [1e-6]";
+        let parameters = read(eta).unwrap().jobs().last().unwrap().parameters;
+        let of_eta = parameters.modulation_period.unwrap();
+        let axes = |period: f64| format!("T = [{period:?}]\nV0 = [2e-4]\nDelta = [1e-6]");
+        assert!(twin(&axes(of_eta.next_down()), eta).is_some());
+        assert!(twin(eta, &axes(of_eta.next_down())).is_some());
+        let doubled = eta.replace("[0.5, 2]", "[2, 2.000000000000001]");
+        assert!(read(&doubled).unwrap_err().contains("write eta = 2"));
+        assert_eq!(twin(&axes(of_eta), eta), None);
+    }
 }

@@ -44,7 +44,6 @@ impl Axis {
 }
 
 impl Sweep {
-    /// The sweep of its controls.
     pub(super) fn unmodulated(&self) -> Self {
         let conditions = self.conditions.iter().filter(|condition| {
             let mut names = condition.names().into_iter();

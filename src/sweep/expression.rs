@@ -42,7 +42,6 @@ const COMPARISON: u8 = 3;
 const SUM: u8 = 4;
 const PRODUCT: u8 = 5;
 
-/// Sign, precedence and value of an operator.
 const fn operator(sign: &'static str, precedence: u8, combine: fn(f64, f64) -> f64) -> Operator {
     Operator {
         sign,
@@ -69,7 +68,6 @@ const OPERATORS: [Operator; 12] = [
     operator("/", PRODUCT, |a, b| a / b),
 ];
 
-/// What is wrong with an expression, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("at character {position}: {problem}")]
 pub struct ExpressionError {
@@ -82,12 +80,10 @@ pub struct ExpressionError {
 type Names<'a, N> = &'a dyn Fn(&str) -> Result<N, String>;
 
 impl<N> Expression<N> {
-    /// Reads a condition.
     pub fn condition(text: &str, names: Names<'_, N>) -> Result<Self, ExpressionError> {
         Self::parse(text, names, true)
     }
 
-    /// Reads a formula for a number.
     pub fn formula(text: &str, names: Names<'_, N>) -> Result<Self, ExpressionError> {
         Self::parse(text, names, false)
     }
@@ -122,7 +118,6 @@ impl<N> Expression<N> {
         }
     }
 
-    /// The names in it, from the left.
     pub fn names(&self) -> Vec<&N> {
         match self {
             Self::Constant(_) => Vec::new(),
@@ -154,7 +149,6 @@ struct Reader<'a, N> {
     text: &'a str,
     /// Byte at which the next word or sign begins.
     next: usize,
-    /// Words and signs that were read.
     words: usize,
     names: Names<'a, N>,
 }

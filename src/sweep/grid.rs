@@ -32,11 +32,9 @@ pub struct Sweep {
     pub(super) solver: Solver,
     pub(super) identity: Identity,
     pub(super) rounds: Option<Rounds>,
-    /// The sweep of its controls; see `controls.rs`.
     pub(super) controls: Option<Box<Self>>,
     /// In a sweep of controls, the sets that are run, in order; `None`: all.
     pub(super) needed: Option<Vec<u64>>,
-    /// The version of the plan by which it is read.
     pub(super) plan_version: u32,
 }
 
@@ -85,7 +83,8 @@ impl Sweep {
     }
 
     /// The jobs in grid order, then their controls.
-    pub fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
+    #[cfg(test)]
+    pub(crate) fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
         self.jobs_at(self.points())
     }
 
@@ -94,7 +93,6 @@ impl Sweep {
         self.jobs_at(0..self.point_count())
     }
 
-    /// The jobs at these points, in order.
     pub fn jobs_at(&self, points: Range<u64>) -> impl Iterator<Item = Job> + Clone + Send + '_ {
         let count = self.point_count();
         let of_grid = self.admitted(points.start.min(count)..points.end.min(count));
@@ -123,13 +121,6 @@ impl Sweep {
         self.find_in_grid(parameters).or_else(control)
     }
 
-    /// Number of the point of a job with these canonical parameters and any seed.
-    pub fn find_set(&self, parameters: &Parameters) -> Option<u64> {
-        let control =
-            || Some(self.point_count() + self.controls.as_ref()?.find_set_in_grid(parameters)?);
-        self.find_set_in_grid(parameters).or_else(control)
-    }
-
     fn find_in_grid(&self, parameters: &Parameters) -> Option<u64> {
         let rows = self.axes.iter().map(|axis| axis.find(parameters));
         let rows: Vec<u64> = rows.collect::<Option<_>>()?;
@@ -156,7 +147,6 @@ impl Sweep {
         jobs.find_map(|job| self.find_in_grid(&job))
     }
 
-    /// Whether a condition reads the seed.
     pub(super) fn reads_seed(&self) -> bool {
         let mut names = self.conditions.iter().flat_map(Expression::names);
         names.any(|name| *name == Quantity::SEED)
@@ -313,7 +303,6 @@ impl Sweep {
         })
     }
 
-    /// The point of these rows, as the axes set it.
     pub(super) fn point(&self, rows: &[u64]) -> Point {
         let mut point = Point {
             parameters: self.base.clone(),

@@ -72,7 +72,6 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// The identity of jobs with this solver and recording.
     pub fn new(solver: Solver, recording: &Recording) -> Self {
         Self::of_versions(MODEL_VERSION, RNG_SCHEME, solver, recording)
     }
@@ -99,7 +98,6 @@ impl Identity {
         self.hash(parameters, &Symbol::ALL)
     }
 
-    /// The id of the set that such a job belongs to.
     pub fn set(&self, parameters: &Parameters) -> String {
         self.hash(parameters, AllButSeed::SYMBOLS)
     }

@@ -7,7 +7,6 @@
 //! checks.rs      expression.rs
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: an adaptive sweep, which runs in rounds
-//! twins.rs: values that differ in the last digits alone
 //! variation.rs: a file with other values, as text
 //! ```
 //!
@@ -29,24 +28,23 @@ mod read;
 mod read_axes;
 mod read_rounds;
 mod rounds;
-mod samples;
 mod source;
-mod spelling;
 #[cfg(test)]
 mod tests;
-mod twins;
 mod variation;
 
 pub use cost::{LARGE, certain_memory, predicted_cost, predicted_memory};
 pub use expression::{Expression, ExpressionError};
 pub use grid::Sweep;
 pub use job::{Identity, Job};
-pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
+pub use plan::{
+    Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, PartName, Plan, Totals,
+};
+pub use quantity::nearest;
 pub use rounds::{
-    Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
+    Bounds, Goal, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
 };
 pub use source::{Mistake, SweepError};
-pub use spelling::nearest;
 pub use variation::{Change, varied};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,

@@ -1,6 +1,6 @@
 //! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
 //!
-//! Each sweep that is run in a directory opens an *extension*, which owns its jobs but for those that earlier extensions
+//! Each sweep that is run in a directory opens an *extension*, which owns its jobs except those that earlier extensions
 //! keep: what they had done by then. Each round of an adaptive sweep is one, too. A *part* is a run of consecutive jobs of an
 //! extension, committed together. Parts are small, so that many workers can share them and little is lost with one, but not
 //! many: see [`Extension::new`].
@@ -49,13 +49,19 @@ pub struct Plan<'a> {
     extensions: &'a [Extension],
 }
 
-/// A part without its jobs: where they lie, and their sums.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outline {
+/// The name of a part, which is that of its file in every table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PartName {
     /// Number of the extension, from 0.
     pub extension: usize,
     /// Number of the part within its extension, from 0.
     pub index: u64,
+}
+
+/// A part without its jobs: where they lie, and their sums.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    pub name: PartName,
     /// Points of the grid from its first job to its last.
     pub points: RangeInclusive<u64>,
     /// Number of its jobs. At least one.
@@ -69,7 +75,6 @@ pub struct Outline {
 /// Consecutive jobs of an extension.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// What is known of it without its jobs.
     pub outline: Outline,
     /// Its jobs, in plan order. At least one.
     pub jobs: Vec<Job>,
@@ -83,7 +88,6 @@ impl Deref for Part {
     }
 }
 
-/// The sums of a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
     pub jobs: u64,
@@ -132,7 +136,6 @@ impl Extension {
             .collect()
     }
 
-    /// Whether it keeps a point of its grid.
     fn keeps(&self, point: u64) -> bool {
         self.kept.as_ref().is_none_or(|kept| contains(kept, point))
             && self.round.as_ref().is_none_or(|round| round.has(point))
@@ -167,7 +170,6 @@ impl<'a> Plan<'a> {
         sweeps.filter_map(|rounds| Some(&rounds.first()?.sweep))
     }
 
-    /// The parts of an extension, in order.
     pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
         let own = &self.extensions[extension];
         let earlier = &self.extensions[..extension];
@@ -188,8 +190,7 @@ impl<'a> Plan<'a> {
                 .map(|job| predicted_memory(&job.parameters, own.sweep.recording()));
             Some(Part {
                 outline: Outline {
-                    extension,
-                    index,
+                    name: PartName { extension, index },
                     points,
                     job_count: jobs.len(),
                     cost,
@@ -201,7 +202,6 @@ impl<'a> Plan<'a> {
         parts.filter(|part| own.keeps(*part.points.start()))
     }
 
-    /// The parts of all extensions, in order.
     pub fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
         (0..self.extensions.len()).flat_map(move |extension| self.parts_of(extension))
     }
@@ -213,8 +213,8 @@ impl<'a> Plan<'a> {
 
     /// The part of an outline, whose points alone are walked through.
     pub fn part(self, outline: &Outline) -> Part {
-        let own = &self.extensions[outline.extension];
-        let earlier = &self.extensions[..outline.extension];
+        let own = &self.extensions[outline.name.extension];
+        let earlier = &self.extensions[..outline.name.extension];
         let points = *outline.points.start()..outline.points.end() + 1;
         Part {
             outline: outline.clone(),
@@ -232,12 +232,12 @@ impl<'a> Plan<'a> {
         let mut next = None;
         for part in self.parts_of(extension).filter(is_kept) {
             match ranges.last_mut() {
-                Some(range) if next == Some(part.index) => {
+                Some(range) if next == Some(part.name.index) => {
                     *range = *range.start()..=*part.points.end();
                 }
                 _ => ranges.push(part.points.clone()),
             }
-            next = Some(part.index + 1);
+            next = Some(part.name.index + 1);
         }
         ranges
     }
@@ -245,7 +245,7 @@ impl<'a> Plan<'a> {
     /// Walks through the plan and sums it up.
     pub fn totals(self) -> Totals {
         self.parts().fold(Totals::default(), |totals, part| {
-            let recording = self.extensions[part.extension].sweep.recording();
+            let recording = self.extensions[part.name.extension].sweep.recording();
             let jobs = part.jobs.iter();
             let intervals = jobs.map(|job| typical_interval(&job.parameters));
             let slips: f64 = intervals

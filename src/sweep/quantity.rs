@@ -1,9 +1,8 @@
 //! What an axis moves and a condition compares: any parameter, and η and the frequency, which fix the period T.
 //!
 //! T = 2πΔ/(η V0) and T = 1/f. Contract: a value that passed [`Quantity::checked`] is canonical, so that equal values
-//! have equal bits.
+//! have equal bits. For an unknown name, [`hint`] says what was probably meant.
 
-use super::spelling::hint;
 use crate::model::{Parameters, Symbol, Value};
 use crate::table::value::Kind;
 use std::f64::consts::TAU;
@@ -43,7 +42,6 @@ impl Quantity {
         Self::all().find(|quantity| quantity.key() == key)
     }
 
-    /// The quantity of a name in a condition.
     pub fn comparable(name: &str) -> Result<Self, String> {
         match Self::from_key(name) {
             Some(Self::BREAK_ON) => Err(
@@ -67,7 +65,6 @@ impl Quantity {
         )
     }
 
-    /// Whether it belongs to the modulation.
     pub const fn is_of_modulation(self) -> bool {
         match self {
             Self::Parameter(symbol) => symbol.is_of_modulation(),
@@ -86,12 +83,10 @@ impl Quantity {
         }
     }
 
-    /// Whether it takes whole numbers only.
     pub fn is_count(self) -> bool {
         matches!(self, Self::Parameter(symbol) if symbol.description().kind == Kind::Count)
     }
 
-    /// The allowed values, as an error message names them.
     pub fn allowed(self) -> String {
         match self {
             Self::Parameter(symbol) => symbol.description().allowed(),
@@ -178,4 +173,23 @@ impl Point {
             (Quantity::Parameter(symbol), _) => parameters.get(symbol).number().unwrap_or(f64::NAN),
         }
     }
+}
+
+/// The hint for an unknown word: the nearest known one, or all.
+pub(super) fn hint(word: &str, known: &[&str]) -> String {
+    match nearest(word, known) {
+        Some(candidate) => format!("did you mean {candidate}?"),
+        None => format!("allowed are {}", known.join(", ")),
+    }
+}
+
+/// The known word that was probably meant by an unknown one.
+pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
+    let distance =
+        |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
+    // Half of a short word, two letters of a long one.
+    let max = (word.chars().count() / 2).min(2);
+    let known = known.iter().copied();
+    let near = known.filter(|candidate| distance(candidate) <= max);
+    near.min_by_key(|candidate| distance(candidate))
 }

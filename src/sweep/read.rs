@@ -13,7 +13,7 @@ use super::plan::PLAN_VERSION;
 use super::quantity::Quantity;
 use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
-use super::rounds::Rounds;
+use super::rounds::{Goal, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
 use crate::model::Parameters;
 use crate::observe::{Recording, RecordingKey};
@@ -129,26 +129,18 @@ fn read_rounds(
     let Some(title) = rounds_title(file) else {
         return Ok(None);
     };
-    let precision = optional_section(file, "[precision]", read_precision);
-    let refinement = optional_section(file, "[refine]", |refine| {
-        read_refinement(refine, file, axes)
-    });
-    let seeds = optional_section(file, title, |section| read_seeds(section, places))?;
     if let (Some(_), Some(precision)) = (file.entry("refine"), file.entry("precision")) {
         let problem = "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
         return Err(file.source.refuse(precision.at, problem));
     }
-    let Some((rounds, axis)) = seeds else {
-        return Ok(None);
-    };
-    if let Ok(axes) = axes {
-        axes.push(axis);
-    }
-    Ok(Some(Rounds {
-        precision: precision?,
-        refinement: refinement?,
-        ..rounds
-    }))
+    optional_section(file, title, |section| {
+        let goal = if title == "[refine]" {
+            read_refinement(section, file, axes).map(Goal::Edges)
+        } else {
+            read_precision(section).map(Goal::Precision)
+        };
+        read_seeds(section, goal, axes, places)
+    })
 }
 
 /// Reads a table of the file, or takes the default if there is none.
@@ -160,7 +152,6 @@ fn read_section<'a, T: Default>(
     Ok(optional_section(file, title, read)?.unwrap_or_default())
 }
 
-/// The key of a table with this title.
 fn key_of(title: &str) -> &str {
     title.trim_matches(['[', ']'])
 }

@@ -11,10 +11,9 @@
 //! Axes stand in the order of the file; the last moves fastest. Values of a range are rounded to twelve digits, those of a
 //! whole-number quantity to whole numbers. An axis reports its first mistake, a zip or a sample that of each column.
 
-use super::axes::{Axis, Column, MAX_ROWS, Repeated};
+use super::axes::{Axis, Column, MAX_ROWS, MAX_SAMPLE, Range, Repeated, sobol};
 use super::checks::Places;
 use super::quantity::Quantity;
-use super::samples::{MAX_SAMPLE, Range, sobol};
 use super::source::{Entry, Refused, Section, all};
 use crate::model::Value;
 
@@ -298,7 +297,6 @@ fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Ref
     of_columns(table, columns.collect())
 }
 
-/// The axis of a zip or a sample.
 fn of_columns(table: &Section<'_>, columns: Vec<Column>) -> Result<Axis, Refused> {
     Axis::table(columns).map_err(|Repeated { earlier, later }| {
         let problem = format!(

@@ -18,11 +18,10 @@
 
 use super::axes::{Axis, MAX_ROWS};
 use super::checks::Places;
-use super::quantity::Quantity;
+use super::quantity::{Quantity, hint};
 use super::read_axes::{read_spaced, spaced};
-use super::rounds::{MAX_JOBS, MIN_SEEDS, Precision, Refinement, Rounds, Target};
+use super::rounds::{Goal, MAX_JOBS, MIN_SEEDS, Precision, Refinement, Rounds, Target};
 use super::source::{Entry, Refused, Section, all};
-use super::spelling::hint;
 use crate::model::Symbol;
 use crate::sets::{STATISTICS, Statistic};
 use crate::table::value::Shortest;
@@ -44,11 +43,13 @@ pub(super) fn read_precision(section: &Section<'_>) -> Result<Precision, Refused
     })
 }
 
-/// Reads the seeds of `[precision]` or `[refine]`, and makes the axis of all of them.
+/// Reads the seeds of `[precision]` or `[refine]`, and adds an axis of all of them.
 pub(super) fn read_seeds(
     section: &Section<'_>,
+    goal: Result<Goal, Refused>,
+    axes: &mut Result<Vec<Axis>, Refused>,
     places: &mut Places<'_>,
-) -> Result<(Rounds, Axis), Refused> {
+) -> Result<Rounds, Refused> {
     let form = "seeds of a set at first and at most, such as { from = 24, to = 256 }";
     let entry = section.required("seeds", "write seeds = { from = 24, to = 256 }")?;
     places.set(Quantity::SEED, entry.at, section.title);
@@ -62,21 +63,21 @@ pub(super) fn read_seeds(
     }
     let first = table.entry("first");
     let first = first.map_or(Ok(0), |first| first.count(0, u64::from(u32::MAX)))?;
-    let rounds = Rounds {
+    if let Ok(axes) = axes {
+        axes.push(Axis::Counted {
+            symbol: Symbol::Seed,
+            first,
+            count: max,
+        });
+    }
+    Ok(Rounds {
         seeds: asked.max(MIN_SEEDS.min(max))..=max,
         asked,
-        precision: None,
-        refinement: None,
-    };
-    let axis = Axis::Counted {
-        symbol: Symbol::Seed,
-        first,
-        count: max,
-    };
-    Ok((rounds, axis))
+        goal: goal?,
+    })
 }
 
-/// Reads a statistic that is allowed, or a list of such; `problem` is what is wrong with others, before those that are.
+/// Reads a statistic that is allowed, or a list of them; `problem` is what is wrong with others, before the allowed ones.
 fn read_statistics(
     entry: &Entry<'_>,
     is_allowed: fn(Statistic) -> bool,

@@ -9,18 +9,34 @@ pub(super) const MAX_SETS: u64 = 100_000;
 /// Most jobs of a sweep that looks for edges.
 pub(super) const MAX_JOBS: u64 = 1_000_000;
 
-/// Seeds of a set below which its interval is not trusted, unless it may have no more: see `rounds/precision.rs`.
+/// Seeds of a set below which its interval is not trusted, unless it may have no more: see `rounds/`.
 pub const MIN_SEEDS: u64 = 24;
 
-/// What makes a sweep adaptive: precision or refinement.
+/// What makes a sweep adaptive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rounds {
     /// Seeds of a set in the first round, and at most.
     pub seeds: RangeInclusive<u64>,
     /// Seeds in the first round as the sweep file has them, which may be fewer.
     pub asked: u64,
-    pub precision: Option<Precision>,
-    pub refinement: Option<Refinement>,
+    pub goal: Goal,
+}
+
+/// What the rounds of a sweep are for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Goal {
+    Precision(Precision),
+    Edges(Refinement),
+}
+
+impl Rounds {
+    /// The statistics that the sweep file names.
+    pub fn statistics(&self) -> &[Statistic] {
+        match &self.goal {
+            Goal::Precision(precision) => &precision.statistics,
+            Goal::Edges(refinement) => &refinement.by,
+        }
+    }
 }
 
 /// Sets get seeds until their statistics are known to a target, or they have the most.
@@ -28,7 +44,6 @@ pub struct Rounds {
 pub struct Precision {
     /// At least one, each with an interval.
     pub statistics: Vec<Statistic>,
-    /// Largest half-width of their intervals.
     pub target: Target,
 }
 
@@ -105,7 +120,6 @@ impl Round {
         self
     }
 
-    /// Whether the rounds are over.
     pub const fn is_end(&self) -> bool {
         self.points.is_empty()
     }

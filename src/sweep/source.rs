@@ -7,8 +7,7 @@
 //! derive: the keys come from tables ([`fields!`](crate::model::fields)) or are open, and its errors name neither the
 //! value as written nor the way out.
 
-use super::quantity::Quantity;
-use super::spelling::{hint, nearest};
+use super::quantity::{Quantity, hint, nearest};
 use crate::model::{self, BreakOn};
 use crate::table::shown::{shown, shown_text};
 use crate::table::value::{Field, Value};
@@ -18,7 +17,6 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A sweep file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     #[error(
@@ -115,7 +113,6 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Reports a mistake at a byte of the text.
     pub fn refuse(&self, at: usize, problem: impl Into<String>) -> Refused {
         self.mistakes.borrow_mut().push((at, problem.into()));
         Refused(())
@@ -131,7 +128,7 @@ impl<'a> Source<'a> {
     pub fn error(&self) -> SweepError {
         let mut mistakes = self.mistakes.take();
         mistakes.sort_unstable();
-        // A misspelt key is met twice where it stands for one that must be there.
+        // A misspelt key that stands for a required key is met twice.
         mistakes.dedup();
         if let Some(of) = self.made_of {
             let problems = mistakes.into_iter().map(|(_, problem)| problem).collect();
@@ -250,7 +247,6 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// Refuses keys that are not allowed here.
     pub fn only(&self, allowed: &[&str]) -> Result<(), Refused> {
         let mut unknown = self.entries();
         unknown.retain(|entry| !allowed.contains(&entry.key));
@@ -270,7 +266,6 @@ pub(super) struct Entry<'a> {
 }
 
 impl<'a> Entry<'a> {
-    /// Reports a mistake in this value.
     pub fn refuse(&self, problem: impl AsRef<str>) -> Refused {
         let problem = problem.as_ref();
         let value = match self.node.get_ref() {
@@ -285,7 +280,6 @@ impl<'a> Entry<'a> {
         self.refuse(format!("must be {allowed}"))
     }
 
-    /// Reports a key that means nothing here.
     pub fn unknown(&self, title: &str, allowed: &[&str]) -> Refused {
         let hint = match self.key {
             "name" | "where" => format!("{} must stand above the first [section]", self.key),
@@ -351,7 +345,6 @@ impl<'a> Entry<'a> {
         self.number(&allowed, |number| number > 0.0)
     }
 
-    /// A whole number within bounds.
     pub fn count(&self, min: u64, max: u64) -> Result<u64, Refused> {
         match self.value().and_then(u64::from_value) {
             Some(count) if (min..=max).contains(&count) => Ok(count),

@@ -1,7 +1,6 @@
 //! A sweep file with other values, as text. Everything else stays unchanged, with its comments.
 
-use super::quantity::Quantity;
-use super::spelling::nearest;
+use super::quantity::{Quantity, nearest};
 use crate::observe::RecordingKey;
 use toml_edit::{DocumentMut, Item, Value};
 
@@ -153,7 +152,7 @@ pub fn varied(text: &str, changes: &[Change]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sweep::Sweep;
+    use crate::sweep::{Goal, Sweep};
     use std::path::Path;
 
     const TEXT: &str = "# About it.\nname = \"mine\"\n\n[model]\n# Stiff.\nKd = 1e8  # N/m\nNs = 4\n\n[axes]\n\
@@ -257,7 +256,7 @@ mod tests {
         let text = varied(&fixed, &[precise.as_slice(), &[seeds]].concat());
         assert!(!text.contains("seed = "), "{text}");
         assert!(
-            parsed(&text).rounds().unwrap().precision.is_some(),
+            matches!(parsed(&text).rounds().unwrap().goal, Goal::Precision(_)),
             "{text}"
         );
         let text = varied(

@@ -9,16 +9,14 @@ use arrow_array::builder::{BooleanBuilder, Float64Builder, Int64Builder, StringB
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};
 use arrow_array::{Array, ArrayRef, RecordBatch};
-use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
+use arrow_schema::{ArrowError, DataType, Field, FieldRef, Fields, Schema, SchemaRef};
 use serde_json::{Map, Value as Json, json};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Key of the unit in a field's metadata.
 pub const UNIT: &str = "unit";
-/// Key of the meaning in a field's metadata.
 pub const DESCRIPTION: &str = "description";
 /// Key under which pandas looks for `DataFrame.attrs` in the metadata of an Arrow schema.
 pub const PANDAS_ATTRS: &str = "PANDAS_ATTRS";
@@ -43,12 +41,13 @@ fn field(column: &Column) -> Field {
 
 /// Arrow schema of a row, with units and meanings in the metadata of its fields and, for pandas, of the schema.
 pub fn schema<R: Row>() -> SchemaRef {
-    schema_of(R::columns().iter().map(field).collect())
+    schema_of(R::columns().iter().map(field).collect::<Fields>())
 }
 
 /// The same of fields that have a unit and a description.
-pub fn schema_of(fields: Vec<Field>) -> SchemaRef {
-    let by_name = |key| by_name(fields.iter(), key);
+pub fn schema_of(fields: impl Into<Fields>) -> SchemaRef {
+    let fields = fields.into();
+    let by_name = |key| by_name(&fields, key);
     let attributes = json!({ "meaning": by_name(DESCRIPTION), "units": by_name(UNIT) });
     Arc::new(Schema::new_with_metadata(
         fields,
@@ -57,8 +56,9 @@ pub fn schema_of(fields: Vec<Field>) -> SchemaRef {
 }
 
 /// What the metadata of fields hold under a key, by the names of the fields.
-pub(super) fn by_name<'f>(fields: impl Iterator<Item = &'f Field>, key: &str) -> Json {
+pub(super) fn by_name(fields: &Fields, key: &str) -> Json {
     let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default();
+    let fields = fields.iter();
     let texts = fields.map(|field| (field.name().clone(), Json::from(text(field))));
     texts.collect::<Map<_, _>>().into()
 }
@@ -106,7 +106,6 @@ enum Cells {
 }
 
 impl RowBuffer {
-    /// An empty buffer for rows of this type.
     pub fn new<R: Row>() -> Self {
         let cells = R::columns().into_iter().map(|column| {
             Some(match column.kind {
@@ -123,14 +122,13 @@ impl RowBuffer {
         }
     }
 
-    /// The same without the columns of these names.
     pub fn without(mut self, left_out: &[Cow<'static, str>]) -> Self {
         let mut fields = Vec::new();
         for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
             if left_out.iter().any(|name| name == field.name()) {
                 *cells = None;
             } else {
-                fields.push(Field::clone(field));
+                fields.push(FieldRef::clone(field));
             }
         }
         self.schema = schema_of(fields);
@@ -149,7 +147,6 @@ impl RowBuffer {
         &self.schema
     }
 
-    /// Appends a row of the type that the buffer was made for.
     pub fn push<R: Row>(&mut self, row: &R) {
         let mut columns = self.cells.iter_mut();
         row.cells(&mut |cell| {
@@ -172,7 +169,6 @@ impl RowBuffer {
         Ok(())
     }
 
-    /// Takes all rows out as one batch.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
         let columns = self.cells.iter_mut().flatten().map(Cells::take);
@@ -206,7 +202,6 @@ impl Cells {
     }
 }
 
-/// A column of a batch, by name and type.
 fn column<'a>(
     batch: &'a RecordBatch,
     name: &str,
@@ -254,7 +249,7 @@ pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::columns::tests::{Reading, Readings, readings};
+    use super::super::tests::{Reading, Readings, readings};
     use super::*;
     use arrow_array::{BooleanArray, Float64Array, Int64Array, StringArray};
 

@@ -8,7 +8,6 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 
-/// The footer's key of the checksum.
 pub const FOOTER_KEY: &str = "seal";
 /// What is in its place while the hash is taken.
 pub const PLACEHOLDER: &str = "0000000000000000000000000000000000000000000000000000000000000000";
@@ -16,7 +15,6 @@ pub const PLACEHOLDER: &str = "0000000000000000000000000000000000000000000000000
 const ENCODED_KEY: &[u8] = b"\x18\x04seal\x18\x40";
 /// Bytes after the footer: its length in four of them, and [`MAGIC`].
 const END: usize = 8;
-/// First and last bytes of a file.
 const MAGIC: &[u8] = b"PAR1";
 
 pub fn hexadecimal(hash: &[u8]) -> String {
@@ -103,9 +101,9 @@ pub fn checked(text: &str) -> Result<String, &'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::columns::tests::{Reading, readings};
     use crate::table::file::{Footer, TableWriter};
     use crate::table::storage::{Disk, Storage};
+    use crate::table::tests::{Reading, readings};
     use std::collections::BTreeMap;
     use std::fs;
 
@@ -114,7 +112,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.parquet");
         let mut writer =
-            TableWriter::<Reading>::new(Disk.create(&path).unwrap(), &Footer::default()).unwrap();
+            TableWriter::<Reading>::new(&[], Disk.create(&path).unwrap(), &Footer::default())
+                .unwrap();
         for (reading, _) in &readings() {
             writer.push(reading).unwrap();
         }

@@ -8,7 +8,6 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What kind of error it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
     /// What was asked for does not fit the directory. Nothing was changed.
@@ -24,11 +23,9 @@ pub enum ErrorKind {
     Disk(io::ErrorKind),
 }
 
-/// A results directory, or a file of it, that cannot be used, written or changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ResultsError {
     pub kind: ErrorKind,
-    /// The file or the directory.
     pub path: PathBuf,
     /// What is wrong with it, and the way out where the kind does not say it.
     pub problem: String,
@@ -43,12 +40,10 @@ impl ResultsError {
         }
     }
 
-    /// What was asked for does not fit.
     pub fn refused(path: &Path, problem: impl fmt::Display) -> Self {
         Self::new(ErrorKind::Refused, path, problem)
     }
 
-    /// It is not as it was written.
     pub fn damaged(path: &Path, problem: impl fmt::Display) -> Self {
         Self::new(ErrorKind::Damaged, path, problem)
     }

@@ -31,7 +31,6 @@ use std::sync::Arc;
 /// The program's name and version, as files have it.
 pub const PROGRAM: &str = concat!("stickslip ", env!("CARGO_PKG_VERSION"));
 
-/// How the names of table files end.
 pub const FILE_EXTENSION: &str = "parquet";
 /// Rows of a group: readers slow down on groups below 5,000 rows, and a writer holds one group, some 50 MB.
 const GROUP_ROWS: usize = 1 << 17;
@@ -54,10 +53,8 @@ impl Default for Footer {
     }
 }
 
-/// The footer's key of the place of a file.
 const PLACE: &str = "file";
 
-/// Folder and name of a file.
 fn place(path: &Path) -> String {
     let names = [path.parent().and_then(Path::file_name), path.file_name()];
     let names = names.map(|name| name.unwrap_or_default().to_string_lossy());
@@ -69,7 +66,6 @@ impl Footer {
         Self(BTreeMap::new())
     }
 
-    /// This footer with the name and the text of a sweep.
     pub fn with_sweep(self, name: &str, text: &str) -> Self {
         self.with("sweep_name", name).with("sweep", text)
     }
@@ -79,21 +75,20 @@ impl Footer {
         self
     }
 
-    /// This footer with the texts of another.
     pub fn and(mut self, other: &Self) -> Self {
         self.0.extend(other.0.clone());
         self
     }
 
-    /// This footer for a file at this place.
     pub fn at(self, path: &Path) -> Self {
         self.with(PLACE, &place(path))
     }
 
     pub(super) fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
+        let by_name = |key| arrow::by_name(schema.fields(), key).to_string();
         let footer = self.clone();
-        let footer = footer.with("units", &by_name(schema, UNIT));
-        let footer = footer.with("meaning", &by_name(schema, DESCRIPTION));
+        let footer = footer.with("units", &by_name(UNIT));
+        let footer = footer.with("meaning", &by_name(DESCRIPTION));
         let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
         let texts = footer.0.into_iter();
         let texts = texts.map(|(key, text)| KeyValue::new(key, text));
@@ -113,11 +108,6 @@ impl Footer {
     }
 }
 
-/// What the metadata of all fields hold under a key, as JSON.
-fn by_name(schema: &Schema, key: &str) -> String {
-    arrow::by_name(schema.fields().iter().map(AsRef::as_ref), key).to_string()
-}
-
 /// Writes one file of a table. A file that was not finished is unreadable.
 pub struct TableWriter<R> {
     row: PhantomData<fn(&R)>,
@@ -129,13 +119,8 @@ pub struct TableWriter<R> {
 }
 
 impl<R: Row> TableWriter<R> {
-    /// Writes into this file, which is empty.
-    pub fn new(file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
-        Self::without(&[], file, footer)
-    }
-
-    /// The same without the columns of these names.
-    pub fn without(
+    /// Writes into this file, which is empty, without the columns of these names.
+    pub fn new(
         left_out: &[Cow<'static, str>],
         file: StoredFile,
         footer: &Footer,
@@ -179,7 +164,6 @@ impl<R: Row> TableWriter<R> {
         Ok(())
     }
 
-    /// Writes the buffered rows as a row group.
     fn flush(&mut self) -> Result<(), ResultsError> {
         let mut encode = || -> Result<(), ParquetError> {
             self.writer.write(&self.buffer.take()?)?;
@@ -212,7 +196,6 @@ impl<R: Row> TableWriter<R> {
     }
 }
 
-/// Some rows of a file.
 #[derive(Clone, Debug)]
 pub struct Batch {
     pub path: Arc<Path>,
@@ -223,13 +206,6 @@ impl Batch {
     pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, ResultsError> {
         arrow::rows(&self.rows).map_err(ResultsError::damage_at(&self.path))
     }
-}
-
-/// The bytes of a file, if they match its checksum.
-fn load(storage: &dyn Storage, path: &Path) -> Result<Bytes, ResultsError> {
-    let bytes = storage.read(path).map_err(ResultsError::of_reading)?;
-    checksum::check(&bytes).map_err(ResultsError::damage_at(path))?;
-    Ok(bytes.into())
 }
 
 /// Compares a footer with where the file lies, and with the texts that it must have. Earlier programs wrote fewer.
@@ -252,16 +228,13 @@ fn check_footer(path: &Path, metadata: &ParquetMetaData, expected: &Footer) -> R
     Ok(())
 }
 
-/// How many rows a file must have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RowCount {
     pub least: u64,
-    /// Whether it may have more.
     pub may_exceed: bool,
 }
 
 impl RowCount {
-    /// Says what is wrong with this number of rows.
     pub fn check(self, rows: u64) -> Result<(), String> {
         let Self { least, may_exceed } = self;
         if rows == least || (may_exceed && rows > least) {
@@ -279,7 +252,6 @@ impl RowCount {
 pub struct DataFile {
     pub path: PathBuf,
     pub rows: Option<RowCount>,
-    /// Texts of its footer.
     pub footer: Arc<Footer>,
 }
 
@@ -373,9 +345,10 @@ fn open(
     columns: &[Cow<'static, str>],
 ) -> Result<ParquetRecordBatchReader, ResultsError> {
     let path = &file.path;
-    let bytes = load(storage, path)?;
+    let bytes = storage.read(path).map_err(ResultsError::of_reading)?;
+    checksum::check(&bytes).map_err(ResultsError::damage_at(path))?;
     let reader = || {
-        let builder = ParquetRecordBatchReaderBuilder::try_new(bytes)?;
+        let builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes))?;
         let mut builder = builder.with_batch_size(BATCH_ROWS);
         let metadata = builder.metadata();
         check_footer(path, metadata, &file.footer).map_err(ParquetError::General)?;
@@ -430,7 +403,7 @@ mod tests {
 
     fn write(path: &Path, numbers: Range<u64>) {
         let footer = Footer::default().with("note", "test");
-        let mut writer = TableWriter::new(Disk.create(path).unwrap(), &footer).unwrap();
+        let mut writer = TableWriter::new(&[], Disk.create(path).unwrap(), &footer).unwrap();
         numbers.for_each(|number| writer.push(&Number::of(number)).unwrap());
         writer.finish().unwrap();
     }
@@ -481,7 +454,7 @@ mod tests {
         write(&whole, 0..rows);
         let footer = Footer::default().with("note", "test");
         let mut writer =
-            TableWriter::<Number>::new(Disk.create(&copied).unwrap(), &footer).unwrap();
+            TableWriter::<Number>::new(&[], Disk.create(&copied).unwrap(), &footer).unwrap();
         for batch in Dataset::new(&Disk, vec![whole.clone()]).batches() {
             let batch = batch.unwrap();
             let middle = batch.rows.num_rows() / 3;
@@ -604,7 +577,7 @@ mod tests {
         }
         let expected = Footer::empty().with("sweep", "one");
         let written = Footer::default().and(&expected).at(&path);
-        let mut writer = TableWriter::new(Disk.create(&path).unwrap(), &written).unwrap();
+        let mut writer = TableWriter::new(&[], Disk.create(&path).unwrap(), &written).unwrap();
         writer.push(&Number::of(1)).unwrap();
         writer.finish().unwrap();
         let check = |path: &Path, footer: &Footer| {

@@ -17,13 +17,11 @@ const LOCK_POLL: Duration = Duration::from_millis(if cfg!(test) { 1 } else { 20 
 /// Most bytes of a file that is read as a whole: more than a part can have whose jobs fit in memory.
 pub const MAX_WHOLE: u64 = 1 << 32;
 
-/// Where the bytes of a file go.
 pub trait Sink: Write + Send {
     /// Returns when all that was written is on the disk.
     fn sync(&mut self) -> io::Result<()>;
 }
 
-/// A file that is being written.
 pub struct StoredFile {
     path: PathBuf,
     sink: Box<dyn Sink>,
@@ -42,14 +40,12 @@ impl StoredFile {
         &self.path
     }
 
-    /// Appends bytes, all of them.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError> {
         self.sink
             .write_all(bytes)
             .map_err(StorageError::at("write", &self.path))
     }
 
-    /// Returns when all that was written is on the disk.
     pub fn sync(&mut self) -> Result<(), StorageError> {
         self.sink
             .sync()
@@ -57,7 +53,6 @@ impl StoredFile {
     }
 }
 
-/// As encoders write to it.
 impl Write for StoredFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.sink.write(bytes)
@@ -84,7 +79,6 @@ pub trait Storage: Sync {
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError>;
     /// Opens a regular file for reading. Of anything else that has its name, the error [is no file](StorageError::is_no_file).
     fn open(&self, file: &Path) -> Result<File, StorageError>;
-    /// Whether a file is there.
     fn exists(&self, file: &Path) -> Result<bool, StorageError>;
     fn remove(&self, file: &Path) -> Result<(), StorageError>;
     /// Removes a folder with all that is in it; nothing happens if there is none.
@@ -120,7 +114,6 @@ pub trait Storage: Sync {
         disk(one).is_none_or(|one| disk(other).is_none_or(|other| one == other))
     }
 
-    /// The number of bytes of a file.
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
         let failed = StorageError::at("read", file);
         match self.open(file)?.metadata() {
@@ -196,11 +189,9 @@ pub enum Lock {
     /// The caller has the lock until this value is dropped or the process ends.
     Ours(Box<dyn Send + Sync>),
     Taken,
-    /// The file system has no locks.
     Unknown,
 }
 
-/// A file operation that failed.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot {action}: {source}", shown(path))]
 pub struct StorageError {
@@ -219,7 +210,6 @@ impl StorageError {
         }
     }
 
-    /// The kind of the operating system's reason.
     pub fn kind(&self) -> io::ErrorKind {
         self.source.kind()
     }
@@ -240,7 +230,6 @@ impl StorageError {
     }
 }
 
-/// Why a file cannot be read as one.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 enum NoFile {
     #[error("it is no regular file, but a folder, a device, a FIFO or a socket")]
@@ -285,7 +274,6 @@ const fn disk(_: &Path) -> Option<()> {
     None
 }
 
-/// The file system of the operating system.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Disk;
 

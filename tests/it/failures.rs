@@ -181,7 +181,7 @@ fn the_command_of_a_job_is_that_job() {
     for text in sweeps {
         let sweep = Sweep::parse(&text, Path::new("sweep.toml")).unwrap();
         let mut compared = 0;
-        for job in sweep.jobs() {
+        for job in sweep.jobs_of_grid() {
             let command = sweep.command(&job);
             let ended = folder.run(&format!(
                 "{} --json",

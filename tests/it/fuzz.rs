@@ -25,7 +25,7 @@ use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::results::tables::{JobRow, PrecursorRow, SlipRow};
 use stickslip::rounds::next;
-use stickslip::run::{Options, Shard, run, status};
+use stickslip::run::{MAX_FAILURES, Options, Shard, join, status};
 use stickslip::sweep::Sweep;
 use stickslip::table::checksum::hexadecimal;
 use stickslip::table::columns::Row;
@@ -215,13 +215,11 @@ static RESULTS: LazyLock<Examples> = LazyLock::new(|| {
         let kernel = |job: &stickslip::sweep::Job, stop: &AtomicBool| {
             measure(&job.parameters, &recording, solver, stop)
         };
-        run(
-            &Layout::new(&Disk, &folder.path().join(name)),
-            &sweep,
-            options,
-            &kernel,
-            &mut |_| (),
-        )
+        let folder = folder.path().join(name);
+        let layout = Layout::new(&Disk, &folder);
+        join(&layout, &sweep, options, |joined| {
+            joined.run(&kernel, &mut |_| ())
+        })
         .unwrap();
     }
     for name in EXAMPLES {
@@ -340,8 +338,7 @@ fn write_nonsense<R: Row>(path: &Path, column: Index, row: Index, value: Index) 
         .filter(is_left_out)
         .collect();
     Disk.remove(path).unwrap();
-    let mut writer =
-        TableWriter::<R>::without(&left_out, Disk.create(path).unwrap(), &footer).unwrap();
+    let mut writer = TableWriter::<R>::new(&left_out, Disk.create(path).unwrap(), &footer).unwrap();
     for Batch { path, rows } in batches
         .into_iter()
         .filter(|batch| batch.rows.num_rows() > 0)
@@ -414,7 +411,7 @@ fn read_all(root: &Path, file: &Path) {
         if file.starts_with(layout.reduced()) {
             let _ = draw_all(&layout, &Look::default(), &Format::ALL);
         } else {
-            let _ = status(&results);
+            let _ = status(&results, MAX_FAILURES);
             let _ = reduce(&results);
         }
     }
@@ -476,7 +473,7 @@ proptest! {
             Err(error) => prop_assert!(error.to_string().starts_with("fuzzed.toml"), "{}", error),
             Ok(sweep) => {
                 // What is admitted can be planned: the first jobs have ids and are found again.
-                for job in sweep.jobs().take(20) {
+                for job in sweep.jobs_of_grid().take(20) {
                     prop_assert!(sweep.contains(&job.parameters));
                     prop_assert!(job.cost.is_finite() && job.cost >= 0.0, "{}", job.cost);
                     prop_assert_eq!(sweep.job_id(&job.parameters).len(), 32);

@@ -1,7 +1,7 @@
 //! Parts at which workers died, and jobs that memory forbids.
 
 use super::*;
-use crate::results::deaths::Marked;
+use crate::results::claims::Marked;
 use crate::results::pending::{Pending, Retry};
 use crate::results::workers::tests::lose;
 use crate::sweep::Part;
@@ -15,9 +15,12 @@ fn marks(root: &Path) -> Vec<String> {
 }
 
 fn marked(root: &Path) -> Vec<Marked> {
-    status(&Results::read(&Layout::new(&Disk, root)).unwrap())
-        .unwrap()
-        .marked
+    status(
+        &Results::read(&Layout::new(&Disk, root)).unwrap(),
+        MAX_FAILURES,
+    )
+    .unwrap()
+    .marked
 }
 
 /// Leaves the marks of this number of deaths at the parts of these numbers.

@@ -1,11 +1,11 @@
 //! Exports, repairs and retries on a disk that dies at each operation in turn, or that cannot be read.
 
-use super::{faulty, fine};
+use super::{faulty, fine, run};
 use crate::observe::Measurements;
 use crate::results::layout::Layout;
 use crate::results::tables::Names;
 use crate::results::{ErrorKind, Results};
-use crate::run::{Kernel, Options, Shard, run};
+use crate::run::{Kernel, Options, Shard};
 use crate::solver::{SimulationError, Summary};
 use crate::sweep::{Job, Sweep};
 use crate::table::formats::Format;

@@ -16,12 +16,11 @@ use crate::model::Parameters;
 use crate::observe::{Measurements, Precursor, Slip};
 use crate::reduce::SetRow;
 use crate::results::ErrorKind;
-use crate::results::layout::PartName;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::results::workers::SILENCE;
 use crate::results::workers::tests::{leave, open};
 use crate::solver::{SimulationError, Summary};
-use crate::sweep::Job;
+use crate::sweep::{Job, PartName};
 use crate::table::columns::Row;
 use crate::table::storage::{Disk, Storage};
 use arrow_array::cast::AsArray;
@@ -34,6 +33,17 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const SEEDS: u64 = 60;
 
 /// Some parts of several jobs each, by the predicted cost of the slower solver.
+/// Runs the jobs of a sweep that are not yet in a directory.
+pub(crate) fn run(
+    layout: &Layout<'_>,
+    sweep: &Sweep,
+    options: Options<'_>,
+    kernel: &Kernel<'_>,
+    display: &mut dyn FnMut(&RunEvent),
+) -> Result<RunReport, ResultsError> {
+    join(layout, sweep, options, |joined| joined.run(kernel, display))
+}
+
 fn sweep(seeds: u64, model: &str) -> Sweep {
     let text = format!(
         "name = \"test\"\n[model]\n{model}\n[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = {seeds} }}\n\
@@ -405,9 +415,12 @@ fn what_is_taken_out_of_the_sweep_is_kept_if_done_and_else_not_run() {
     assert!(narrowed.jobs_run > 0);
     let after = tables_of(root.path());
     assert!(before.iter().all(|(path, bytes)| after[path] == *bytes));
-    let overview = status(&Results::read(&Layout::new(&Disk, root.path())).unwrap())
-        .unwrap()
-        .overview;
+    let overview = status(
+        &Results::read(&Layout::new(&Disk, root.path())).unwrap(),
+        MAX_FAILURES,
+    )
+    .unwrap()
+    .overview;
     assert_eq!(
         (overview.jobs_missing, overview.jobs_done),
         (0, begun.jobs_run + narrowed.jobs_run)
@@ -712,9 +725,12 @@ fn finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again(
         )
         .unwrap();
         let (done, overview) = (all.lock().unwrap().len() as u64, {
-            status(&Results::read(&Layout::new(&Disk, root.path())).unwrap())
-                .unwrap()
-                .overview
+            status(
+                &Results::read(&Layout::new(&Disk, root.path())).unwrap(),
+                MAX_FAILURES,
+            )
+            .unwrap()
+            .overview
         });
         assert_eq!(
             (
@@ -762,9 +778,7 @@ fn parts_of_a_dead_worker_elsewhere_are_taken_over_and_those_of_a_living_one_lef
         fs::create_dir_all(layout.claims()).unwrap();
         for part in results.plan().parts().skip(1).take(2) {
             fs::write(
-                layout
-                    .claims()
-                    .join(format!("{}.0", PartName::from(&*part))),
+                layout.claims().join(format!("{}.0", part.name)),
                 "worker-elsewhere",
             )
             .unwrap();
@@ -786,7 +800,7 @@ fn parts_of_a_dead_worker_elsewhere_are_taken_over_and_those_of_a_living_one_lef
             let begin = Instant::now();
             let report = run_all(root.path(), &sweep(SEEDS, ""), &fine);
             done.store(true, Ordering::Relaxed);
-            // Who beats is known after a beat, and who does not after the silence.
+            // A worker that beats is known after a beat, and one that does not after the silence.
             assert!(begin.elapsed() < 2 * SILENCE, "{:?}", begin.elapsed());
             report
         });
@@ -895,7 +909,11 @@ fn the_status_reports_what_is_there_and_what_is_missing() {
         &mut |_| (),
     )
     .unwrap();
-    let status = status(&Results::read(&Layout::new(&Disk, root.path())).unwrap()).unwrap();
+    let status = status(
+        &Results::read(&Layout::new(&Disk, root.path())).unwrap(),
+        MAX_FAILURES,
+    )
+    .unwrap();
     let overview = status.overview;
     let rows = texts(root.path(), "jobs", "outcome");
     let failed = rows.iter().filter(|outcome| *outcome == "failed").count() as u64;

@@ -1,5 +1,5 @@
 //! Several processes on one directory, whose operations on the disk are interleaved as a seed decides, with caches as of
-//! a network file system or without. Whatever the order, whoever is killed, and whoever is suspended and wakes when others
+//! a network file system or without. Whatever the order, whichever worker is killed, and whichever is suspended and wakes when others
 //! have taken over its work: nothing is lost, done twice, moved or
 //! reported as damaged, and the end is the same bytes.
 
@@ -275,7 +275,7 @@ fn is_allowed(
     error.is::<NoJobs>()
 }
 
-/// Goes through one schedule; who did what.
+/// Goes through one schedule; which worker did what.
 fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut below = |count| random_index(&mut random, count);

@@ -1,11 +1,10 @@
 //! Directories of programs of other versions: what is there is read, and nothing is run in them.
 
-use super::{fine, options, run_all, sweep};
+use super::{fine, options, run, run_all, sweep};
 use crate::reduce::{SetRow, read_reduced, reduce};
 use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, Names, PrecursorRow, SlipRow};
 use crate::results::{ErrorKind, Results, of_other_versions};
-use crate::run::run;
 use crate::table::columns::Row;
 use crate::table::file::{Dataset, Footer, TableWriter};
 use crate::table::formats::Format;
@@ -51,7 +50,7 @@ fn write_again<R: Row>(file: &Path, results: &Results<'_>) {
         .collect();
     fs::remove_file(file).unwrap();
     let created = Disk.create(file).unwrap();
-    let mut writer = TableWriter::<R>::without(&left_out, created, &Footer::default()).unwrap();
+    let mut writer = TableWriter::<R>::new(&left_out, created, &Footer::default()).unwrap();
     for batch in &batches {
         writer.copy(batch, 0..batch.rows.num_rows()).unwrap();
     }

@@ -304,7 +304,7 @@ fn what_an_earlier_sweep_did_is_kept_and_the_rest_belongs_to_the_new_one() {
         "[axes]\nV0 = [1e-4]\nseed = {{ count = 4 }}\n{record}"
     ));
     let mut all = extensions([&wide]);
-    all[0].kept = Some(Plan::new(&all).ranges(0, |part| [1, 2, 5].contains(&part.index)));
+    all[0].kept = Some(Plan::new(&all).ranges(0, |part| [1, 2, 5].contains(&part.name.index)));
     let parts: Vec<usize> = Plan::new(&all)
         .parts()
         .map(|part| part.jobs.len())
@@ -318,7 +318,7 @@ fn what_an_earlier_sweep_did_is_kept_and_the_rest_belongs_to_the_new_one() {
         .parts()
         .flat_map(|Part { outline, jobs }| {
             jobs.into_iter()
-                .map(move |job| (outline.extension, outline.index, job))
+                .map(move |job| (outline.name.extension, outline.name.index, job))
         })
         .map(|(extension, index, job)| {
             (

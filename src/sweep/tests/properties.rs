@@ -169,13 +169,13 @@ proptest! {
         let mut covered = Vec::new();
         let mut next = vec![0; extensions.len()];
         for part in plan.parts() {
-            prop_assert_eq!(part.index, next[part.extension]);
-            next[part.extension] += 1;
+            prop_assert_eq!(part.name.index, next[part.name.extension]);
+            next[part.name.extension] += 1;
             prop_assert!(!part.jobs.is_empty() && part.jobs.len() <= PART_JOBS);
-            prop_assert!(part.jobs.len() == 1 || part.cost <= extensions[part.extension].part_cost);
+            prop_assert!(part.jobs.len() == 1 || part.cost <= extensions[part.name.extension].part_cost);
             prop_assert_eq!(&plan.part(&part.outline), &part);
             let super::Part { outline, jobs } = part;
-            covered.extend(jobs.into_iter().map(|job| (outline.extension, job)));
+            covered.extend(jobs.into_iter().map(|job| (outline.name.extension, job)));
         }
         prop_assert_eq!(covered, expected);
     }
@@ -192,8 +192,8 @@ proptest! {
             if let Some(last) = extensions.len().checked_sub(1) {
                 let is_done = |index: u64| is_done[usize::try_from(index).unwrap().wrapping_add(7 * last) % is_done.len()];
                 let plan = Plan::new(&extensions);
-                done.extend(plan.parts_of(last).filter(|part| is_done(part.index)));
-                extensions[last].kept = Some(plan.ranges(last, |part| is_done(part.index)));
+                done.extend(plan.parts_of(last).filter(|part| is_done(part.name.index)));
+                extensions[last].kept = Some(plan.ranges(last, |part| is_done(part.name.index)));
             }
             extensions.push(Extension::new(sweep, &extensions));
         }

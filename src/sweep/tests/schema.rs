@@ -127,6 +127,10 @@ fn value(kind: Kind, (low, high): (Bound<f64>, Bound<f64>)) -> Json {
 }
 
 /// A number, without a decimal point if it is whole and a double holds it exactly.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "it is whole, and a double holds it exactly"
+)]
 fn whole(number: f64) -> Json {
     if number.fract() == 0.0 && number.abs() <= 9_007_199_254_740_992.0 {
         json!(number as i64)
