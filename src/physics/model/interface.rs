@@ -5,9 +5,8 @@
 //! is due. Contract: decisions are by contact identity; simultaneous events go in the order of blocks, then contacts.
 
 use super::disorder::Contact;
-use super::lanes::{LANES, Row};
 use super::reattachments::{Due, Reattachments};
-use super::simd::{Simd, Vector};
+use super::simd::{LANES, Row, Simd, Vector};
 use super::{BreakOn, Disorder, Parameters};
 use crate::value::words;
 use pulp::Scalar512b;

@@ -5,7 +5,6 @@ mod drive;
 pub mod equation;
 pub mod fields;
 mod interface;
-mod lanes;
 mod parameters;
 mod reattachments;
 pub mod selected;
@@ -16,8 +15,8 @@ pub use disorder::{Contact, Disorder, RNG_SCHEME, standard_normal_quantile};
 pub use drive::Drive;
 pub use fields::Description;
 pub use interface::{Change, ContactChange, ContactEvent, Interface};
-pub(crate) use lanes::{LANES, Row};
 pub use parameters::{BreakOn, ParameterError, Parameters, Symbol};
+pub(crate) use simd::{LANES, Row};
 
 /// The value of a parameter, in a file, on an axis or in a table.
 pub type Value = crate::value::Value<'static>;

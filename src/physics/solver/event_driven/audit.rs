@@ -1,8 +1,8 @@
 //! What the event-driven solver enters into the energy ledger along the way: damping along series and leaps.
 
-use super::chain::{Chain, State};
 use super::kernels::Kernels;
 use super::leap::Split;
+use super::slider::{Chain, State};
 use super::taylor::Series;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;

@@ -1,10 +1,9 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
-use super::chain::{Chain, State};
 use super::grid::{Grid, GridStep, advance, velocity};
 use super::leap::{Bounds, Plan, Split, leap};
 use super::moving_frame::GridDrive;
-use super::slider::Slider;
+use super::slider::{Chain, Slider, State};
 use super::taylor::{Series, StepInput, evaluate, expand, reachable};
 use crate::model::simd::Simd;
 use crate::solver::harmonic::Harmonic;

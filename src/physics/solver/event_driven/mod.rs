@@ -9,11 +9,9 @@
 //! Displacements and times are kept in a [`moving_frame`], so that neither loses digits in long runs.
 
 mod audit;
-mod chain;
 mod crossing;
 mod grid;
 mod kernels;
-mod lane_layout;
 mod leap;
 mod moving_frame;
 mod slider;
@@ -22,10 +20,9 @@ mod tolerances;
 
 use self::grid::Grid;
 use self::kernels::Kernels;
-use self::lane_layout::Layout;
 use self::leap::{Bounds, Split};
 use self::moving_frame::Frame;
-use self::slider::Slider;
+use self::slider::{Layout, Slider};
 use self::taylor::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;

@@ -21,8 +21,7 @@
 
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
-use crate::solver::event_driven::chain::Chain;
-use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
+use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK};
 
 /// Part of its diagonal entry that a pivot must exceed: less is rounding, and the matrix not surely positive definite.
 const MIN_PIVOT: f64 = 1e-12;

@@ -13,8 +13,7 @@ mod split;
 pub(super) use self::split::Split;
 
 use self::split::SplitRow;
-use super::chain::{Chain, State};
-use super::slider::Slider;
+use super::slider::{Chain, Slider, State};
 use crate::model::Interface;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::harmonic::Harmonic;

@@ -15,8 +15,7 @@
 use super::elimination::{Elimination, Number, outer};
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Row};
-use crate::solver::event_driven::chain::{Chain, State};
-use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
+use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, State};
 use crate::solver::harmonic::Harmonic;
 use crate::solver::segment::ForcePath;
 

@@ -1,4 +1,4 @@
-//! Taylor steps: motion as a series in time ([`series`], [`recurrence`]), each step up to its next contact events.
+//! Taylor steps: motion as a series in time ([`series`]), each step up to its next contact events.
 //!
 //! Setting: `tolerance`, of which each step may take a share ([`super::tolerances`]). Method: Taylor series to the order at
 //! which they converge, as described by À. Jorba and M. Zou, Exp. Math. 14, 99 (2005); a bound on each block's motion
@@ -18,17 +18,13 @@
 //! ends where the series would no longer be accurate. Contract: events in the right order, also of blocks whose series has
 //! changed.
 
-mod recurrence;
 mod series;
 
-pub(super) use self::recurrence::{StepInput, expand};
-pub(super) use self::series::{DriveDerivatives, Series, evaluate, reachable};
+pub(super) use self::series::{DriveDerivatives, Series, StepInput, evaluate, expand, reachable};
 
 use super::Integration;
-use super::chain::Chain;
 use super::crossing::first_exit;
-use super::lane_layout::Layout;
-use super::slider::Slider;
+use super::slider::{Chain, Layout, Slider};
 use crate::model::Change;
 use crate::solver::polynomial;
 use crate::solver::segment::{ForceAt, ForcePath, Segment};
