@@ -5,12 +5,10 @@
 //! the largest shear force between the previous slip's end (its last break) and the instant at which its rupture reaches
 //! the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
-use super::Recording;
 use super::drops::{DropDetector, Drops};
-use super::phase::phase;
-use super::regime::Averages;
 use super::rupture::{Rupture, advance_speed};
-use super::slip::{Energies, Modulation, Precursor, Slip};
+use super::slip::{Energies, Modulation, Precursor, Slip, phase};
+use super::{Averages, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
 

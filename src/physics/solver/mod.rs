@@ -8,7 +8,6 @@ mod fixed_step;
 mod harmonic;
 mod ledger;
 mod polynomial;
-mod quadrature;
 mod segment;
 
 pub use harmonic::Harmonic;

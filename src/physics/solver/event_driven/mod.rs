@@ -3,13 +3,12 @@
 //! Between events the model is linear with constant coefficients. While it is quiet, a leap follows the driven solution
 //! to the next event ([`leap`]). While it moves, it is resolved in one of two ways: on a constant grid of time, which
 //! events correct to fourth order ([`grid`]); or in Taylor series, of which each locates the first crossing of a break
-//! position rigorously ([`taylor`], [`crossing`]). Contract: errors of displacement of the order of `tolerance` · f_s/k,
+//! position rigorously ([`taylor`]). Contract: errors of displacement of the order of `tolerance` · f_s/k,
 //! and events in the right order within that.
 //!
 //! Displacements and times are kept in a [`moving_frame`], so that neither loses digits in long runs.
 
 mod audit;
-mod crossing;
 mod grid;
 mod kernels;
 mod leap;

@@ -2,7 +2,7 @@
 //!
 //! Setting: `tolerance`, of which each step may take a share ([`super::tolerances`]). Method: Taylor series to the order at
 //! which they converge, as described by À. Jorba and M. Zou, Exp. Math. 14, 99 (2005); a bound on each block's motion
-//! isolates the first crossing of a break position ([`super::crossing`]).
+//! isolates the first crossing of a break position ([`first_exit`](polynomial::first_exit)).
 //!
 //! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of
 //! k_i a_i over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and
@@ -23,7 +23,6 @@ mod series;
 pub(super) use self::series::{DriveDerivatives, Series, StepInput, evaluate, expand, reachable};
 
 use super::Integration;
-use super::crossing::first_exit;
 use super::slider::{Chain, Layout, Slider};
 use crate::model::Change;
 use crate::solver::polynomial;
@@ -132,7 +131,7 @@ impl Step {
             return f64::INFINITY;
         }
         self.series.block(row, lane, &mut self.coefficients);
-        let Some(s) = first_exit(&mut self.coefficients, levels, from, end) else {
+        let Some(s) = polynomial::first_exit(&mut self.coefficients, levels, from, end) else {
             return f64::INFINITY;
         };
         self.breaks.push((s, block));
