@@ -8,7 +8,6 @@
 //!
 //! Displacements and times are kept in a [`moving_frame`], so that neither loses digits in long runs.
 
-mod audit;
 mod grid;
 mod kernels;
 mod leap;

@@ -251,10 +251,78 @@ pub(super) fn leap<S: Simd>(
     }
     let plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
     if let Some(audit) = audit {
-        audit.follow_leap(chain, drive, split, state, plan.segment.duration);
+        let left_out = chain.mass * free_energy(chain, drive, split, state);
+        Audit::add(&audit.left_out, left_out);
+        let damping = damping_loss(chain, drive, split, plan.segment.duration);
+        Audit::add(&audit.damping, damping);
     }
     follow(simd, split, drive, plan.segment.duration, state);
     Ok(plan)
+}
+
+/// Energy of the free motion, by mass: E(x_p + y) - E(x_p) = yᵀ (S (x_p + y/2) - b - drive) + m w (v_p + w/2).
+fn free_energy(chain: &Chain, drive: &Harmonic, split: &Split, state: &State) -> f64 {
+    let coupling = chain.coupling[0][0];
+    let mut energy = 0.0;
+    let mut before = [0.0; 2];
+    for j in 0..chain.layout.blocks {
+        let driven = split.driven(chain, j);
+        let [real, imaginary] = driven.wave;
+        let x = driven.start + real;
+        let v = driven.rate - drive.angular_frequency * imaginary;
+        let y = chain.at(&state.displacement, j) - x;
+        let w = chain.at(&state.velocity, j) - v;
+        let middle = x + 0.5 * y;
+        let mut force = chain.at(&chain.diagonal, j) * middle - chain.at(&chain.pull, j);
+        if j == 0 {
+            force -= chain.drive_stiffness / chain.mass * drive.value(0.0);
+        }
+        energy += y * force + w * (v + 0.5 * w);
+        if j > 0 {
+            // The two off-diagonal terms of the pair, y_j m_{j-1} + y_{j-1} m_j.
+            energy -= coupling * (y * before[1] + before[0] * middle);
+        }
+        before = [y, middle];
+    }
+    energy
+}
+
+/// Damping loss along the driven solution in `elapsed` s, in J, in closed form: the velocity is p1 - ω Im(q e^{iωt}).
+fn damping_loss(chain: &Chain, drive: &Harmonic, split: &Split, elapsed: f64) -> f64 {
+    let frequency = drive.angular_frequency;
+    // Σ p1², Σ p1 q, Σ |q|² and Σ q².
+    let mut ramp = 0.0;
+    let mut mixed = [0.0; 2];
+    let mut size = 0.0;
+    let mut square = [0.0; 2];
+    for j in 0..chain.layout.blocks {
+        let driven = split.driven(chain, j);
+        let rate = driven.rate;
+        let [real, imaginary] = driven.wave;
+        ramp += rate * rate;
+        mixed = [mixed[0] + rate * real, mixed[1] + rate * imaginary];
+        size += real * real + imaginary * imaginary;
+        square = [
+            square[0] + real * real - imaginary * imaginary,
+            square[1] + 2.0 * real * imaginary,
+        ];
+    }
+    let mut integral = ramp * elapsed;
+    if drive.amplitude > 0.0 {
+        let (sine, versine) = sine_and_versine(frequency, elapsed);
+        let (sine_twice, versine_twice) = sine_and_versine(2.0 * frequency, elapsed);
+        integral -= 2.0 * (mixed[0] * versine + mixed[1] * sine);
+        let swing = 0.5 * (square[0] * sine_twice - square[1] * versine_twice);
+        integral += 0.5 * frequency * (size * frequency * elapsed - swing);
+    }
+    chain.mass * chain.damping_rate * integral
+}
+
+/// sin ωt and 1 - cos ωt; whole turns are taken off first.
+fn sine_and_versine(frequency: f64, elapsed: f64) -> (f64, f64) {
+    let angle = TAU * (frequency * elapsed / TAU).fract();
+    let half = libm::sin(0.5 * angle);
+    (libm::sin(angle), 2.0 * half * half)
 }
 
 /// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free motion's

@@ -25,6 +25,7 @@ pub(super) use self::series::{DriveDerivatives, Series, StepInput, evaluate, exp
 use super::Integration;
 use super::slider::{Chain, Layout, Slider};
 use crate::model::Change;
+use crate::solver::ledger::Audit;
 use crate::solver::polynomial;
 use crate::solver::segment::{ForceAt, ForcePath, Segment};
 use crate::solver::{Observer, SimulationError};
@@ -277,15 +278,27 @@ impl Integration<'_> {
             path: self.step.force_path(first, [force, end_force]),
         });
         if let Some(audit) = self.audit {
-            audit.follow_series(
-                &*self.kernels,
-                &self.slider.chain,
-                &self.step.series,
-                [first, last],
-                length,
-            );
+            self.enter_damping(audit, [first, last]);
         }
         end_force
+    }
+
+    /// Enters the damping loss over a part of the step: ∫ mγ Σ v² dt, exact for the polynomial.
+    fn enter_damping(&self, audit: &Audit, [first, last]: [f64; 2]) {
+        let Slider { chain, state, .. } = &self.slider;
+        let Step { series, length, .. } = &self.step;
+        let mut probe = state.clone();
+        let nodes = audit.quadrature.nodes(series.order).iter();
+        let mean_square: f64 = nodes
+            .map(|&(s, weight)| {
+                let s = first + s * (last - first);
+                self.kernels.evaluate(series, s, *length, &mut probe);
+                let velocities = probe.velocity.iter().flat_map(|row| row.iter());
+                weight * velocities.map(|v| v * v).sum::<f64>()
+            })
+            .sum();
+        let loss = chain.mass * chain.damping_rate * (last - first) * length * mean_square;
+        Audit::add(&audit.damping, loss);
     }
 
     /// Breaks the contacts that a block has reached, or attaches the one that is due there, at s in the step. Returns
