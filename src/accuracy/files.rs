@@ -195,7 +195,7 @@ fn points(
 
 #[cfg(test)]
 mod tests {
-    use super::super::Method;
+    use super::super::SolverColumns;
     use super::super::bias::{Bias, Sample};
     use super::super::breaks::BreakErrors;
     use super::super::study::BiasRow;
@@ -208,7 +208,7 @@ mod tests {
 
     fn findings() -> Findings {
         let parameters = Parameters::default();
-        let solver = Method::from(Solver::FixedStep { time_step: 1e-6 });
+        let solver = SolverColumns::from(Solver::fixed_step(1e-6));
         let break_times = BreakErrors {
             breaks: Some(100),
             missing: Some(0),

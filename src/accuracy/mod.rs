@@ -18,58 +18,50 @@ pub use files::{check, processor, to_json, write};
 pub use study::{BiasRow, Findings, MethodRow, Study};
 pub use verdict::{shows_bias, verdict};
 
-use crate::model::{Parameters, Symbol, Value};
-use crate::solver::{Resolve, Solver};
+use crate::model::{Description, Parameters, Symbol, Value};
+use crate::solver::{Method, Resolve, Solver};
 use crate::table::columns::columns;
 use std::fmt;
 
-const FIXED_STEP: &str = "fixed-step";
-
 columns! {
-    /// A solver, with its one setting.
+    /// A solver, by the main setting of its method.
     #[derive(Clone, Debug, PartialEq)]
-    pub struct Method {
+    pub struct SolverColumns {
         method: String = "", "event-driven, or how it resolves motion: grid or taylor; or fixed-step";
         setting: f64 = "", "tolerance, or dt in s";
     }
 }
 
-impl From<Solver> for Method {
+impl From<Solver> for SolverColumns {
     fn from(solver: Solver) -> Self {
-        let (method, setting) = match solver {
-            Solver::EventDriven {
-                resolve: Resolve::Auto,
-                tolerance,
-            } => ("event-driven", tolerance),
-            Solver::EventDriven { resolve, tolerance } => (resolve.word(), tolerance),
-            Solver::FixedStep { time_step } => (FIXED_STEP, time_step),
+        let method = match solver.resolve {
+            Resolve::Auto => solver.method.word(),
+            resolve => resolve.word(),
         };
         Self {
             method: method.to_owned(),
-            setting,
+            setting: solver.setting(),
         }
     }
 }
 
-impl Method {
+impl SolverColumns {
     /// The method without its setting, in words.
     pub fn name(&self) -> &str {
         match self.method.as_str() {
             "taylor" => "Taylor steps",
-            FIXED_STEP => "fixed step",
+            "fixed-step" => "fixed step",
             name => name,
         }
     }
 }
 
-impl fmt::Display for Method {
+impl fmt::Display for SolverColumns {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (setting, unit) = if self.method == FIXED_STEP {
-            ("dt", " s")
-        } else {
-            ("tolerance", "")
-        };
-        write!(f, "{}, {setting} {:e}{unit}", self.name(), self.setting)
+        let method = Method::from_word(&self.method).unwrap_or(Method::EventDriven);
+        let Description { key, unit, .. } = method.settings()[0].description();
+        let setting = format!("{}, {key} {:e} {unit}", self.name(), self.setting);
+        f.write_str(setting.trim_end())
     }
 }
 

@@ -5,7 +5,7 @@
 //! chance in one study of twenty. With few slips, or one realisation, no bias counts.
 
 use super::study::{BiasRow, Findings, MethodRow, Study};
-use super::{Method, set_in_words};
+use super::{SolverColumns, set_in_words};
 
 /// Least number of slips on either side with which a bias counts.
 const MIN_SLIPS: u64 = 100;
@@ -24,7 +24,7 @@ fn can_tell(row: &BiasRow) -> bool {
 
 /// The lines, the answer first.
 pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
-    let own = Method::from(study.own);
+    let own = SolverColumns::from(study.own);
     let compared: Vec<&BiasRow> = findings
         .biases
         .iter()
@@ -182,9 +182,9 @@ mod tests {
     use crate::solver::{Resolve, Solver};
     use crate::table::columns::Interval;
 
-    const GRID: Solver = Solver::EventDriven {
-        tolerance: 1e-3,
+    const GRID: Solver = Solver {
         resolve: Resolve::Grid,
+        ..Solver::event_driven(1e-3)
     };
 
     fn row(quantity: &str, slips: u64, bias: f64) -> BiasRow {
@@ -230,9 +230,9 @@ mod tests {
     }
 
     fn lines(slips_of_set: u64, biases: Vec<BiasRow>) -> Vec<String> {
-        let tighter = Solver::EventDriven {
-            tolerance: 1e-5,
+        let tighter = Solver {
             resolve: Resolve::Grid,
+            ..Solver::event_driven(1e-5)
         };
         let study = Study {
             sets: vec![Parameters::default()],

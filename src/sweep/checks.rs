@@ -13,7 +13,7 @@ use crate::model::Symbol;
 use crate::model::theory::typical_interval;
 use crate::observe::Recording;
 use crate::sets::Statistic;
-use crate::solver::{Resolve, Solver};
+use crate::solver::Resolve;
 use crate::table::value::Shortest;
 use std::ops::RangeInclusive;
 
@@ -135,9 +135,7 @@ pub(super) fn whole(
         );
         return Err(file.source.refuse(file.place_of("record"), problem));
     }
-    let is_on_grid =
-        matches!(sweep.solver, Solver::EventDriven { resolve, .. } if resolve == Resolve::Grid);
-    if sweep.recording.energies && is_on_grid {
+    if sweep.recording.energies && sweep.solver.resolve == Resolve::Grid {
         let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
         return Err(file.source.refuse(file.place_of("record"), problem));
     }

@@ -9,7 +9,10 @@ use stickslip::observe::{AttachedMap, ContactLog, Observers, Recording, SlipObse
 use stickslip::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate};
 
 const fn solver(tolerance: f64, resolve: Resolve) -> Solver {
-    Solver::EventDriven { tolerance, resolve }
+    Solver {
+        resolve,
+        ..Solver::event_driven(tolerance)
+    }
 }
 
 const GRID: Solver = solver(1e-3, Resolve::Grid);

@@ -165,14 +165,14 @@ fn logged(parameters: &Parameters, solver: Solver) -> (Vec<Slip>, ContactLog, f6
 }
 
 fn solvers() -> [Solver; 3] {
-    let event_driven = |resolve| Solver::EventDriven {
-        tolerance: 1e-3,
+    let event_driven = |resolve| Solver {
         resolve,
+        ..Solver::event_driven(1e-3)
     };
     [
         event_driven(Resolve::Grid),
         event_driven(Resolve::Taylor),
-        Solver::FixedStep { time_step: 1e-6 },
+        Solver::fixed_step(1e-6),
     ]
 }
 

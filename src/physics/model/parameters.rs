@@ -56,7 +56,7 @@ fields! {
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
         L("L", "L") slider_length: f64 = 0.15, "m", POSITIVE,
             "slider length, enters positions and front speeds only";
-        BreakOn("break_on") break_on: BreakOn = BreakOn::Magnitude, "", BREAK_ON, "when a contact breaks";
+        BreakOn("break_on") break_on: BreakOn = BreakOn::Magnitude, "", WORD and "magnitude of either sign", "when a contact breaks";
         Seed("seed") seed: u64 = 0, "", COUNT_OR_ZERO, "realisation of the disorder";
     }
 }

@@ -10,10 +10,13 @@
 use super::ledger::{Audit, FinalState};
 use super::polynomial;
 use super::segment::{ForceAt, ForcePath, Segment};
-use super::{Limits, Observer, SimulationError, Summary};
+use super::{Limits, Observer, SimulationError, SolverKey, Summary};
+use crate::model::equation::stability_limit;
 use crate::model::{ContactChange, ContactEvent, Drive, Interface, Parameters};
 use pulp::Arch;
 use std::sync::atomic::Ordering;
+
+pub(super) const SETTINGS: &[SolverKey] = &[SolverKey::TimeStep];
 
 /// Steps between two checks of the interrupt flag and of whether the state is finite.
 const STEPS_PER_CHECK: u64 = 4096;
@@ -71,6 +74,16 @@ impl Motion {
         (0..blocks).fold(false, |any, j| {
             any | (x[j] >= upper[j]) | (x[j] <= lower[j])
         })
+    }
+}
+
+/// Checks that a time step, in s, is stable.
+pub(super) fn check(time_step: f64, parameters: &Parameters) -> Result<(), SimulationError> {
+    let limit = stability_limit(parameters);
+    if time_step > 0.0 && time_step < limit {
+        Ok(())
+    } else {
+        Err(SimulationError::UnstableStep { time_step, limit })
     }
 }
 

@@ -3,10 +3,10 @@
 use super::super::quantity::Quantity;
 use super::super::rounds::MAX_JOBS;
 use super::super::{SCHEMA, Sweep};
-use crate::model::{BreakOn, Description, Parameters, Value};
+use crate::model::{Description, Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::sets::STATISTICS;
-use crate::solver::{Resolve, TOLERANCES};
+use crate::solver::{Solver, SolverKey};
 use crate::table::value::Kind;
 use serde_json::{Value as Json, json};
 use std::collections::BTreeSet;
@@ -121,7 +121,7 @@ fn every_table_of_the_schema_has_the_keys_that_the_parser_allows() {
 fn value(field: &Description) -> Json {
     let mut number = match field.kind {
         Kind::Flag => return json!({ "type": "boolean" }),
-        Kind::Text => return json!({ "enum": BreakOn::ALL.map(BreakOn::word) }),
+        Kind::Text => return json!({ "enum": field.choices }),
         Kind::Count => json!({ "type": "integer" }),
         Kind::Real => json!({ "type": "number" }),
     };
@@ -263,13 +263,16 @@ fn every_value_of_the_schema_has_kind_range_default_and_words_of_the_parser() {
         );
     }
     let solver = &schema["properties"]["solver"]["properties"];
-    let tolerances =
-        json!({ "type": "number", "minimum": TOLERANCES.start(), "maximum": TOLERANCES.end() });
-    assert_value(&schema, &solver["tolerance"], &tolerances, None);
-    assert_eq!(
-        solver["resolve"]["enum"],
-        json!(Resolve::ALL.map(Resolve::word))
-    );
+    for key in SolverKey::ALL {
+        let field = key.description();
+        let expected = value(&field);
+        assert_value(
+            &schema,
+            &solver[field.key],
+            &expected,
+            Some((&field, Solver::default().get(key))),
+        );
+    }
 }
 
 #[test]

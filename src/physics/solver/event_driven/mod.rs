@@ -26,9 +26,40 @@ use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
 use super::ledger::{Audit, FinalState};
 use super::segment::{ForcePath, Segment};
-use super::{Limits, Observer, Resolve, SimulationError, Summary};
+use super::{Limits, Observer, SimulationError, Solver, SolverKey, Summary};
 use crate::model::{ContactChange, ContactEvent, Drive, Parameters};
+use crate::value::{Field, words};
 use std::sync::atomic::Ordering;
+
+pub(super) const SETTINGS: &[SolverKey] = &[SolverKey::Tolerance, SolverKey::Resolve];
+
+words! {
+    /// How motion between leaps is resolved.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Resolve {
+        /// On the grid from a tolerance of [`GRID_TOLERANCE`] on, if the clock resolves its step and no ledger is kept;
+        /// else in Taylor steps.
+        Auto = "auto",
+        /// On a constant grid of time, corrected for events to fourth order.
+        Grid = "grid",
+        /// In Taylor series, each up to the next event.
+        Taylor = "taylor",
+    }
+}
+
+impl Resolve {
+    /// Whether motion is resolved on the grid at a tolerance, but for the exceptions of [`Self::Auto`].
+    pub fn takes_grid(self, tolerance: f64) -> bool {
+        match self {
+            Self::Auto => tolerance >= GRID_TOLERANCE,
+            Self::Grid => true,
+            Self::Taylor => false,
+        }
+    }
+}
+
+/// Least tolerance at which [`Resolve::Auto`] takes the grid: it is cheaper down to some 1e-8.
+pub const GRID_TOLERANCE: f64 = 1e-7;
 
 /// A leap is tried only if no reattachment is due within this many longest Taylor steps, or steps of the grid.
 const WORTHWHILE_LEAP: f64 = 6.0;
@@ -36,15 +67,25 @@ const WORTHWHILE_GRID_LEAP: f64 = 80.0;
 /// Steps between two checks of the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
 
-/// Runs the method with this tolerance, relative to the contact reach; see [`super::simulate`].
+/// Checks a tolerance.
+pub(super) fn check(tolerance: f64) -> Result<(), SimulationError> {
+    match SolverKey::Tolerance.checked(tolerance.value()) {
+        Some(_) => Ok(()),
+        None => Err(SimulationError::BadTolerance { tolerance }),
+    }
+}
+
+/// Runs the method with a tolerance in its range; see [`super::simulate`].
 pub(super) fn run(
+    solver: Solver,
     parameters: &Parameters,
-    tolerance: f64,
-    resolve: Resolve,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
     audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
+    let Solver {
+        tolerance, resolve, ..
+    } = solver;
     let rows = Layout::new(parameters.blocks).rows;
     if resolve == Resolve::Grid && audit.is_some() {
         return Err(SimulationError::LedgerOnGrid);
@@ -423,6 +464,13 @@ mod tests {
     use crate::model::{Change, ContactEvent};
     use crate::observe::{ContactLog, Recording, SlipObserver};
 
+    fn in_taylor_steps(tolerance: f64) -> Solver {
+        Solver {
+            resolve: Resolve::Taylor,
+            ..Solver::event_driven(tolerance)
+        }
+    }
+
     #[test]
     fn every_set_of_processor_features_gives_the_same_bits() {
         let plain = Parameters::default();
@@ -482,9 +530,8 @@ mod tests {
                 };
                 let mut log = ContactLog::default();
                 let summary = run(
+                    in_taylor_steps(tolerance),
                     &parameters,
-                    tolerance,
-                    Resolve::Taylor,
                     limits,
                     &mut log,
                     None,
@@ -603,9 +650,8 @@ mod tests {
             };
             let mut log = ContactLog::default();
             run(
+                in_taylor_steps(tolerance),
                 &parameters,
-                tolerance,
-                Resolve::Taylor,
                 limits,
                 &mut log,
                 None,
