@@ -9,7 +9,6 @@
 
 use super::quantity::Quantity;
 use super::spelling::{hint, nearest};
-use crate::model::{self, BreakOn};
 use crate::table::shown::{shown, shown_text};
 use crate::table::value::{Field, Value};
 use std::cell::RefCell;
@@ -324,7 +323,7 @@ impl<'a> Entry<'a> {
     }
 
     /// The value as written: a count where it is one.
-    pub fn value(&self) -> Option<model::Value> {
+    pub fn value(&self) -> Option<Value<'a>> {
         match self.node.get_ref() {
             DeValue::Integer(integer) => {
                 let digits = integer.as_str();
@@ -334,7 +333,7 @@ impl<'a> Entry<'a> {
             }
             DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
             DeValue::Boolean(flag) => Some(Value::Flag(*flag)),
-            DeValue::String(word) => BreakOn::from_word(word).map(|rule| rule.value()),
+            DeValue::String(word) => Some(Value::Text(word)),
             _ => None,
         }
     }
