@@ -200,7 +200,7 @@ mod tests {
     use super::super::breaks::BreakErrors;
     use super::super::study::BiasRow;
     use super::*;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::solver::Solver;
     use crate::table::columns::{Column, Row};
 

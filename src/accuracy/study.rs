@@ -9,8 +9,8 @@
 use super::bias::{Bias, Sample};
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::{Cost, SolverColumns, set_in_words};
-use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
+use crate::model::{Selected, Selection};
 use crate::observe::{Measurements, Recording, Slip, measure};
 use crate::run::threads;
 use crate::solver::{Limits, Observer, Resolve, Solver, Summary, simulate};

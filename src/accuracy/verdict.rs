@@ -178,7 +178,7 @@ mod tests {
     use super::super::breaks::BreakErrors;
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::solver::{Resolve, Solver};
     use crate::table::columns::Interval;
 

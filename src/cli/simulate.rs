@@ -223,7 +223,8 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let wall = begin.elapsed().as_secs_f64();
 
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
-    let slips = (measured.slips.iter()).map(|slip| -> SlipRow<'_> { (&label, slip) });
+    let slips = (measured.slips.iter())
+        .map(|slip| -> SlipRow<'_> { (Cow::Borrowed(&label), Cow::Borrowed(slip)) });
     let contacts = records.contacts.iter().map(ContactRow::from);
     let footer = Footer::default()
         .with_sweep(sweep.name(), sweep.text())

@@ -6,7 +6,7 @@ use super::{custom, drag, edge_values, histograms, intervals, map, overview, pha
 use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
-use crate::table::columns::{FromRow, Table};
+use crate::table::columns::Table;
 use anyhow::Result;
 use std::path::PathBuf;
 
@@ -73,7 +73,7 @@ pub fn write_custom(
     write(layout, &[picture], look, formats)
 }
 
-fn read<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
+fn read<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
     read_reduced(layout).map_err(advise(ADVICE))
 }
 

@@ -140,7 +140,7 @@ impl Grid {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::observe::Regime;
     use crate::reduce::Interval;
 

@@ -64,8 +64,9 @@ pub use words;
 
 words! {
     /// What a field holds.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Kind {
+        #[default]
         Real = "real",
         Count = "count",
         Flag = "flag",

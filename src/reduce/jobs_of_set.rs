@@ -2,7 +2,7 @@
 
 use super::sequence::{Estimate, Sequences};
 use crate::model::Parameters;
-use crate::model::selected::Selected;
+use crate::model::Selected;
 use crate::observe::Regime;
 use crate::results::tables::JobOutcome;
 use crate::sets::SetRow;

@@ -6,7 +6,7 @@ use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
 use crate::results::{ErrorKind, Results, ResultsError};
 use crate::table::checksum::hexadecimal;
-use crate::table::columns::{FromRow, Table};
+use crate::table::columns::Table;
 use crate::table::file::{DataFile, Dataset, Footer};
 use crate::table::storage::StorageError;
 use anyhow::Result;
@@ -108,7 +108,7 @@ pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
 }
 
 /// The rows of a reduced table, such as [`Point`](super::Point).
-pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
+pub fn read_reduced<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
     let file = layout.reduced_file(R::NAME);
     let batches = Dataset::new(layout.storage, vec![file]).rows();
     let batches: Vec<Vec<R>> = batches.collect::<Result<_, _>>()?;

@@ -148,7 +148,7 @@ mod tests {
     use super::super::read_reduced;
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{
@@ -159,6 +159,7 @@ mod tests {
     use crate::sweep::Sweep;
     use crate::table::file::Footer;
     use crate::table::storage::{Disk, Storage};
+    use std::borrow::Cow;
     use std::fs;
     use std::path::Path;
 
@@ -252,10 +253,11 @@ mod tests {
                 .map(|label| job_result(label, slips))
                 .collect();
             for (job, result) in labels.iter().zip(&measured) {
-                result
-                    .slips
-                    .iter()
-                    .for_each(|slip| slip_writer.push(&(job, slip)).unwrap());
+                result.slips.iter().for_each(|slip| {
+                    slip_writer
+                        .push(&(Cow::Borrowed(job), Cow::Borrowed(slip)))
+                        .unwrap()
+                });
             }
             slip_writer.finish().unwrap();
             if part < 2 {

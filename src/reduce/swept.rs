@@ -118,7 +118,7 @@ pub fn has_even_steps(values: &[f64]) -> bool {
 mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
 
     fn row(velocity: f64, amplitude: f64, period: Option<f64>) -> SetRow {
         let parameters = Parameters {

@@ -212,7 +212,7 @@ pub fn is_same(value: f64, other: f64) -> bool {
 mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::table::columns::Interval;
 
     fn rows() -> Vec<SetRow> {

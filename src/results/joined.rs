@@ -1,7 +1,7 @@
 //! Tables with columns that their files lack: those of the jobs of their rows, and whether a row belongs to a control.
 //! Exports and the Python module read them part by part.
 
-use crate::model::selected::Selected;
+use crate::model::Selected;
 use crate::results::directory::Results;
 use crate::results::layout::PartName;
 use crate::results::parts::row_count;

@@ -2,14 +2,15 @@
 //!
 //! Quantities are SI. Nothing in a table says when, where or how fast it was computed.
 
-use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
+use crate::model::{Selected, Selection};
 use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
 use crate::sweep::Sweep;
 use crate::table::arrow::RowBuffer;
 use crate::table::columns::{Table, columns, tables};
 use crate::table::value::words;
 use arrow_schema::SchemaRef;
+use std::borrow::Cow;
 
 words! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,8 +127,8 @@ pub fn relabel<S, T>(label: &JobLabel<S>) -> JobLabel<T> {
     )
 }
 
-pub type SlipRow<'a> = (&'a JobLabel<DriveAndSeed>, &'a Slip);
-pub type PrecursorRow<'a> = (&'a JobLabel<DriveAndSeed>, &'a Precursor);
+pub type SlipRow<'a> = (Cow<'a, JobLabel<DriveAndSeed>>, Cow<'a, Slip>);
+pub type PrecursorRow<'a> = (Cow<'a, JobLabel<DriveAndSeed>>, Cow<'a, Precursor>);
 pub type JobRow = (JobLabel<All>, JobRecord);
 
 tables! {

@@ -6,7 +6,7 @@ mod label;
 pub use label::{Digits, Label, capitalised, first_clause, label, power_of_ten, symbol_of};
 
 use crate::model::Symbol;
-use crate::model::selected::{Selected, Selection};
+use crate::model::{Selected, Selection};
 use crate::observe::Regime;
 use crate::table::columns::{Column, Interval, Kind, Row, columns, tables};
 use std::borrow::Cow;

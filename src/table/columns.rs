@@ -25,8 +25,8 @@ pub(crate) use tables;
 pub(crate) mod tests {
     use super::*;
     use crate::documented::markdown;
-    use crate::model::selected::{Selected, Selection};
     use crate::model::{BreakOn, Symbol};
+    use crate::model::{Selected, Selection};
 
     columns! {
         /// One reading.

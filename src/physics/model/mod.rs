@@ -7,7 +7,6 @@ pub mod fields;
 mod interface;
 mod parameters;
 mod reattachments;
-pub mod selected;
 pub(crate) mod simd;
 pub mod theory;
 
@@ -15,7 +14,7 @@ pub use disorder::{Contact, Disorder, RNG_SCHEME, standard_normal_quantile};
 pub use drive::Drive;
 pub use fields::Description;
 pub use interface::{Change, ContactChange, ContactEvent, Interface};
-pub use parameters::{BreakOn, ParameterError, Parameters, Symbol};
+pub use parameters::{BreakOn, ParameterError, Parameters, Selected, Selection, Symbol};
 pub(crate) use simd::{LANES, Row};
 
 /// The value of a parameter, in a file, on an axis or in a table.
