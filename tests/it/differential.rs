@@ -243,10 +243,7 @@ impl Run {
             events: 200_000,
             interrupt: None,
         };
-        let mut both = Observers {
-            lead: &mut breaks,
-            others: vec![&mut slips],
-        };
+        let mut both = Observers(vec![&mut breaks, &mut slips]);
         let summary = simulate(parameters, solver, limits, &mut both)
             .map_err(|error| format!("{solver:?}: {error}"))?;
         if !breaks.in_order.is_sorted_by_key(|found| found.time) {

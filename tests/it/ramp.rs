@@ -98,10 +98,7 @@ fn both_solvers_show_the_same_trace() {
             &parameters,
             solver,
             limits,
-            &mut Observers {
-                lead: &mut lead,
-                others: vec![&mut trace],
-            },
+            &mut Observers(vec![&mut lead, &mut trace]),
         )
         .unwrap();
         trace.rows

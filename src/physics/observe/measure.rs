@@ -2,7 +2,9 @@
 
 use super::{Precursor, Recording, Slip, SlipObserver};
 use crate::model::Parameters;
-use crate::solver::{Limits, SimulationError, Solver, Summary, simulate, simulate_audited};
+use crate::solver::{
+    Limits, Observer, SimulationError, Solver, Summary, simulate, simulate_audited,
+};
 use crate::value::words;
 use std::sync::atomic::AtomicBool;
 
@@ -69,20 +71,16 @@ pub struct Measurements {
 impl Measurements {
     /// What an observer has measured in a simulation that ended with this summary.
     pub fn new(observer: SlipObserver, summary: Summary) -> Self {
-        let averages = observer.averages();
-        let running_interval = observer.running_interval();
-        let ruptures = observer.ruptures;
-        let has_given_up = observer.has_given_up;
-        let (slips, precursors) = observer.into_rows();
-        Self {
-            slips,
-            precursors,
-            ruptures,
-            averages,
-            running_interval,
-            has_given_up,
+        let mut measured = Self {
+            averages: observer.averages(),
+            running_interval: observer.running_interval(),
+            ruptures: observer.ruptures,
+            has_given_up: observer.has_given_up,
             summary,
-        }
+            ..Self::default()
+        };
+        (measured.slips, measured.precursors) = observer.into_rows();
+        measured
     }
 
     /// How the slider moved; `None` without averages.
@@ -100,22 +98,28 @@ pub fn measure(
     interrupt: &AtomicBool,
 ) -> Result<Measurements, SimulationError> {
     let mut observer = SlipObserver::new(parameters, recording);
-    let limits = recording.limits(interrupt);
-    let summary = if recording.energies {
-        simulate_audited(parameters, solver, limits, &mut observer)?.0
-    } else {
-        simulate(parameters, solver, limits, &mut observer)?
-    };
+    let summary = recording.simulate(parameters, solver, interrupt, &mut observer)?;
     Ok(Measurements::new(observer, summary))
 }
 
 impl Recording {
-    /// The bounds that a recording sets on a simulation.
-    pub fn limits<'a>(&self, interrupt: &'a AtomicBool) -> Limits<'a> {
-        Limits {
+    /// Simulates one realisation within the bounds of the recording, with a ledger if it asks for energies.
+    pub fn simulate(
+        &self,
+        parameters: &Parameters,
+        solver: Solver,
+        interrupt: &AtomicBool,
+        observer: &mut dyn Observer,
+    ) -> Result<Summary, SimulationError> {
+        let limits = Limits {
             end_time: self.max_time.unwrap_or(f64::INFINITY),
             events: self.max_events,
             interrupt: Some(interrupt),
+        };
+        if self.energies {
+            Ok(simulate_audited(parameters, solver, limits, observer)?.0)
+        } else {
+            simulate(parameters, solver, limits, observer)
         }
     }
 }

@@ -111,10 +111,7 @@ fn displacement_at(parameters: &Parameters, solver: Solver, end_time: f64) -> Op
         events: 1_000_000,
         interrupt: None,
     };
-    let mut both = Observers {
-        lead: &mut log,
-        others: vec![&mut profile],
-    };
+    let mut both = Observers(vec![&mut log, &mut profile]);
     let summary = simulate(parameters, solver, limits, &mut both).unwrap();
     (summary.breaks == 0).then(|| profile.rows.last().unwrap().displacement)
 }
