@@ -57,6 +57,23 @@ pub struct ContactEvent {
     pub mean_displacement: f64,
 }
 
+impl ContactEvent {
+    /// A change with what [`Interface::count`] gives for it.
+    #[inline(always)]
+    pub(crate) const fn new(
+        what: ContactChange,
+        (attached, attached_time): (u64, f64),
+        mean_displacement: f64,
+    ) -> Self {
+        Self {
+            what,
+            attached,
+            attached_time,
+            mean_displacement,
+        }
+    }
+}
+
 impl Deref for ContactEvent {
     type Target = ContactChange;
 
@@ -209,11 +226,9 @@ impl Interface {
             .flat_map(move |block| {
                 (0..self.contacts_per_block).map(move |contact| (block, contact))
             })
-            .map(|(block, contact)| ContactEvent {
-                what: self.change(block, contact, 0.0, 0.0, Change::Attach),
-                attached: self.attached.count,
-                attached_time: 0.0,
-                mean_displacement: 0.0,
+            .map(|(block, contact)| {
+                let what = self.change(block, contact, 0.0, 0.0, Change::Attach);
+                ContactEvent::new(what, (self.attached.count, 0.0), 0.0)
             })
     }
 

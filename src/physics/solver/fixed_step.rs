@@ -7,7 +7,7 @@
 //! for the features of the processor, chosen at run time, as those of the other solver are; nothing is fused
 //! or reassociated, so all give the same bits.
 
-use super::ledger::{Audit, FinalState};
+use super::ledger::Audit;
 use super::polynomial;
 use super::segment::{ForceAt, ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, SolverKey, Summary};
@@ -52,14 +52,6 @@ impl Motion {
         a[0] *= inverse_mass;
     }
 
-    fn final_state(&self, driven: f64) -> FinalState<'_> {
-        FinalState {
-            displacement: &self.displacement,
-            velocity: &self.velocity,
-            driven,
-        }
-    }
-
     /// Whether any block is at or past a break position.
     #[inline(always)]
     #[expect(
@@ -83,7 +75,12 @@ pub(super) fn check(time_step: f64, parameters: &Parameters) -> Result<(), Simul
     if time_step > 0.0 && time_step < limit {
         Ok(())
     } else {
-        Err(SimulationError::UnstableStep { time_step, limit })
+        Err(SimulationError::BadSetting {
+            setting: format!("dt = {time_step:e} s"),
+            allowed: format!(
+                "below the stability limit 2/omega_max = {limit:.4e} s of these parameters"
+            ),
+        })
     }
 }
 
@@ -235,8 +232,8 @@ fn integrate(
         });
     }
     if let Some(audit) = audit {
-        let end = motion.final_state(drive.motion(summary.end_time).0);
-        audit.record_final_energy(end, &interface, mass, coupling, drive.stiffness);
+        let driven = drive.motion(summary.end_time).0;
+        audit.record_final_energy(&interface, &motion.displacement, &motion.velocity, driven);
     }
     observer.end(summary.end_time, &motion.displacement);
     Ok(summary)
@@ -254,25 +251,16 @@ fn change_contacts(
     let mean_displacement = displacement.iter().sum::<f64>() / displacement.len() as f64;
     while let Some((_, block)) = interface.next_reattachment_by(time) {
         let change = interface.reattach_next(displacement[block]);
-        let (attached, attached_time) = interface.count(&change);
+        let count = interface.count(&change);
         summary.reattachments += 1;
-        observer.contact(&ContactEvent {
-            what: ContactChange { time, ..change },
-            attached,
-            attached_time,
-            mean_displacement: 0.0,
-        });
+        let change = ContactChange { time, ..change };
+        observer.contact(&ContactEvent::new(change, count, 0.0));
     }
     for (block, &x) in displacement.iter().enumerate() {
         if x >= interface.block_upper[block] || x <= interface.block_lower[block] {
-            interface.break_reached(block, time, x, |what, (attached, attached_time)| {
+            interface.break_reached(block, time, x, |change, count| {
                 summary.breaks += 1;
-                observer.contact(&ContactEvent {
-                    what,
-                    attached,
-                    attached_time,
-                    mean_displacement,
-                });
+                observer.contact(&ContactEvent::new(change, count, mean_displacement));
             });
         }
     }

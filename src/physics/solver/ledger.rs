@@ -53,17 +53,13 @@ pub struct Spent {
     pub broken: f64,
 }
 
-/// The motion at the end: displacements and velocities of the blocks, in m and m/s, and the displacement of the driven end.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct FinalState<'a> {
-    pub displacement: &'a [f64],
-    pub velocity: &'a [f64],
-    pub driven: f64,
-}
-
 /// The entries that a solver makes; cells, since the meter reads them while it makes them.
 #[derive(Clone, Debug)]
 pub(super) struct Audit {
+    /// Mass of a block in kg, and stiffness of the springs between blocks and of the driving spring in N/m.
+    mass: f64,
+    coupling: f64,
+    stiffness: f64,
     pub quadrature: Quadrature,
     pub damping: Cell<f64>,
     pub left_out: Cell<f64>,
@@ -72,8 +68,11 @@ pub(super) struct Audit {
 }
 
 impl Audit {
-    fn new() -> Self {
+    fn new(parameters: &Parameters) -> Self {
         Self {
+            mass: parameters.block_mass(),
+            coupling: parameters.coupling_stiffness(),
+            stiffness: parameters.drive_stiffness,
             quadrature: Quadrature::new(),
             damping: Cell::new(0.0),
             left_out: Cell::new(0.0),
@@ -82,27 +81,25 @@ impl Audit {
         }
     }
 
-    /// Enters the energies at the end, of blocks with this `mass` in kg, springs of `coupling` N/m between them, and a driving
-    /// spring of `stiffness` N/m.
+    /// Enters the energies at the end: of blocks at these displacements in m with these velocities in m/s, their contacts,
+    /// and the driving spring, with its far end at `driven` m.
     pub fn record_final_energy(
         &self,
-        end: FinalState<'_>,
         interface: &Interface,
-        mass: f64,
-        coupling: f64,
-        stiffness: f64,
+        x: &[f64],
+        velocity: &[f64],
+        driven: f64,
     ) {
-        let x = end.displacement;
         let stretched: f64 = x
             .windows(2)
             .map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]))
             .sum();
-        let pulled = end.driven - x[0];
-        let springs = coupling * stretched + stiffness * pulled * pulled;
+        let pulled = driven - x[0];
+        let springs = self.coupling * stretched + self.stiffness * pulled * pulled;
         self.elastic
             .set(0.5 * springs + interface.elastic_energy(x));
-        let squares: f64 = end.velocity.iter().map(|v| v * v).sum();
-        self.kinetic.set(0.5 * mass * squares);
+        let squares: f64 = velocity.iter().map(|v| v * v).sum();
+        self.kinetic.set(0.5 * self.mass * squares);
     }
 
     /// Adds to an entry, in J.
@@ -162,7 +159,7 @@ pub(super) fn audited(
     observer: &mut dyn Observer,
     run: impl FnOnce(&mut dyn Observer, &Audit) -> Result<Summary, SimulationError>,
 ) -> Result<(Summary, Ledger), SimulationError> {
-    let audit = Audit::new();
+    let audit = Audit::new(parameters);
     let mut meter = Meter {
         observer,
         audit: &audit,

@@ -155,22 +155,9 @@ pub struct Summary {
 /// Why a simulation could not continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulationError {
-    /// The time step is not stable.
-    #[error(
-        "dt = {time_step:e} s: must be below the stability limit 2/omega_max = {limit:.4e} s of these parameters"
-    )]
-    UnstableStep {
-        /// The refused step, in s.
-        time_step: f64,
-        /// The limit, in s.
-        limit: f64,
-    },
-    /// The tolerance is out of range.
-    #[error(
-        "tolerance = {tolerance:e}: must be {}",
-        SolverKey::Tolerance.description().allowed()
-    )]
-    BadTolerance { tolerance: f64 },
+    /// The main setting is out of range, or does not fit the parameters.
+    #[error("{setting}: must be {allowed}")]
+    BadSetting { setting: String, allowed: String },
     /// A ledger is asked for along the grid.
     #[error(
         "resolve = \"grid\": an energy ledger is kept along Taylor steps only; leave resolve out or set it to \"taylor\""

@@ -252,7 +252,7 @@ impl HardCase {
             }
         })
         .map_err(|error| match error {
-            SimulationError::UnstableStep { .. } | SimulationError::BadTolerance { .. } => {
+            SimulationError::BadSetting { .. } => {
                 format!("{REFUSED}: {error}")
             }
             _ => format!("stopped {error}"),

@@ -24,7 +24,7 @@ use self::slider::{Layout, Slider};
 use self::taylor::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
-use super::ledger::{Audit, FinalState};
+use super::ledger::Audit;
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Solver, SolverKey, Summary};
 use crate::model::{ContactChange, ContactEvent, Drive, Parameters};
@@ -71,7 +71,10 @@ const STEPS_PER_CHECK: u64 = 1024;
 pub(super) fn check(tolerance: f64) -> Result<(), SimulationError> {
     match SolverKey::Tolerance.checked(tolerance.value()) {
         Some(_) => Ok(()),
-        None => Err(SimulationError::BadTolerance { tolerance }),
+        None => Err(SimulationError::BadSetting {
+            setting: format!("tolerance = {tolerance:e}"),
+            allowed: SolverKey::Tolerance.description().allowed(),
+        }),
     }
 }
 
@@ -256,20 +259,13 @@ impl<'a> Integration<'a> {
 
     fn record_final_energy(&self, audit: &Audit) {
         let slider = &self.slider;
-        let chain = &slider.chain;
-        let displacement: Vec<f64> = slider.displacements().collect();
-        let velocity =
-            (0..chain.layout.blocks).map(|block| chain.at(&slider.state.velocity, block));
+        let blocks = 0..slider.chain.layout.blocks;
+        let velocity = blocks.map(|block| slider.chain.at(&slider.state.velocity, block));
         audit.record_final_energy(
-            FinalState {
-                displacement: &displacement,
-                velocity: &velocity.collect::<Vec<_>>(),
-                driven: self.frame.drive_motion().value(0.0),
-            },
             &slider.interface,
-            chain.mass,
-            chain.mass * chain.coupling[0][0],
-            chain.drive_stiffness,
+            &slider.displacements().collect::<Vec<_>>(),
+            &velocity.collect::<Vec<_>>(),
+            self.frame.drive_motion().value(0.0),
         );
     }
 
@@ -398,14 +394,13 @@ impl<'a> Integration<'a> {
         let frame = &self.frame;
         let summary = &mut self.summary;
         let mean_displacement = frame.absolute_displacement(mean);
-        let mut log = |change: ContactChange, (attached, attached_time): (u64, f64)| {
+        let mut log = |change: ContactChange, count: (u64, f64)| {
             summary.breaks += 1;
-            observer.contact(&ContactEvent {
-                what: frame.absolute(change),
-                attached,
-                attached_time,
+            observer.contact(&ContactEvent::new(
+                frame.absolute(change),
+                count,
                 mean_displacement,
-            });
+            ));
         };
         self.slider.break_reached(block, frame.time, x, &mut log);
     }
@@ -424,25 +419,8 @@ impl<'a> Integration<'a> {
         self.summary.reattachments += 1;
         let count = self.slider.interface.count(&change);
         if self.grid.wants_attachments() {
-            self.report_change(change, count, 0.0, observer);
+            observer.contact(&ContactEvent::new(self.frame.absolute(change), count, 0.0));
         }
-    }
-
-    /// Reports a change to the observer, with the contacts attached after it and the integral of their number, and the mean
-    /// displacement of the blocks, in m.
-    fn report_change(
-        &self,
-        change: ContactChange,
-        (attached, attached_time): (u64, f64),
-        mean_displacement: f64,
-        observer: &mut dyn Observer,
-    ) {
-        observer.contact(&ContactEvent {
-            what: self.frame.absolute(change),
-            attached,
-            attached_time,
-            mean_displacement,
-        });
     }
 
     /// Moves the frame to where the slider and the clock are.
