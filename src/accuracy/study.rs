@@ -6,15 +6,12 @@
 //! enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its slips: it is
 //! timed over a short stretch, and its cost per slip follows from the steps of an interval.
 
-use super::bias::{Bias, Sample};
-use super::breaks::{BreakErrors, Comparison, Reference};
-use super::{Cost, SolverColumns, set_in_words};
-use crate::model::{Parameters, Symbol};
-use crate::model::{Selected, Selection};
+use super::comparison::{Bias, BreakErrors, Comparison, Reference, Sample};
+use super::{BiasRow, Cost, Findings, MethodRow, SolverColumns, set_in_words};
+use crate::model::{Parameters, Selected};
 use crate::observe::{Measurements, Recording, Slip, measure};
 use crate::run::threads;
 use crate::solver::{Limits, Observer, Resolve, Solver, Summary, simulate};
-use crate::table::columns::columns;
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -159,26 +156,6 @@ const fn taylor(tolerance: f64) -> Solver {
     }
 }
 
-#[derive(Clone, Debug, PartialEq)]
-pub struct DriveAlone;
-
-impl Selection for DriveAlone {
-    const SYMBOLS: &'static [Symbol] = &[Symbol::V0, Symbol::Delta, Symbol::T];
-}
-
-columns! {
-    /// One solver at one set of parameters. Costs are those of its cheapest realisation per step: other work on the machine
-    /// can only add to them. Errors of break times are left out where they would take too long.
-    #[derive(Clone, Debug, PartialEq)]
-    pub struct MethodRow {
-        parameters: Selected<DriveAlone>;
-        case: String = "", "the drive, and what else differs from the defaults";
-        solver: SolverColumns;
-        cost: Cost;
-        break_times: BreakErrors;
-    }
-}
-
 /// A quantity of slips whose distributions are compared.
 type Quantity = (&'static str, fn(&Slip) -> Option<f64>);
 
@@ -191,42 +168,6 @@ const QUANTITIES: [Quantity; 6] = [
     ("duration", |slip| Some(slip.duration)),
     ("front_speed", |slip| slip.front_speed),
 ];
-
-columns! {
-    /// A quantity of the slips of one solver at one set of parameters, beside that of the reference ensemble.
-    #[derive(Clone, Debug, PartialEq)]
-    pub struct BiasRow {
-        parameters: Selected<DriveAlone>;
-        case: String = "", "the drive, and what else differs from the defaults";
-        solver: SolverColumns;
-        quantity: String = "", "interval, phase, drop, peak_force, duration or front_speed";
-        slips: u64 = "", "size of the sample";
-        reference_slips: u64 = "", "size of the reference sample";
-        mean: f64 = "", "mean";
-        reference_mean: f64 = "", "mean of the reference";
-        deviation: f64 = "", "standard deviation";
-        reference_deviation: f64 = "", "standard deviation of the reference";
-        bias: Bias;
-    }
-}
-
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Findings {
-    /// Set by set, solver by solver.
-    pub methods: Vec<MethodRow>,
-    pub biases: Vec<BiasRow>,
-}
-
-impl Findings {
-    /// The bias of a quantity, for the solver and set of a row.
-    pub fn bias_of(&self, row: &MethodRow, quantity: &str) -> Option<&BiasRow> {
-        self.biases.iter().find(|other| {
-            other.quantity == quantity
-                && other.parameters == row.parameters
-                && other.solver == row.solver
-        })
-    }
-}
 
 /// Slips and cost of one solver, seed by seed.
 #[derive(Clone, Debug, Default)]

@@ -4,8 +4,7 @@
 //! A bias counts if it survives the number of comparisons (Bonferroni): among all of a solver that has none, one counts by
 //! chance in one study of twenty. With few slips, or one realisation, no bias counts.
 
-use super::study::{BiasRow, Findings, MethodRow, Study};
-use super::{SolverColumns, set_in_words};
+use super::{BiasRow, Findings, MethodRow, SolverColumns, Study, set_in_words};
 
 /// Least number of slips on either side with which a bias counts.
 const MIN_SLIPS: u64 = 100;
@@ -174,8 +173,7 @@ fn tighter(findings: &Findings, rows: &[&MethodRow]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::Cost;
-    use super::super::bias::Bias;
-    use super::super::breaks::BreakErrors;
+    use super::super::comparison::{Bias, BreakErrors};
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
