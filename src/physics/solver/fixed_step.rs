@@ -9,7 +9,7 @@
 
 use super::ledger::Audit;
 use super::polynomial;
-use super::segment::{ForceAt, ForcePath, Segment};
+use super::segment::{ForceAt, ForcePath, PolynomialPath, Segment};
 use super::{Limits, Observer, SimulationError, SolverKey, Summary};
 use crate::model::equation::stability_limit;
 use crate::model::{ContactChange, ContactEvent, Drive, Interface, Parameters};
@@ -50,6 +50,15 @@ impl Motion {
             a[last] = (chain + pull[last] - stiffness[last] * x[last]) * inverse_mass;
         }
         a[0] *= inverse_mass;
+    }
+
+    /// Checks at a time in s that the state is finite.
+    fn check(&self, time: f64) -> Result<(), SimulationError> {
+        if self.displacement.iter().sum::<f64>().is_finite() {
+            Ok(())
+        } else {
+            Err(SimulationError::NotFinite { time })
+        }
     }
 
     /// Whether any block is at or past a break position.
@@ -162,37 +171,8 @@ fn integrate(
             *v = (*v + half * a) * damp_after;
         }
         let next_rate = drive.stiffness * (drive_velocity - motion.velocity[0]);
-        let coefficients = hermite(
-            force,
-            next_force,
-            time_step * force_rate,
-            time_step * next_rate,
-        );
-        let [constant, linear, square, cube] = coefficients;
-        let integral = constant + 0.5 * linear + square / 3.0 + 0.25 * cube;
-        let ends = [
-            ForceAt {
-                force,
-                integral: 0.0,
-            },
-            ForceAt {
-                force: next_force,
-                integral,
-            },
-        ];
-        let curvature_bound = polynomial::second_derivative_bound(&coefficients);
-        let path = ForcePath::Polynomial {
-            coefficients: &coefficients,
-            curvature_bound,
-            first: 0.0,
-            scale: time_step,
-            ends,
-        };
-        observer.advance(&Segment {
-            start,
-            duration: time_step,
-            path,
-        });
+        let forces = [force, next_force];
+        report_force(observer, start, time_step, forces, [force_rate, next_rate]);
         force = next_force;
         force_rate = next_rate;
         summary.end_time = time;
@@ -215,9 +195,7 @@ fn integrate(
             motion.accelerate(&interface, force, coupling, mass);
         }
         if summary.steps.is_multiple_of(STEPS_PER_CHECK) {
-            if !motion.displacement.iter().sum::<f64>().is_finite() {
-                return Err(SimulationError::NotFinite { time });
-            }
+            motion.check(time)?;
             if limits
                 .interrupt
                 .is_some_and(|flag| flag.load(Ordering::Relaxed))
@@ -226,11 +204,7 @@ fn integrate(
             }
         }
     }
-    if !motion.displacement.iter().sum::<f64>().is_finite() {
-        return Err(SimulationError::NotFinite {
-            time: summary.end_time,
-        });
-    }
+    motion.check(summary.end_time)?;
     if let Some(audit) = audit {
         let driven = drive.motion(summary.end_time).0;
         audit.record_final_energy(&interface, &motion.displacement, &motion.velocity, driven);
@@ -264,6 +238,34 @@ fn change_contacts(
             });
         }
     }
+}
+
+/// Reports the shear force over a step that begins at `start` s, from its values in N and rates in N/s at both ends.
+#[inline(always)]
+fn report_force(
+    observer: &mut dyn Observer,
+    start: f64,
+    time_step: f64,
+    [force, next_force]: [f64; 2],
+    rates: [f64; 2],
+) {
+    let [slope, next_slope] = rates.map(|rate| time_step * rate);
+    let coefficients = hermite(force, next_force, slope, next_slope);
+    let [constant, linear, square, cube] = coefficients;
+    let whole = constant + 0.5 * linear + square / 3.0 + 0.25 * cube;
+    let ends = [(force, 0.0), (next_force, whole)];
+    let path = PolynomialPath {
+        coefficients: &coefficients,
+        curvature_bound: polynomial::second_derivative_bound(&coefficients),
+        first: 0.0,
+        scale: time_step,
+        ends: ends.map(|(force, integral)| ForceAt { force, integral }),
+    };
+    observer.advance(&Segment {
+        start,
+        duration: time_step,
+        path: ForcePath::Polynomial(path),
+    });
 }
 
 /// Coefficients in [0, 1] of the cubic with these values and slopes at its ends.

@@ -83,6 +83,38 @@ impl Harmonic {
         [Some(first), Some(last)]
     }
 
+    /// Lower and upper bound over the first `duration` s.
+    pub(super) fn bounds(&self, duration: f64) -> (f64, f64) {
+        let end = self.start + self.rate * duration;
+        let swing = self.amplitude.abs();
+        (self.start.min(end) - swing, self.start.max(end) + swing)
+    }
+
+    /// Visits time and value of the first and the last maximum and minimum in [0, `duration`], in order of time.
+    pub(super) fn for_each_turn(&self, duration: f64, mut visit: impl FnMut(f64, f64)) {
+        let crests = |sign: f64| self.times(sign).crests(duration);
+        let all = [crests(1.0), crests(-1.0)].concat();
+        let mut turns: Vec<f64> = all.into_iter().flatten().collect();
+        turns.sort_by(f64::total_cmp);
+        for elapsed in turns {
+            visit(elapsed, self.value(elapsed));
+        }
+    }
+
+    /// Time and value of the largest `sign` · value in [0, `duration`].
+    pub(super) fn extreme(&self, duration: f64, sign: f64) -> (f64, f64) {
+        let mut best = (0.0, f64::NEG_INFINITY);
+        let ends = [Some(0.0), Some(duration)];
+        let turns = self.times(sign).crests(duration);
+        for elapsed in ends.into_iter().chain(turns).flatten() {
+            let value = sign * self.value(elapsed);
+            if value > best.1 {
+                best = (elapsed, value);
+            }
+        }
+        best
+    }
+
     /// The same multiplied by `sign`.
     pub(super) fn times(&self, sign: f64) -> Self {
         Self {

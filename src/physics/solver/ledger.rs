@@ -10,7 +10,7 @@
 //! again for its damping and for the work on it, which the segment of the leap does not show.
 
 use super::harmonic::Harmonic;
-use super::segment::{ForcePath, Segment};
+use super::segment::{ForcePath, PolynomialPath, Segment};
 use super::{Observer, SimulationError, Summary};
 use crate::model::{Change, ContactEvent, Drive, Interface, Parameters};
 use std::cell::Cell;
@@ -186,7 +186,7 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
         return drive.velocity * segment.impulse();
     }
     match segment.path {
-        ForcePath::Polynomial { coefficients, .. } => {
+        ForcePath::Polynomial(PolynomialPath { coefficients, .. }) => {
             let nodes = quadrature.nodes(coefficients.len().div_ceil(2) + NODES_FOR_DRIVE);
             let power = |s: f64| {
                 let elapsed = s * segment.duration;
@@ -220,7 +220,7 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
             drive.velocity * segment.impulse()
                 + drive.amplitude * (ramp + amplitude * (beat - drift))
         }
-        ForcePath::Grid { .. } => unreachable!("a ledger is kept along Taylor steps"),
+        ForcePath::Grid(_) => unreachable!("a ledger is kept along Taylor steps"),
     }
 }
 

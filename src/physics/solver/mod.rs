@@ -13,7 +13,7 @@ mod segment;
 pub use event_driven::{GRID_TOLERANCE, Resolve};
 pub use harmonic::Harmonic;
 pub use ledger::{Ledger, Spent};
-pub use segment::{CubicStep, Extremes, ForcePath, Segment};
+pub use segment::{CubicStep, Extremes, ForcePath, GridPath, PolynomialPath, Segment};
 
 use self::ledger::Audit;
 use crate::model::fields::fields;

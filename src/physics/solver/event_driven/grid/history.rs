@@ -1,6 +1,6 @@
 //! The shear force along the grid since the last segment that observers have seen.
 
-use crate::solver::segment::{CubicStep, Extremes, ForcePath, Segment};
+use crate::solver::segment::{CubicStep, Extremes, ForcePath, GridPath, Segment};
 
 /// Steps of shear force, from somewhere in the first of them on.
 #[derive(Clone, Debug)]
@@ -86,7 +86,7 @@ impl ForceHistory {
         } else {
             0.0
         };
-        let path = ForcePath::Grid {
+        let path = GridPath {
             steps: &self.steps,
             count: self.count,
             first: self.first,
@@ -105,7 +105,7 @@ impl ForceHistory {
         Some(Segment {
             start: origin + self.start,
             duration: steps * spacing,
-            path,
+            path: ForcePath::Grid(path),
         })
     }
 

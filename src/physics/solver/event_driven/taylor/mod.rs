@@ -27,7 +27,7 @@ use super::slider::{Chain, Layout, Slider};
 use crate::model::Change;
 use crate::solver::ledger::Audit;
 use crate::solver::polynomial;
-use crate::solver::segment::{ForceAt, ForcePath, Segment};
+use crate::solver::segment::{ForceAt, ForcePath, PolynomialPath, Segment};
 use crate::solver::{Observer, SimulationError};
 
 /// Steps are halved at most this often where events crowd; further only if a series does not converge.
@@ -114,13 +114,13 @@ impl Step {
 
     /// The shear force along a part of the step that starts at s = `first`; `ends` are its values there and at the end.
     fn force_path(&self, first: f64, ends: [ForceAt; 2]) -> ForcePath<'_> {
-        ForcePath::Polynomial {
+        ForcePath::Polynomial(PolynomialPath {
             coefficients: &self.force,
             curvature_bound: self.curvature_bound,
             first,
             scale: self.length,
             ends,
-        }
+        })
     }
 
     /// Notes and returns where in a part of the step a block first breaks; infinite if it does not.
