@@ -17,6 +17,10 @@ import pyarrow.parquet
 from stickslip.tables import parameters
 
 
+#: Parameters that the motion does not depend on once every draw of the disorder is given.
+NOT_NEEDED = {"FN", "L", "dfs", "seed", "tau_r"}
+
+
 class LogError(Exception):
     """A contact log that cannot be replayed: what is wrong, and where."""
 
@@ -176,6 +180,9 @@ def read(options: argparse.Namespace) -> tuple[ContactLog, Parameters]:
         log, footer = ContactLog.read(options.log), parameters(options.log)
     except (OSError, KeyError, ValueError) as error:
         raise LogError(f"cannot be read as a contact log: {error}") from error
+    known = {field.name for field in dataclasses.fields(Parameters)} | NOT_NEEDED
+    if unknown := sorted(footer.keys() - known):
+        raise LogError(f"this replay does not know the parameters {', '.join(unknown)} in its footer")
     given = Parameters.from_values(footer | vars(options))
     log.check(given)
     return log, given

@@ -20,7 +20,7 @@ pub(super) enum Quantity {
 }
 
 /// Range of η, f, Δ, V0 and T where one is derived from the others: their products keep all digits.
-const DERIVABLE: RangeInclusive<f64> = 1e-100..=1e100;
+pub(super) const DERIVABLE: RangeInclusive<f64> = 1e-100..=1e100;
 
 impl Quantity {
     pub const BREAK_ON: Self = Self::Parameter(Symbol::BreakOn);

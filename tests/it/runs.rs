@@ -114,8 +114,14 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     ] {
         assert!(there.contains(&file), "{file} is not in {there:?}");
     }
+    let in_folder = |folder: &str| there.iter().filter(|file| file.starts_with(folder)).count();
     let is_result = |file: &&&str| !file.starts_with("run/") && !file.starts_with("tables/");
-    assert_eq!(there.iter().filter(is_result).count(), 10, "{there:?}");
+    assert_eq!(in_folder("reduced/"), 4, "{there:?}");
+    assert_eq!(
+        there.iter().filter(is_result).count(),
+        4 + in_folder("figures/"),
+        "{there:?}"
+    );
     // Few jobs are parts of their own.
     assert_eq!(folder.parts("results/tiny", "jobs").len() as u64, TINY_JOBS);
     assert!(

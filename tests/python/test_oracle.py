@@ -71,5 +71,7 @@ def test_a_log_that_cannot_be_replayed_is_rejected_with_the_reason(log):
     assert "--ki and --fs" in rejected(log, "--ki", 1e6)
     assert "--N and --Ns" in rejected(log, "--N", 8)
     assert "give --N, --Ns, --M" in rejected(changed(log, lambda table: table, metadata={}))
+    unknown = {b"parameters": b'{"gravity": 9.81}'}
+    assert "does not know the parameters gravity" in rejected(changed(log, lambda table: table, metadata=unknown))
     assert "cannot be read as a contact log" in rejected(changed(log, lambda table: table.drop_columns(["threshold"])))
     assert "initial attachment" in rejected(changed(log, lambda table: table.slice(0, 9 * 20 - 1)))

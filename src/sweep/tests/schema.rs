@@ -1,11 +1,12 @@
-//! The JSON Schema of sweep files against what the parser knows: keys, kinds and ranges of values, words.
+//! The JSON Schema of sweep files against what the parser knows: keys, kinds and ranges of values, words. What follows
+//! from descriptions in the code is written with `UPDATE_DOCS=1`.
 
-use super::super::quantity::Quantity;
+use super::super::quantity::{DERIVABLE, Quantity};
 use super::super::rounds::MAX_JOBS;
 use super::super::{SCHEMA, Sweep};
 use crate::model::{Description, Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
-use crate::sets::STATISTICS;
+use crate::sets::{STATISTICS, Statistic};
 use crate::solver::{Solver, SolverKey};
 use crate::table::value::Kind;
 use serde_json::{Value as Json, json};
@@ -15,19 +16,6 @@ use std::path::Path;
 
 fn schema() -> Json {
     serde_json::from_str(SCHEMA).unwrap()
-}
-
-/// A part of the schema, past references.
-fn part<'a>(schema: &'a Json, mut part: &'a Json) -> &'a Json {
-    while let Some(reference) = part["$ref"]
-        .as_str()
-        .or_else(|| part["allOf"][0]["$ref"].as_str())
-    {
-        part = schema
-            .pointer(&reference[1..])
-            .unwrap_or_else(|| panic!("{reference}"));
-    }
-    part
 }
 
 fn keys(table: &Json) -> BTreeSet<String> {
@@ -72,22 +60,22 @@ fn every_table_of_the_schema_has_the_keys_that_the_parser_allows() {
         ),
         // Of the two spacings a form has one, and a word has no range.
         (
-            "/definitions/positive_axis/anyOf/1",
+            "/definitions/number_above_0_axis/anyOf/1",
             &["[axes]\nV0 = { log = [1, 2], points = 2, ??? }"],
             "log",
         ),
         (
-            "/definitions/positive_axis/anyOf/2",
+            "/definitions/number_above_0_axis/anyOf/2",
             &["[axes]\nV0 = { log = [1, 2], points = 2, ??? }"],
             "linear",
         ),
         (
-            "/definitions/positive_range/anyOf/0",
+            "/definitions/number_above_0_range/anyOf/0",
             &["[axes.sobol]\nV0 = { log = [1, 2], ??? }"],
             "log",
         ),
         (
-            "/definitions/positive_range/anyOf/1",
+            "/definitions/number_above_0_range/anyOf/1",
             &["[axes.sobol]\nV0 = { log = [1, 2], ??? }"],
             "linear",
         ),
@@ -117,166 +105,206 @@ fn every_table_of_the_schema_has_the_keys_that_the_parser_allows() {
     }
 }
 
-/// What the schema says of a value that the parser describes so.
-fn value(field: &Description) -> Json {
-    let mut number = match field.kind {
+/// A number or word that the parser allows, as the schema puts it.
+fn value(kind: Kind, (low, high): (Bound<f64>, Bound<f64>), words: &[&str]) -> Json {
+    let mut number = match kind {
         Kind::Flag => return json!({ "type": "boolean" }),
-        Kind::Text => return json!({ "enum": field.choices }),
+        Kind::Text => return json!({ "enum": words }),
         Kind::Count => json!({ "type": "integer" }),
         Kind::Real => json!({ "type": "number" }),
     };
     for (end, included, excluded) in [
-        (field.range.ends.0, "minimum", "exclusiveMinimum"),
-        (field.range.ends.1, "maximum", "exclusiveMaximum"),
+        (low, "minimum", "exclusiveMinimum"),
+        (high, "maximum", "exclusiveMaximum"),
     ] {
         match end {
-            Bound::Included(end) if end.is_finite() => number[included] = json!(end),
-            Bound::Excluded(end) if end.is_finite() => number[excluded] = json!(end),
+            Bound::Included(end) if end.is_finite() => number[included] = whole(end),
+            Bound::Excluded(end) if end.is_finite() => number[excluded] = whole(end),
             _ => {}
         }
     }
     number
 }
 
-/// Asserts that a part of the schema allows these values; with `words` also that it describes them so.
-fn assert_value(
-    schema: &Json,
-    found: &Json,
-    expected: &Json,
-    words: Option<(&Description, Value)>,
-) {
-    if let Some((field, default)) = words {
-        assert_eq!(
-            found["description"],
-            json!(format!("{}: {}", field.meaning, field.requirement()))
-        );
-        let default = if default == Value::Null {
-            None
-        } else {
-            Some(json!(default))
-        };
-        assert_eq!(
-            numbers(found.get("default")),
-            numbers(default.as_ref()),
-            "{}",
-            field.key
-        );
+/// A number, without a decimal point if it is whole and a double holds it exactly.
+fn whole(number: f64) -> Json {
+    if number.fract() == 0.0 && number.abs() <= 9_007_199_254_740_992.0 {
+        json!(number as i64)
+    } else {
+        json!(number)
     }
-    let found = part(schema, found);
-    for key in [
-        "type",
-        "enum",
-        "minimum",
-        "exclusiveMinimum",
-        "maximum",
-        "exclusiveMaximum",
+}
+
+/// A name for a definition of what a value can be: `number_above_0`.
+fn name(value: &Json) -> String {
+    if let Some(words) = value["enum"].as_array() {
+        let words: Vec<&str> = words.iter().filter_map(Json::as_str).collect();
+        return words.join("_or_");
+    }
+    let mut name = value["type"].as_str().unwrap().to_owned();
+    for (key, word) in [
+        ("minimum", "from"),
+        ("exclusiveMinimum", "above"),
+        ("maximum", "to"),
+        ("exclusiveMaximum", "below"),
     ] {
-        assert_eq!(
-            numbers(found.get(key)),
-            numbers(expected.get(key)),
-            "{key} of {found}"
-        );
+        if let Some(end) = value.get(key) {
+            name = format!("{name}_{word}_{end}");
+        }
     }
+    name
 }
 
-/// Whole numbers as reals, which are the same in JSON.
-fn numbers(value: Option<&Json>) -> Option<Json> {
-    value.map(|value| value.as_f64().map_or_else(|| value.clone(), Json::from))
+/// What a parameter can be, in words and by itself.
+fn described(field: &Description, default: Value) -> Json {
+    let mut described = value(field.kind, field.range.ends, field.choices);
+    described["description"] = json!(format!("{}: {}", field.meaning, field.requirement()));
+    match default {
+        Value::Null => {}
+        Value::Real(number) => described["default"] = whole(number),
+        other => described["default"] = json!(other),
+    }
+    described
 }
 
-#[test]
-fn every_value_of_the_schema_has_kind_range_default_and_words_of_the_parser() {
-    let schema = schema();
-    let [model, axes, record] =
-        ["model", "axes", "record"].map(|key| &schema["properties"][key]["properties"]);
-    let [columns, sample] =
-        ["columns", "sample"].map(|key| &schema["definitions"][key]["properties"]);
+/// The forms of an axis over values that a definition describes: a list, ranges, a count.
+fn axis_forms(definition: &str, quantity: Quantity) -> Json {
+    let items = json!({ "$ref": format!("#/definitions/{definition}") });
+    let mut forms = vec![json!({ "type": "array", "items": items, "minItems": 1 })];
+    if quantity != Quantity::BREAK_ON {
+        forms.extend(SPACINGS.map(|spacing| {
+            let mut form = range_form(spacing, &items);
+            form["required"] = json!([spacing, "points"]);
+            form["properties"]["points"] = json!({ "$ref": "#/definitions/points" });
+            form
+        }));
+    }
+    if quantity.is_count() {
+        forms.push(json!({ "$ref": "#/definitions/count" }));
+    }
+    json!({ "anyOf": forms })
+}
+
+const SPACINGS: [&str; 2] = ["linear", "log"];
+
+/// A range between two values, without a number of points.
+fn range_form(spacing: &str, items: &Json) -> Json {
+    let ends = json!({ "type": "array", "items": items, "minItems": 2, "maxItems": 2 });
+    json!({
+        "type": "object",
+        "additionalProperties": false,
+        "required": [spacing],
+        "properties": { spacing: ends },
+    })
+}
+
+/// The schema with all that follows from the descriptions of parameters, statistics and keys.
+fn generated() -> Json {
+    let mut schema = schema();
+    let references = |of: &str| json!({ "$ref": of });
     for quantity in Quantity::all() {
         let key = quantity.key();
-        let (expected, words) = match quantity {
-            Quantity::Parameter(symbol) => (
-                value(&symbol.description()),
-                Some((symbol.description(), Parameters::default().get(symbol))),
-            ),
-            _ => (
-                json!({ "type": "number", "minimum": 1e-100, "maximum": 1e100 }),
-                None,
-            ),
-        };
-        assert_value(
-            &schema,
-            &model[key],
-            &expected,
-            words.as_ref().map(|(field, default)| (field, *default)),
-        );
-        assert_value(
-            &schema,
-            &columns[key],
-            &Json::Null,
-            words.as_ref().map(|(field, _)| (field, Value::Null)),
-        );
-        assert_eq!(
-            part(&schema, &axes[key]),
-            part(&schema, &columns[key]),
-            "{key}"
-        );
-        let forms = [&columns[key], &sample[key]].map(|of| part(&schema, of)["anyOf"].as_array());
-        let mut found = Vec::new();
-        for form in forms
-            .into_iter()
-            .flatten()
-            .flatten()
-            .map(|form| part(&schema, form))
-        {
-            let ends = ["linear", "log"]
-                .into_iter()
-                .find(|spacing| form["properties"].get(spacing).is_some());
-            let items = ends
-                .map_or(form, |spacing| &form["properties"][spacing])
-                .get("items");
-            if let Some(items) = items {
-                assert_value(&schema, items, &expected, None);
+        let (values, model) = match quantity {
+            Quantity::Parameter(symbol) => {
+                let field = symbol.description();
+                let default = Parameters::default().get(symbol);
+                (
+                    value(field.kind, field.range.ends, field.choices),
+                    described(&field, default),
+                )
             }
-            found.push(ends.unwrap_or(if items.is_some() { "list" } else { "count" }));
-        }
-        let spacings: &[&str] = if quantity == Quantity::BREAK_ON {
-            &[]
-        } else {
-            &["linear", "log"]
+            // Their words are the schema's own.
+            Quantity::Eta | Quantity::Frequency => {
+                let ends = (
+                    Bound::Included(*DERIVABLE.start()),
+                    Bound::Included(*DERIVABLE.end()),
+                );
+                let values = value(Kind::Real, ends, &[]);
+                let mut model = values.clone();
+                model["description"] =
+                    schema["properties"]["model"]["properties"][key]["description"].clone();
+                (values, model)
+            }
         };
-        let count: &[&str] = if quantity.is_count() { &["count"] } else { &[] };
-        let of_sample = if key == "seed" { &[] } else { spacings };
-        assert_eq!(
-            found,
-            [&["list"], spacings, count, of_sample].concat(),
-            "{key}"
-        );
+        let definition = name(&values);
+        let description = &model["description"];
+        let axis = json!({
+            "description": description,
+            "allOf": [references(&format!("#/definitions/{definition}_axis"))],
+        });
+        let definitions = &mut schema["definitions"];
+        definitions["columns"]["properties"][key] = axis;
+        definitions[format!("{definition}_axis")] = axis_forms(&definition, quantity);
+        if quantity != Quantity::BREAK_ON && quantity != Quantity::SEED {
+            let items = references(&format!("#/definitions/{definition}"));
+            let forms = SPACINGS.map(|spacing| range_form(spacing, &items));
+            definitions[format!("{definition}_range")] = json!({ "anyOf": forms });
+            definitions["sample"]["properties"][key] =
+                references(&format!("#/definitions/{definition}_range"));
+        }
+        definitions[definition] = values;
+        schema["properties"]["axes"]["properties"][key] =
+            references(&format!("#/definitions/columns/properties/{key}"));
+        schema["properties"]["model"]["properties"][key] = model;
     }
     for key in RecordingKey::ALL {
-        let field = key.description();
-        let expected = value(&field);
-        assert_value(
-            &schema,
-            &record[field.key],
-            &expected,
-            Some((&field, Recording::default().get(key))),
-        );
+        schema["properties"]["record"]["properties"][key.key()] =
+            described(&key.description(), Recording::default().get(key));
     }
-    let solver = &schema["properties"]["solver"]["properties"];
     for key in SolverKey::ALL {
-        let field = key.description();
-        let expected = value(&field);
-        assert_value(
-            &schema,
-            &solver[field.key],
-            &expected,
-            Some((&field, Solver::default().get(key))),
+        schema["properties"]["solver"]["properties"][key.key()] =
+            described(&key.description(), Solver::default().get(key));
+    }
+    let keys_of = |is_named: fn(&Statistic) -> bool| -> Json {
+        let named = STATISTICS.iter().filter(|statistic| is_named(statistic));
+        named.map(|statistic| statistic.key).collect()
+    };
+    let is_real = |quantity: &Quantity| *quantity != Quantity::BREAK_ON && !quantity.is_count();
+    let definitions = &mut schema["definitions"];
+    definitions["estimate"]["enum"] = keys_of(|statistic| statistic.has_interval);
+    definitions["crossing"]["enum"] = keys_of(|statistic| statistic.can_cross());
+    definitions["refinable"]["enum"] = Quantity::all().filter(is_real).map(Quantity::key).collect();
+    schema
+}
+
+/// JSON with what fits into 120 columns on one line.
+fn laid_out(json: &Json, indent: usize) -> String {
+    let line = json.to_string();
+    let (open, close, parts): (_, _, Vec<String>) = match json {
+        _ if indent + line.len() <= 120 => return line,
+        Json::Array(items) => {
+            let items = items.iter().map(|item| laid_out(item, indent + 2));
+            ('[', ']', items.collect())
+        }
+        Json::Object(fields) => {
+            let fields = fields
+                .iter()
+                .map(|(key, field)| format!("\"{key}\": {}", laid_out(field, indent + 2)));
+            ('{', '}', fields.collect())
+        }
+        _ => return line,
+    };
+    let inner = " ".repeat(indent + 2);
+    let lines = parts.join(&format!(",\n{inner}"));
+    format!("{open}\n{inner}{lines}\n{}{close}", " ".repeat(indent))
+}
+
+#[test]
+fn the_schema_follows_from_the_descriptions() {
+    let text = laid_out(&generated(), 0) + "\n";
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/sweep.schema.json");
+        std::fs::write(file, &text).unwrap();
+    } else {
+        assert!(
+            text == SCHEMA,
+            "docs/sweep.schema.json is out of date: run the tests with UPDATE_DOCS=1"
         );
     }
 }
 
 #[test]
-fn the_schema_names_what_rounds_can_be_told_as_the_documentation_does() {
+fn the_schema_describes_the_keys_of_rounds_as_the_documentation_does() {
     let schema = schema();
     let page = include_str!("../../../docs/rounds.md");
     for section in ["precision", "refine"] {
@@ -304,21 +332,6 @@ fn the_schema_names_what_rounds_can_be_told_as_the_documentation_does() {
             );
         }
     }
-    let estimates: Vec<&str> = STATISTICS
-        .iter()
-        .filter(|known| known.has_interval)
-        .map(|known| known.key)
-        .collect();
-    let between = |quantity: &Quantity| *quantity != Quantity::BREAK_ON && !quantity.is_count();
-    let refinable: Vec<&str> = Quantity::all().filter(between).map(Quantity::key).collect();
-    let crossing: Vec<&str> = STATISTICS
-        .iter()
-        .filter(|known| known.can_cross())
-        .map(|known| known.key)
-        .collect();
-    assert_eq!(schema["definitions"]["estimate"]["enum"], json!(estimates));
-    assert_eq!(schema["definitions"]["refinable"]["enum"], json!(refinable));
-    assert_eq!(schema["definitions"]["crossing"]["enum"], json!(crossing));
     assert_eq!(
         schema["properties"]["refine"]["properties"]["jobs"]["maximum"],
         json!(MAX_JOBS)
