@@ -26,7 +26,7 @@ columns! {
     /// A solver, by the main setting of its method.
     #[derive(Clone, Debug, PartialEq)]
     pub struct SolverColumns {
-        method: String = "", "event-driven, or how it resolves motion: grid or taylor; or fixed-step";
+        method: String = "", "grid or taylor, by which the event-driven method resolves motion; else the method";
         setting: f64 = "", "tolerance, or dt in s";
     }
 }

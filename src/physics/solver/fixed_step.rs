@@ -52,6 +52,17 @@ impl Motion {
         a[0] *= inverse_mass;
     }
 
+    /// Takes velocities to the middle of a step and displacements to its end.
+    #[inline(always)]
+    fn advance(&mut self, time_step: f64, damping: f64) {
+        let half = 0.5 * time_step;
+        let motion = self.displacement.iter_mut().zip(&mut self.velocity);
+        for ((x, v), a) in motion.zip(&self.acceleration) {
+            *v = *v * damping + half * a;
+            *x += time_step * *v;
+        }
+    }
+
     /// Checks at a time in s that the state is finite.
     fn check(&self, time: f64) -> Result<(), SimulationError> {
         if self.displacement.iter().sum::<f64>().is_finite() {
@@ -146,15 +157,7 @@ fn integrate(
         }
         summary.steps += 1;
         let time = summary.steps as f64 * time_step;
-        for ((x, v), a) in motion
-            .displacement
-            .iter_mut()
-            .zip(&mut motion.velocity)
-            .zip(&motion.acceleration)
-        {
-            *v = *v * damp_before + half * a;
-            *x += time_step * *v;
-        }
+        motion.advance(time_step, damp_before);
         if let Some(audit) = audit {
             // These velocities are those of the middle of the step.
             let squares = motion.velocity.iter().map(|v| v * v).sum::<f64>();

@@ -194,31 +194,9 @@ impl Integration<'_> {
             force: self.step.force[0],
             integral: 0.0,
         };
-        self.kernels.reachable(
-            &self.slider.chain,
-            &mut self.step.series,
-            &mut self.step.candidates,
-        );
-        self.step.breaks.clear();
-        while let Some((row, lane)) = self.step.candidates.pop() {
-            let chain = &self.slider.chain;
-            let found = self
-                .step
-                .look_for_break(chain, chain.layout.block(row, lane), 0.0, end);
-            // Events this long after the first are left to the next step.
-            end = end.min(found + self.control.break_window / length);
-        }
+        end = self.look_for_breaks(end);
         loop {
-            let due = ((self.slider.interface.next_reattachment() - start) / length).max(done);
-            let event = match self.step.first_break() {
-                Some((s, block)) if s <= due && s <= end => Some((Change::Break, block, s)),
-                _ if due <= end => self
-                    .slider
-                    .interface
-                    .next_reattachment_by(f64::INFINITY)
-                    .map(|(_, block)| (Change::Attach, block, due)),
-                _ => None,
-            };
+            let event = self.next_event(done, end);
             let s = event.map_or(end, |(_, _, s)| s);
             force = self.report([done, s], force, observer);
             done = s;
@@ -259,6 +237,37 @@ impl Integration<'_> {
         };
         self.control.typical_advance += 0.25 * (covered - self.control.typical_advance);
         Ok(())
+    }
+
+    /// Notes where blocks first break up to `end`, and returns where the step should end for them.
+    fn look_for_breaks(&mut self, mut end: f64) -> f64 {
+        let Slider { chain, .. } = &self.slider;
+        let Step {
+            series, candidates, ..
+        } = &mut self.step;
+        self.kernels.reachable(chain, series, candidates);
+        self.step.breaks.clear();
+        while let Some((row, lane)) = self.step.candidates.pop() {
+            let block = chain.layout.block(row, lane);
+            let found = self.step.look_for_break(chain, block, 0.0, end);
+            // Events this long after the first are left to the next step.
+            end = end.min(found + self.control.break_window / self.step.length);
+        }
+        end
+    }
+
+    /// The first event from `done` to `end`: what happens, at which block, and where in the step.
+    fn next_event(&self, done: f64, end: f64) -> Option<(Change, usize, f64)> {
+        let interface = &self.slider.interface;
+        let Step { start, length, .. } = self.step;
+        let due = ((interface.next_reattachment() - start) / length).max(done);
+        match self.step.first_break() {
+            Some((s, block)) if s <= due && s <= end => Some((Change::Break, block, s)),
+            _ if due <= end => interface
+                .next_reattachment_by(f64::INFINITY)
+                .map(|(_, block)| (Change::Attach, block, due)),
+            _ => None,
+        }
     }
 
     /// Reports a part of the step to the observer, and to the ledger if there is one; `force` is the shear force at its
