@@ -282,7 +282,8 @@ mod x86 {
 
         #[inline(always)]
         fn to_next_lane(self, registers: [Self::f64s; 2]) -> [Self::f64s; 2] {
-            let (avx, [low, high]) = (self.avx, registers.map(|register| cast!(register)));
+            let avx = self.avx;
+            let [low, high] = registers.map(|register| cast!(register));
             // 0 0 l0 l1 and l2 l3 h0 h1, each then shifted by one against the register itself.
             let before_low = avx._mm256_permute2f128_pd::<0x08>(low, low);
             let before_high = avx._mm256_permute2f128_pd::<0x21>(low, high);
@@ -292,7 +293,8 @@ mod x86 {
 
         #[inline(always)]
         fn to_lane_before(self, registers: [Self::f64s; 2]) -> [Self::f64s; 2] {
-            let (avx, [low, high]) = (self.avx, registers.map(|register| cast!(register)));
+            let avx = self.avx;
+            let [low, high] = registers.map(|register| cast!(register));
             // l2 l3 h0 h1 and h2 h3 0 0.
             let after_low = avx._mm256_permute2f128_pd::<0x21>(low, high);
             let after_high = avx._mm256_permute2f128_pd::<0x81>(high, high);

@@ -94,7 +94,8 @@ impl CubicStep {
     /// Coefficients by s, from 0 to 1, in N.
     #[inline(always)]
     fn coefficients(&self) -> [f64; 4] {
-        let ([start, end], [from, to]) = (self.force, self.bend);
+        let [start, end] = self.force;
+        let [from, to] = self.bend;
         [
             start,
             (end - start) - (2.0 * from + to) / 6.0,
@@ -171,7 +172,8 @@ impl CubicStep {
     /// Lower and upper bound on F_S, in N.
     #[inline(always)]
     pub(super) fn bounds(&self) -> [f64; 2] {
-        let ([start, end], [from, to]) = (self.force, self.bend);
+        let [start, end] = self.force;
+        let [from, to] = self.bend;
         let largest = |a: f64, b: f64| if a > b { a } else { b };
         let spread = 0.125 * largest(from.abs(), to.abs());
         [

@@ -86,19 +86,18 @@ impl ForceHistory {
         } else {
             0.0
         };
+        let [low, high] = first.bounds();
+        let [lowest, highest] = last.bounds();
         let path = GridPath {
             steps: &self.steps,
             count: self.count,
             first: self.first,
             spacing,
             inner: self.inner,
-            bounds: {
-                let ([low, high], [lowest, highest]) = (first.bounds(), last.bounds());
-                [
-                    self.inner.least.1.min(low).min(lowest),
-                    self.inner.largest.1.max(high).max(highest),
-                ]
-            },
+            bounds: [
+                self.inner.least.1.min(low).min(lowest),
+                self.inner.largest.1.max(high).max(highest),
+            ],
             end: last.value(s),
             integral: self.integral - before - beyond,
         };

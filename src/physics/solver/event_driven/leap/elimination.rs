@@ -92,7 +92,9 @@ impl<S: Simd, const C: usize> Number<S, C> {
 
     #[inline(always)]
     fn inverse(mut self) -> Self {
-        let (one, [real, imaginary]) = (self.0.splat(1.0), [self.1[0], self.1[C - 1]]);
+        let one = self.0.splat(1.0);
+        let real = self.1[0];
+        let imaginary = self.1[C - 1];
         if C == 1 {
             self.1[0] = one.over(real);
             return self;
