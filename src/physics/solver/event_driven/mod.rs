@@ -18,7 +18,7 @@ mod tolerances;
 
 use self::grid::Grid;
 use self::kernels::Kernels;
-use self::leap::{Bounds, Split};
+use self::leap::{Bounds, Plan, Split};
 use self::moving_frame::Frame;
 use self::slider::{Layout, Slider};
 use self::taylor::{Step, StepControl};
@@ -305,16 +305,12 @@ impl<'a> Integration<'a> {
                 return false;
             }
         };
-        let segment = Segment {
-            start,
-            ..plan.segment
-        };
-        self.report_leap(&segment, &drive, began, observer);
+        self.report_leap(&plan, &drive, [start, began], observer);
         self.grid.is_on = false;
         self.summary.steps += 1;
         self.summary.leaps += 1;
         self.next_leap = 0.0;
-        self.arrive(segment.duration, plan.is_whole);
+        self.arrive(plan.duration, plan.is_whole);
         match plan.reached {
             Some(block) => {
                 let x = self.slider.displacement(block);
@@ -327,28 +323,24 @@ impl<'a> Integration<'a> {
         true
     }
 
-    /// Reports the shear force along a leap that began at a time in s in the frame, and attaches on the driven solution what
-    /// it passed from the grid.
+    /// Reports the shear force along a leap that began at `start` s, at `began` s in the frame, and attaches on the driven
+    /// solution what it passed from the grid.
     fn report_leap(
         &mut self,
-        leap: &Segment<'static>,
+        leap: &Plan,
         drive: &Harmonic,
-        began: f64,
+        [start, began]: [f64; 2],
         observer: &mut dyn Observer,
     ) {
-        let ForcePath::Harmonic(path) = leap.path else {
-            unreachable!("a leap follows the driven solution")
-        };
         let mut reported = 0.0;
         let mut report = |until: f64, observer: &mut dyn Observer| {
             let path = Harmonic {
-                start: path.start + path.rate * reported,
-                phase: path.phase + path.turn(reported),
-                ..path
+                start: leap.force.start + leap.force.rate * reported,
+                phase: leap.force.phase + leap.force.turn(reported),
+                ..leap.force
             };
-            let start = leap.start + reported;
             observer.advance(&Segment {
-                start,
+                start: start + reported,
                 duration: until - reported,
                 path: ForcePath::Harmonic(path),
             });

@@ -18,7 +18,7 @@ use crate::model::Interface;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;
-use crate::solver::segment::Segment;
+use crate::solver::segment::{ForcePath, Segment};
 use std::f64::consts::TAU;
 
 /// How far beyond a leap under modulation a larger shear force is looked for, in units of 1/γ.
@@ -35,8 +35,9 @@ const ASTRAY: f64 = 2.0 * LOOSE + PASSED_SHARE;
 /// A leap that may be taken.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plan {
-    /// The shear force on the way, from time 0 on.
-    pub segment: Segment<'static>,
+    /// The shear force on the way, in N, and how long that is, in s.
+    pub force: Harmonic,
+    pub duration: f64,
     /// The block that reaches a break position at its end, if any.
     pub reached: Option<usize>,
     /// Whether it ends at the horizon.
@@ -140,13 +141,11 @@ fn plan<S: Simd>(
     if !elapsed.is_finite() {
         return Err(f64::INFINITY);
     }
-    let path = split
-        .driven(chain, 0)
-        .force_path(drive, chain.drive_stiffness);
+    let force = split.driven(chain, 0).force(drive, chain.drive_stiffness);
     let segment = Segment {
         start: 0.0,
         duration: elapsed,
-        path,
+        path: ForcePath::Harmonic(force),
     };
     if largest > error
         && !hides_no_peak(
@@ -162,7 +161,8 @@ fn plan<S: Simd>(
         return Err(wait);
     }
     Ok(Plan {
-        segment,
+        force,
+        duration: elapsed,
         reached,
         is_whole: elapsed == horizon,
     })
@@ -253,10 +253,10 @@ pub(super) fn leap<S: Simd>(
     if let Some(audit) = audit {
         let left_out = chain.mass * free_energy(chain, drive, split, state);
         Audit::add(&audit.left_out, left_out);
-        let damping = damping_loss(chain, drive, split, plan.segment.duration);
+        let damping = damping_loss(chain, drive, split, plan.duration);
         Audit::add(&audit.damping, damping);
     }
-    follow(simd, split, drive, plan.segment.duration, state);
+    follow(simd, split, drive, plan.duration, state);
     Ok(plan)
 }
 
