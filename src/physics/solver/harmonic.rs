@@ -31,7 +31,7 @@ impl Harmonic {
     }
 
     /// Value and slope after `elapsed` s.
-    pub(super) fn value_and_slope(&self, elapsed: f64) -> (f64, f64) {
+    fn value_and_slope(&self, elapsed: f64) -> (f64, f64) {
         let (sine, cosine) = libm::sincos(self.angle(elapsed));
         let ramp = self.start + self.rate * elapsed;
         (
@@ -62,7 +62,7 @@ impl Harmonic {
     }
 
     /// First and last local maximum in [0, `duration`], if any: the largest is one of the two.
-    pub(super) fn crests(&self, duration: f64) -> [Option<f64>; 2] {
+    fn crests(&self, duration: f64) -> [Option<f64>; 2] {
         let speed = self.amplitude.abs() * self.angular_frequency;
         if speed <= self.rate.abs() {
             return [None; 2];

@@ -225,7 +225,7 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
 }
 
 /// Largest number of nodes of a rule.
-pub(super) const MAX_NODES: usize = 33;
+const MAX_NODES: usize = 33;
 /// Newton's method doubles the correct digits of a node each time, and starts with two.
 const NEWTON_STEPS: usize = 6;
 

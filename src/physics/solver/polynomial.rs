@@ -162,7 +162,7 @@ pub(crate) fn for_each_turn(
 }
 
 /// The same polynomial in the variable r, which runs from -1 to 1 as s does from `low` to `high`.
-pub(crate) fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MAX_COEFFICIENTS] {
+fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MAX_COEFFICIENTS] {
     let half = 0.5 * (high - low);
     let mut about = shifted(coefficients, 0.5 * (low + high));
     let mut power = 1.0;

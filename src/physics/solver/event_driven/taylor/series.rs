@@ -19,7 +19,7 @@ const MAX_ORDER: usize = MAX_COEFFICIENTS - 1;
 const MIN_ORDER: usize = 3;
 
 /// 1/p!.
-pub const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
+const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
     let mut inverse = [1.0; MAX_COEFFICIENTS];
     let mut p = 1;
     while p < MAX_COEFFICIENTS {
@@ -80,7 +80,7 @@ impl Series {
 
     /// Number of rows, which is `R` unless that is 0.
     #[inline(always)]
-    pub fn rows_in<const R: usize>(&self) -> usize {
+    fn rows_in<const R: usize>(&self) -> usize {
         if R == 0 { self.rows } else { R }
     }
 
