@@ -253,11 +253,10 @@ mod tests {
                 .map(|label| job_result(label, slips))
                 .collect();
             for (job, result) in labels.iter().zip(&measured) {
-                result.slips.iter().for_each(|slip| {
-                    slip_writer
-                        .push(&(Cow::Borrowed(job), Cow::Borrowed(slip)))
-                        .unwrap()
-                });
+                for slip in &result.slips {
+                    let row = (Cow::Borrowed(job), Cow::Borrowed(slip));
+                    slip_writer.push(&row).unwrap();
+                }
             }
             slip_writer.finish().unwrap();
             if part < 2 {

@@ -127,6 +127,7 @@ fn value(kind: Kind, (low, high): (Bound<f64>, Bound<f64>), words: &[&str]) -> J
 }
 
 /// A number, without a decimal point if it is whole and a double holds it exactly.
+#[expect(clippy::cast_possible_truncation, reason = "within 2^53")]
 fn whole(number: f64) -> Json {
     if number.fract() == 0.0 && number.abs() <= 9_007_199_254_740_992.0 {
         json!(number as i64)
