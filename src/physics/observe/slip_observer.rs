@@ -235,10 +235,17 @@ impl SlipObserver {
     }
 
     /// Ends the rupture if no break has come in the wave crossing time before a time in s.
+    #[inline(always)]
     fn finish_rupture_before(&mut self, time: f64) {
         let crossing_time = self.criteria.crossing_time;
-        let is_over = |active: &mut Active| time - active.last.time > crossing_time;
-        let Some(active) = self.rupture.take_if(is_over) else {
+        let is_over = |active: &Active| time - active.last.time > crossing_time;
+        if self.rupture.as_ref().is_some_and(is_over) {
+            self.finish_rupture();
+        }
+    }
+
+    fn finish_rupture(&mut self) {
+        let Some(active) = self.rupture.take() else {
             return;
         };
         self.ruptures += 1;
