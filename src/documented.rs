@@ -44,15 +44,22 @@ fn file(page: &str) -> PathBuf {
 }
 
 fn table(fields: &[(Description, Value)]) -> String {
+    // A column that is empty everywhere says nothing.
+    let has_symbols = fields.iter().any(|(field, _)| !field.symbol.is_empty());
+    let symbol_cell = |symbol: &str| {
+        if has_symbols {
+            format!(" {symbol} |")
+        } else {
+            String::new()
+        }
+    };
+    let head = symbol_cell("symbol");
+    let rule = if has_symbols { "---|" } else { "" };
     let mut text =
-        "| key | symbol | meaning | default | allowed |\n|---|---|---|---|---|\n".to_owned();
+        format!("| key |{head} meaning | default | allowed |\n|---|{rule}---|---|---|\n");
     for (field, default) in fields {
-        let Description {
-            key,
-            symbol,
-            meaning,
-            ..
-        } = field;
+        let Description { key, meaning, .. } = field;
+        let symbol = symbol_cell(field.symbol);
         // Shorter than in messages: most values are finite numbers.
         let allowed = field
             .requirement()
@@ -60,16 +67,9 @@ fn table(fields: &[(Description, Value)]) -> String {
             .replace("a whole number from", "whole,");
         writeln!(
             text,
-            "| `{key}` | {symbol} | {meaning} | {default} | {allowed} |"
+            "| `{key}` |{symbol} {meaning} | {default} | {allowed} |"
         )
         .unwrap();
-    }
-    // A column that is empty everywhere says nothing.
-    if fields.iter().all(|(field, _)| field.symbol.is_empty()) {
-        text = text
-            .replace("| symbol ", "")
-            .replacen("|---", "", 1)
-            .replace("` |  |", "` |");
     }
     text
 }

@@ -1,9 +1,8 @@
 //! `stickslip accuracy`: speed against error of the solvers, measured in one run.
 
-use super::exit::{Exit, UsageError};
 use super::output::{self, TextTable};
-use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
+use super::{Exit, UsageError, catch_signals};
 use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, shows_bias, verdict};
 use crate::model::Parameters;
 use crate::model::theory::typical_interval;
@@ -110,7 +109,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     accuracy::check(&out)?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
-    let files = accuracy::write(&study, &findings, &out, signals::catch)?;
+    let files = accuracy::write(&study, &findings, &out, catch_signals)?;
     if arguments.json {
         output::plain_json(&accuracy::to_json(&study, &findings))?;
     } else {

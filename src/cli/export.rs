@@ -1,16 +1,11 @@
 //! `stickslip export`: the tables of a results directory as a few large files, for other tools.
 
-use super::exit::Exit;
-use super::output;
-use super::signals;
+use super::{Exit, catch_signals, choice, layout, output};
 use crate::results::Results;
-use crate::results::layout::Layout;
 use crate::table::formats::Format;
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
 use anyhow::Result;
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
@@ -32,40 +27,27 @@ pub struct Arguments {
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
     /// Format of the files
-    #[arg(long, value_enum, default_value_t = Format::Parquet)]
+    #[arg(
+        long,
+        default_value = "parquet",
+        value_parser = choice(&Format::ALL, Format::word, Format::description)
+    )]
     format: Format,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
-impl ValueEnum for Format {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let value = PossibleValue::new(self.extension());
-        Some(match self {
-            Self::Parquet => value,
-            Self::Csv => value.help(
-                "Plain text with a line of names; real numbers with as many digits as they have",
-            ),
-            Self::Arrow => value.help("The file format of Arrow"),
-        })
-    }
-}
-
 const JSON_FORMAT: u32 = 2;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
-    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let results = Results::read(&layout(&arguments.directory))?;
     // Shown on a terminal only.
     let bar = ProgressBar::new(0);
     bar.set_style(ProgressStyle::with_template(
         "{wide_bar} {percent} % of the parts, {eta} left",
     )?);
-    let stop = signals::catch()?;
+    let stop = catch_signals()?;
     let out = &arguments.out;
     let exported = results.export(out, arguments.format, stop, &mut |done, total| {
         bar.set_length(total);

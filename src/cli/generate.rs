@@ -1,8 +1,6 @@
 //! `stickslip generate`: what a package or an editor takes beside the program.
 
-use super::Cli;
-use super::exit::Exit;
-use super::output;
+use super::{Cli, Exit, output};
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, CommandFactory, Subcommand};

@@ -1,8 +1,7 @@
 //! `stickslip init`: a commented sweep file to start from.
 
-use super::exit::Exit;
-use super::output;
 use super::sweep::{Preset, Variation, changes, preset_parser, vary};
+use super::{Exit, output};
 use crate::results::destination::{Destination, Kind};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
@@ -94,10 +93,8 @@ pub fn init(arguments: &Arguments) -> Result<Exit> {
     };
     let sweep = renamed(preset, file)?;
     let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
-    let of_question = changes(&Variation {
-        settings: Vec::new(),
-        axes,
-    })?;
+    let settings = Vec::new();
+    let of_question = changes(&Variation { settings, axes })?;
     let own = changes(&arguments.variation)?;
     let sweep = vary(vary(sweep, &of_question)?, &own)?;
     // A key that is set need not stand as a comment with its default.
@@ -159,7 +156,8 @@ mod tests {
             .lines()
             .map(|line| uncommented(line).unwrap_or_else(|| line.to_owned()))
             .collect();
-        let (sparse, full) = (sweep(TEMPLATE.text), sweep(&all.join("\n")));
+        let sparse = sweep(TEMPLATE.text);
+        let full = sweep(&all.join("\n"));
         assert_eq!(sparse.jobs().count(), 3 * 3 * 2);
         assert!(
             sparse

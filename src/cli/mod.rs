@@ -1,10 +1,9 @@
-//! Flags, text and JSON output, progress, exit codes: the only code that prints.
+//! Flags, text and JSON output, progress, exit codes: the only code that prints. Below: the commands, the exit codes,
+//! and the signals that end a run early.
 
 mod accuracy;
 mod batch;
-mod exit;
 mod export;
-mod figure_flags;
 mod generate;
 mod init;
 mod output;
@@ -15,19 +14,31 @@ mod reduce;
 mod report;
 mod run;
 mod show;
-mod signals;
 mod simulate;
 mod status;
 mod sweep;
-mod time;
 mod verify;
 
-use self::exit::Exit;
+use crate::figure::BadOption;
+use crate::reduce::NoJobs;
+use crate::results::layout::Layout;
+use crate::results::{ErrorKind, ResultsError};
+use crate::run::threads::ThreadsError;
+use crate::solver::SimulationError;
+use crate::sweep::SweepError;
+use crate::table::storage::Disk;
+use anyhow::{Context, Result};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
+use signal_hook::consts::signal::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
+use signal_hook::flag::{register, register_conditional_shutdown};
 use std::ffi::OsString;
+use std::io;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Parameter sweeps of stick-slip friction: a slider held by breakable contacts (Capozza et al., PRL 107, 024301, 2011).
+/// Parameter sweeps of stick-slip friction: a slider held by breakable contacts (Capozza et al., PRL 107, 024301,
+/// 2011).
 #[derive(Debug, Parser)]
 #[command(name = "stickslip", version, max_term_width = 100, after_help = EXAMPLES)]
 struct Cli {
@@ -69,7 +80,7 @@ enum Command {
 /// default the executable itself; the first of the arguments is its name.
 pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let command = Cli::parse_from(arguments).command;
-    let ended = signals::outlive_limit_of_files().and_then(|()| match command {
+    let ended = outlive_limit_of_files().and_then(|()| match command {
         Command::Init(arguments) => init::init(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
         Command::Run(arguments) => run::run(&arguments),
@@ -92,6 +103,25 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
     exit as u8
 }
 
+/// Reads one of some values by its word; the help describes them.
+fn choice<T: Copy + Send + Sync + 'static>(
+    all: &'static [T],
+    word: fn(T) -> &'static str,
+    description: fn(T) -> Option<&'static str>,
+) -> impl TypedValueParser<Value = T> {
+    let described = |&value| PossibleValue::new(word(value)).help(description(value));
+    let words = PossibleValuesParser::new(all.iter().map(described));
+    words.try_map(move |given| {
+        let mut values = all.iter().copied();
+        values.find(|value| word(*value) == given).ok_or(given)
+    })
+}
+
+/// The layout of a results directory on the disk.
+fn layout(root: &Path) -> Layout<'_> {
+    Layout::new(&Disk, root)
+}
+
 /// An error and its causes, without those that it already quotes.
 fn message(error: &anyhow::Error) -> String {
     error
@@ -102,4 +132,102 @@ fn message(error: &anyhow::Error) -> String {
             _ if message.contains(&cause) => message,
             _ => format!("{message}: {cause}"),
         })
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    Done = 0,
+    Failed = 1,
+    /// The command line, a sweep file or a directory does not fit.
+    Usage = 2,
+    /// Stopped early; the same command resumes.
+    Stopped = 3,
+    Damaged = 4,
+}
+
+/// A mistake on the command line that the flags' own parser cannot see.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct UsageError(pub String);
+
+impl Exit {
+    /// The code for an error: by the first cause that says whose fault it is; a disk that fails can be resumed from.
+    pub fn of(error: &anyhow::Error) -> Self {
+        error
+            .chain()
+            .find_map(Self::of_cause)
+            .unwrap_or(Self::Stopped)
+    }
+
+    fn of_cause(cause: &(dyn std::error::Error + 'static)) -> Option<Self> {
+        let is_usage =
+            cause.is::<UsageError>() || cause.is::<BadOption>() || cause.is::<ThreadsError>();
+        if is_usage || cause.is::<SweepError>() || cause.is::<NoJobs>() {
+            return Some(Self::Usage);
+        }
+        if let Some(error) = cause.downcast_ref::<SimulationError>() {
+            return Some(match error {
+                SimulationError::BadSetting { .. } => Self::Usage,
+                SimulationError::Interrupted { .. } => Self::Stopped,
+                _ => Self::Failed,
+            });
+        }
+        match cause.downcast_ref::<ResultsError>()?.kind {
+            ErrorKind::Refused | ErrorKind::Busy => Some(Self::Usage),
+            ErrorKind::Damaged => Some(Self::Damaged),
+            ErrorKind::Disk(_) | ErrorKind::Stopped => None,
+        }
+    }
+}
+
+// Signals. Batch systems warn with one signal and follow with others, and some send the same one twice. So only a
+// second SIGINT, which is Ctrl-C, exits at once. SIGINT and SIGTERM cancel a run; the others warn that its time is
+// over. SIGHUP keeps its usual effect: it ends the program unless `nohup` started it.
+
+const WARNING: &[i32] = &[SIGUSR1, SIGUSR2, SIGXCPU];
+const CANCELLING: &[i32] = &[SIGINT, SIGTERM];
+
+/// Set by the first signal that stops.
+static STOP: AtomicBool = AtomicBool::new(false);
+/// Set by the first signal that cancels.
+static CANCELLED: AtomicBool = AtomicBool::new(false);
+/// Set by the first SIGINT.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// Set when a file would pass the limit on its size.
+static FILE_TOO_LARGE: AtomicBool = AtomicBool::new(false);
+
+/// Whether the signals are caught.
+static CAUGHT: AtomicBool = AtomicBool::new(false);
+
+/// Catches the signals; the flag turns true with the first.
+pub fn catch_signals() -> Result<&'static AtomicBool> {
+    if !CAUGHT.swap(true, Ordering::Relaxed) {
+        register_all().context("cannot catch signals")?;
+    }
+    Ok(&STOP)
+}
+
+/// Lets the write of a file that passes the limit on its size fail, where a signal would end the program.
+fn outlive_limit_of_files() -> Result<()> {
+    register(SIGXFSZ, &FILE_TOO_LARGE).context("cannot catch signals")?;
+    Ok(())
+}
+
+/// Whether a signal came that cancels, alone or with others.
+pub fn is_cancelled() -> bool {
+    CANCELLED.load(Ordering::Relaxed)
+}
+
+fn register_all() -> io::Result<()> {
+    // Before the flag that it looks at, so that the first SIGINT does not exit.
+    register_conditional_shutdown(SIGINT, Exit::Stopped as i32, &INTERRUPTED)?;
+    register(SIGINT, &INTERRUPTED)?;
+    // Before the flag that stops: what stops a run finds it set.
+    CANCELLING
+        .iter()
+        .try_for_each(|&signal| register(signal, &CANCELLED).map(drop))?;
+    CANCELLING
+        .iter()
+        .chain(WARNING)
+        .try_for_each(|&signal| register(signal, &STOP).map(drop))
 }

@@ -1,11 +1,10 @@
 //! Text for people and JSON for programs.
 
-use super::signals;
+use super::catch_signals;
 use crate::results::Results;
 use crate::results::destination::Destination;
 use crate::results::next_round::RoundsSoFar;
 use crate::run::Reasons;
-use crate::sweep::Standing;
 use crate::table::shown::{is_plain, shown_text};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
@@ -44,7 +43,7 @@ pub fn warn(warnings: &[String]) {
 
 /// Writes bytes to a file.
 pub fn write(file: &Destination, bytes: &[u8]) -> Result<()> {
-    file.write(signals::catch, |mut file| Ok(file.write(bytes)?))
+    file.write(catch_signals, |mut file| Ok(file.write(bytes)?))
 }
 
 /// Prints a value as JSON, with the version of its form.
@@ -176,26 +175,22 @@ pub fn by_reason(reasons: &Reasons) -> String {
 
 /// How far the rounds of a sweep are.
 pub fn rounds(rounds: &RoundsSoFar) -> String {
-    let Standing {
-        sets_done,
-        sets_open,
-        sets_capped,
-        edges_capped,
-    } = rounds.standing;
+    let standing = &rounds.standing;
     let over = if rounds.is_over {
         "the last"
     } else {
         "not the last"
     };
     let round = rounds.round;
-    let done = count(sets_done, "set");
-    let mut text = format!("{round} ({over}): {done} done, {sets_open} open");
-    if sets_capped > 0 {
-        let sets = count(sets_capped, "set");
+    let done = count(standing.sets_done, "set");
+    let open = standing.sets_open;
+    let mut text = format!("{round} ({over}): {done} done, {open} open");
+    if standing.sets_capped > 0 {
+        let sets = count(standing.sets_capped, "set");
         text = format!("{text}; {sets} with all seeds allowed, above the target");
     }
-    if edges_capped > 0 {
-        let edges = count(edges_capped, "edge");
+    if standing.edges_capped > 0 {
+        let edges = count(standing.edges_capped, "edge");
         text = format!("{text}; {edges} wider than wanted, at the limit of seeds or jobs");
     }
     text

@@ -1,8 +1,7 @@
 //! `stickslip plan`: what would run. Nothing is written.
 
-use super::exit::Exit;
-use super::output;
 use super::sweep::{self, PresetFlag, Variation};
+use super::{Exit, output};
 use crate::results::layout::Layout;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
@@ -33,7 +32,8 @@ pub struct Arguments {
     preset: PresetFlag,
     #[command(flatten)]
     variation: Variation,
-    /// Results directory to compare with, if it is there [default: results/<name of the sweep>; none with --set or --axis]
+    /// Results directory to compare with, if it is there [default: results/<name of the sweep>; none with --set or
+    /// --axis]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print JSON
@@ -43,7 +43,7 @@ pub struct Arguments {
 
 const JSON_FORMAT: u32 = 2;
 
-/// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction. As measured, rounded up.
+/// Bytes that a worker takes beside its jobs, for the program, commits and the reduction: measured, rounded up.
 const MEMORY: f64 = 80e6;
 
 /// What a sweep would run.
@@ -129,10 +129,9 @@ impl<'a> Forecast<'a> {
     }
 
     fn pairs(&self, sweep: &Sweep) -> Vec<(&'static str, String)> {
-        let axes: Vec<String> = (self.axes.iter())
-            .map(|axis| format!("{} ({})", axis.keys, axis.points))
-            .collect();
-        let axes = match axes.as_slice() {
+        let axes = self.axes.iter();
+        let axes = axes.map(|axis| format!("{} ({})", axis.keys, axis.points));
+        let axes = match &*axes.collect::<Vec<_>>() {
             [] => "none: a single point".to_owned(),
             axes => axes.join(" x "),
         };
@@ -148,11 +147,12 @@ impl<'a> Forecast<'a> {
         };
         let cpu_time = self.predicted_cpu_seconds;
         let core_hours = cpu_time / 3600.0;
-        let cpu_time = output::duration(cpu_time);
+        let cpu_time = format!("{}, {core_hours:.1} core-hours", output::duration(cpu_time));
         let wall_time = output::duration(self.predicted_wall_seconds);
         let threads = output::count(self.threads as u64, "thread");
         let of_worker = shown_bytes(self.worker_memory_bytes);
         let of_thread = shown_bytes(self.thread_memory_bytes);
+        let memory = format!("{of_worker} and {of_thread} for each thread");
         let mut pairs = vec![
             ("sweep", self.name.to_owned()),
             ("axes", axes),
@@ -160,30 +160,21 @@ impl<'a> Forecast<'a> {
             ("jobs", format!("{} {which}", self.jobs)),
             ("parts", self.parts.to_string()),
             ("slips to record", self.slips.to_string()),
-            (
-                "predicted CPU time",
-                format!("{cpu_time}, {core_hours:.1} core-hours"),
-            ),
+            ("predicted CPU time", cpu_time),
             ("predicted wall time", format!("{wall_time} on {threads}")),
-            (
-                "worker memory",
-                format!("{of_worker} and {of_thread} for each thread"),
-            ),
+            ("worker memory", memory),
         ];
-        if let Some(Bounds {
-            sets,
-            jobs,
-            predicted_cost,
-        }) = self.at_most
-        {
-            let cost = output::duration(predicted_cost);
+        if let Some(bounds) = &self.at_most {
+            let sets = bounds.sets;
+            let jobs = bounds.jobs;
+            let cost = output::duration(bounds.predicted_cost);
             let at_most = format!("at most {sets} sets, {jobs} jobs; estimated CPU time {cost}");
             pairs.push(("all rounds", at_most));
         }
-        let directory = (self.directory.as_ref()).map_or_else(
-            || "none yet: all jobs are to run".to_owned(),
-            DirectoryState::in_words,
-        );
+        let directory = match &self.directory {
+            Some(directory) => directory.in_words(),
+            None => "none yet: all jobs are to run".to_owned(),
+        };
         pairs.push(("directory", directory));
         pairs
     }

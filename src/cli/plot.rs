@@ -1,15 +1,15 @@
 //! `stickslip plot`: reduced data to figures, the standing ones or a custom one.
 
-use super::exit::{Exit, UsageError};
-use super::figure_flags::{CUSTOM_FIGURE, CustomFlags, size};
 use super::output::{self, TextTable};
-use crate::figure::{Format, Look, Size, Style, draw_all, draw_custom, write_custom};
-use crate::reduce::{renew, set_columns};
+use super::{Exit, UsageError, choice, layout};
+use crate::figure::{
+    CustomFigure, Format, Limits, Look, Size, Style, draw_all, draw_custom, write_custom,
+};
+use crate::reduce::{SetRow, renew};
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
-use crate::results::layout::Layout;
+use crate::table::columns::Row;
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -24,14 +24,23 @@ pub struct Arguments {
     /// List the columns that can be drawn, with units and meanings
     #[arg(long)]
     list: bool,
-    /// Formats, separated by commas [default: svg,png]
-    #[arg(long, value_enum, value_delimiter = ',')]
+    /// Formats, separated by commas
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "svg,png",
+        value_parser = choice(&Format::ALL, Format::word, Format::description)
+    )]
     format: Vec<Format>,
     /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: what the data need; in print one or two columns wide]
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     size: Option<Size>,
     /// Style
-    #[arg(long, value_enum, default_value_t = Style::Screen)]
+    #[arg(
+        long,
+        default_value = "screen",
+        value_parser = choice(&Style::ALL, Style::word, Style::description)
+    )]
     style: Style,
     #[command(flatten)]
     custom: CustomFlags,
@@ -65,14 +74,6 @@ impl Arguments {
             ..Look::of_sweep(results.sweep().name())
         }
     }
-
-    fn formats(&self) -> &[Format] {
-        if self.format.is_empty() {
-            &Format::DEFAULT
-        } else {
-            &self.format
-        }
-    }
 }
 
 pub fn plot(arguments: &Arguments) -> Result<Exit> {
@@ -83,7 +84,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         return Ok(Exit::Done);
     };
     let out = arguments.out.as_deref().map(picture_file).transpose()?;
-    let results = renew(&Results::read(&Layout::new(&Disk, directory))?)?;
+    let results = renew(&Results::read(&layout(directory))?)?;
     let layout = results.layout();
     let look = arguments.look(&results);
     let files = if let Some(figure) = arguments.custom.figure() {
@@ -92,14 +93,14 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
             output::report(&format!("for the caption: {}", picture.note()));
         }
         match &out {
-            None => write_custom(layout, picture, &look, arguments.formats())?,
+            None => write_custom(layout, picture, &look, &arguments.format)?,
             Some((out, format)) => {
                 output::write(out, &picture.encoded(*format)?)?;
                 arguments.out.iter().cloned().collect()
             }
         }
     } else {
-        draw_all(layout, &look, arguments.formats())?
+        draw_all(layout, &look, &arguments.format)?
     };
     if files.is_empty() {
         output::report("there is nothing to draw: no set has a result");
@@ -122,10 +123,160 @@ pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
 
 /// The columns of the table of sets.
 fn list() -> String {
-    let described = set_columns();
+    let described = SetRow::columns();
     let mut columns = TextTable::default();
     columns.words("", &described, |column| column.name.to_string());
     columns.words("", &described, |column| column.unit.to_owned());
     columns.words("", &described, |column| column.meaning.to_owned());
     columns.to_string()
+}
+
+const CUSTOM_FIGURE: &str = "Custom figure";
+
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = CUSTOM_FIGURE)]
+struct CustomFlags {
+    /// Column, or formula of columns such as 'Kd*Delta', on the x axis of a custom figure
+    #[arg(long, value_name = "COLUMN", requires = "y")]
+    x: Option<String>,
+    /// Column on the y axis, with error bars if it has an interval; or a formula, without
+    #[arg(long, value_name = "COLUMN", requires = "x")]
+    y: Option<String>,
+    /// Column that colours show, up to six values in the legend, more on a scale [default: what else was swept]
+    #[arg(long, value_name = "COLUMN", requires = "x")]
+    colour: Option<String>,
+    /// Column whose values get a panel each, up to nine
+    #[arg(long, value_name = "COLUMN", requires = "x")]
+    panels: Option<String>,
+    /// Logarithmic axes [default: where it was swept so, or values lie decades apart]
+    #[arg(long, value_name = "AXES", requires = "x", value_parser = ["x", "y", "xy", "none"])]
+    log: Option<String>,
+    /// Ends of the x axis, in SI; either may be left out
+    #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true)]
+    xlim: Option<Limits>,
+    /// Ends of the y axis, in SI
+    #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true)]
+    ylim: Option<Limits>,
+    /// Label of the x axis [default: meaning, name and unit of the column]
+    #[arg(long, value_name = "TEXT", requires = "x")]
+    xlabel: Option<String>,
+    /// Label of the y axis
+    #[arg(long, value_name = "TEXT", requires = "x")]
+    ylabel: Option<String>,
+}
+
+impl CustomFlags {
+    /// The figure, if one is asked for.
+    fn figure(&self) -> Option<CustomFigure> {
+        let flags = self.clone();
+        Some(CustomFigure {
+            x: flags.x?,
+            y: flags.y?,
+            colour: flags.colour,
+            panels: flags.panels,
+            log: flags.log,
+            xlim: flags.xlim.unwrap_or_default(),
+            ylim: flags.ylim.unwrap_or_default(),
+            xlabel: flags.xlabel,
+            ylabel: flags.ylabel,
+        })
+    }
+}
+
+fn limits(text: &str) -> Result<Limits, &'static str> {
+    const WANTED: &str = "must be LOW:HIGH with finite numbers, such as 1e-6:1e-3, 0: or :5";
+    let end = |text: &str| match text.trim() {
+        "" => Ok(None),
+        number => number
+            .parse()
+            .ok()
+            .filter(|end: &f64| end.is_finite())
+            .map(Some)
+            .ok_or(WANTED),
+    };
+    match text.split_once(':') {
+        Some((low, high)) if text.trim() != ":" => Ok((end(low)?, end(high)?)),
+        _ => Err(WANTED),
+    }
+}
+
+/// `86mmx60mm`; lengths in mm, cm, in, pt or px, a pixel being 1/96 inch.
+fn size(text: &str) -> Result<Size, &'static str> {
+    // The x of px does not stand between sides.
+    let between = text
+        .match_indices('x')
+        .map(|(at, _)| at)
+        .find(|&at| !text[..at].ends_with('p'));
+    let sides = between.and_then(|at| Some((length(&text[..at])?, length(&text[at + 1..])?)));
+    let (width, height) = sides
+        .ok_or("must be WIDTHxHEIGHT in mm, cm, in, pt or px, up to 2 m, such as 86mmx60mm")?;
+    Ok(Size { width, height })
+}
+
+/// A length in mm.
+fn length(text: &str) -> Option<f64> {
+    /// Longest side in mm: a poster.
+    const LONGEST: f64 = 2000.0;
+    const INCH: f64 = 25.4;
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic())?);
+    let millimetres = match unit {
+        "mm" => 1.0,
+        "cm" => 10.0,
+        "in" => INCH,
+        "pt" => INCH / 72.0,
+        "px" => INCH / 96.0,
+        _ => return None,
+    };
+    let number: f64 = number.parse().ok()?;
+    Some(number * millimetres).filter(|side| *side > 0.0 && *side <= LONGEST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn either_end_of_an_axis_may_be_left_out() {
+        assert_eq!(limits("1e-6:1e-3"), Ok((Some(1e-6), Some(1e-3))));
+        assert_eq!(limits("-1:"), Ok((Some(-1.0), None)));
+        assert_eq!(limits(":5"), Ok((None, Some(5.0))));
+        for wrong in ["", ":", "1", "a:b", "1:nan", "1:2:3", "inf:"] {
+            assert!(limits(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn sizes_are_read_in_their_units() {
+        let mm = |text: &str| size(text).unwrap();
+        assert_eq!(
+            mm("86mmx60mm"),
+            Size {
+                width: 86.0,
+                height: 60.0
+            }
+        );
+        assert_eq!(
+            mm("8.6cmx6cm"),
+            Size {
+                width: 86.0,
+                height: 60.0
+            }
+        );
+        assert!((mm("96pxx192px").height - 50.8).abs() < 1e-9);
+        assert!((mm("72ptx1in").width - 25.4).abs() < 1e-9);
+        for wrong in [
+            "",
+            "86mm",
+            "86x60",
+            "0mmx60mm",
+            "-1mmx5mm",
+            "nanmmx5mm",
+            "9e9mmx5mm",
+            "86mmx60furlong",
+            "mmxmm",
+            "µmxµm",
+        ] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+    }
 }

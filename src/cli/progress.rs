@@ -5,8 +5,7 @@ use crate::run::threads::Threads;
 use crate::run::{MAX_FAILURES, Reasons, RunEvent, Tally};
 use crate::table::shown::shown_bytes;
 use crate::table::value::floored;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use indicatif::{ProgressBar, ProgressStyle};
 use std::time::{Duration, Instant};
 
 /// Time between two plain lines.
@@ -17,8 +16,8 @@ const RESOLUTION: u32 = 1000;
 const GUESS: f64 = 0.05;
 
 pub struct Progress {
+    /// Hidden unless standard error is a terminal.
     bar: ProgressBar,
-    is_terminal: bool,
     begin: Instant,
     last_line: Instant,
     tally: Tally,
@@ -36,7 +35,6 @@ impl Progress {
         let now = Instant::now();
         Self {
             bar: ProgressBar::hidden(),
-            is_terminal: std::io::stderr().is_terminal(),
             begin: now,
             last_line: now,
             tally: Tally::default(),
@@ -56,7 +54,29 @@ impl Progress {
     pub fn show(&mut self, event: &RunEvent) {
         self.tally.note(event);
         match event {
-            RunEvent::Started { .. } => self.begin(event),
+            RunEvent::Started {
+                jobs,
+                predicted_cost,
+                jobs_there,
+                threads,
+                others,
+                ..
+            } => {
+                self.has_results |= *jobs_there > 0;
+                let jobs = output::count(*jobs, "job") + self.of_round;
+                let time = output::duration(predicted_cost / *threads as f64);
+                let mut place = output::count(*threads as u64, "thread");
+                if let Some(variable) = self.threads.variable {
+                    place = format!("{place} ({variable})");
+                }
+                if *others > 0 {
+                    let others = output::count(*others as u64, "worker");
+                    place = format!("{place}, shared with {others}");
+                }
+                self.begin(&format!(
+                    "running {jobs}, {jobs_there} there already; predicted: {time} on {place}"
+                ));
+            }
             RunEvent::PartCommitted { .. } => self.has_results = true,
             RunEvent::RoundBegun { jobs, rounds, .. } => {
                 let jobs = output::count(*jobs, "job");
@@ -108,53 +128,20 @@ impl Progress {
     }
 
     /// Says what is to be done, and begins the bar.
-    fn begin(&mut self, event: &RunEvent) {
-        let &RunEvent::Started {
-            jobs,
-            predicted_cost,
-            jobs_there,
-            threads,
-            others,
-            ..
-        } = event
-        else {
-            return;
-        };
+    fn begin(&mut self, line: &str) {
+        self.say(line);
         self.begin = Instant::now();
-        self.has_results |= jobs_there > 0;
-        let jobs = output::count(jobs, "job") + self.of_round;
-        let time = output::duration(predicted_cost / threads as f64);
-        let mut place = output::count(threads as u64, "thread");
-        if let Some(variable) = self.threads.variable {
-            place = format!("{place} ({variable})");
-        }
-        if others > 0 {
-            place = format!(
-                "{place}, shared with {}",
-                output::count(others as u64, "worker")
-            );
-        }
-        self.say(&format!(
-            "running {jobs}, {jobs_there} there already; predicted: {time} on {place}"
-        ));
-        if self.is_terminal {
-            let target = ProgressDrawTarget::stderr();
-            self.bar = ProgressBar::with_draw_target(Some(u64::from(RESOLUTION)), target);
-        }
+        self.bar = ProgressBar::new(u64::from(RESOLUTION));
         if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
             self.bar.set_style(style.progress_chars("=> "));
         }
     }
 
     fn say(&self, line: &str) {
-        if self.is_terminal {
-            self.bar.suspend(|| output::report(line));
-        } else {
-            output::report(line);
-        }
+        self.bar.suspend(|| output::report(line));
     }
 
-    /// Draws the bar, which counts the jobs of all workers since this one began, or prints a line if the last is long ago.
+    /// Draws the bar, which counts the jobs of all workers since this one began, or now and then prints a line.
     fn draw(&mut self) {
         let share = self.tally.share();
         let elapsed = self.begin.elapsed().as_secs_f64();
@@ -179,7 +166,7 @@ impl Progress {
         let position = floored(f64::from(RESOLUTION) * share) as u64;
         self.bar.set_position(position);
         self.bar.set_message(text.clone());
-        if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
+        if self.bar.is_hidden() && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();
             let elapsed = output::duration(elapsed);
             output::report(&format!("{elapsed}, {:.0} %: {text}", 100.0 * share));

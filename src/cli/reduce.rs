@@ -1,12 +1,10 @@
 //! `stickslip reduce`: tables to reduced data.
 
-use super::exit::Exit;
-use super::output;
+use super::{Exit, layout, output};
 use crate::reduce::ReductionSummary;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -26,7 +24,7 @@ pub struct Arguments {
 const JSON_FORMAT: u32 = 2;
 
 pub fn reduce(arguments: &Arguments) -> Result<Exit> {
-    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let results = Results::read(&layout(&arguments.directory))?;
     let summary = crate::reduce::reduce(&results)?;
     if arguments.json {
         output::json(JSON_FORMAT, &summary)?;

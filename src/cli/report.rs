@@ -1,14 +1,12 @@
 //! `stickslip report`, and `--report` of `run`: a results directory as one HTML page.
 
-use super::exit::Exit;
-use super::{message, output};
+use super::{Exit, layout, message, output};
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
 use crate::results::layout::Layout;
 use crate::run::{RunEvent, RunReport};
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -35,7 +33,7 @@ pub struct Arguments {
 }
 
 pub fn report(arguments: &Arguments) -> Result<Exit> {
-    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let results = Results::read(&layout(&arguments.directory))?;
     let path = match &arguments.out {
         None => crate::report::write(&results, None)?,
         Some(path) => {

@@ -1,10 +1,9 @@
 //! `stickslip run`: the missing jobs of a sweep, then reduced data and figures.
 
-use super::exit::{Exit, UsageError};
 use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, PresetFlag, Variation};
-use super::{output, reduce, show, signals, time};
+use super::{Exit, UsageError, batch, catch_signals, is_cancelled, output, reduce, show};
 use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
 use crate::reduce::NoJobs;
@@ -52,7 +51,8 @@ pub struct Arguments {
     preset: PresetFlag,
     #[command(flatten)]
     variation: Variation,
-    /// Results directory [default: results/<name of the sweep>, with --set or --axis if it is new; or the one to resume]
+    /// Results directory [default: results/<name of the sweep>, with --set or --axis if it is new; or the one to
+    /// resume]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads [default: those that the batch system grants, else all cores]
@@ -61,8 +61,9 @@ pub struct Arguments {
     /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// End within this time, such as 55m, 1h30m or 1:30:00, and keep what is done; reduction and figures take extra time
-    #[arg(long, value_name = "TIME", value_parser = time::parse)]
+    /// End within this time, such as 55m, 1h30m or 1:30:00, and keep what is done; reduction and figures take extra
+    /// time
+    #[arg(long, value_name = "TIME", value_parser = batch::parse_time)]
     walltime: Option<Duration>,
     /// Run as one of many workers in a batch queue: exit with 0 also when others run the rest, or when the time is over
     /// (--walltime, SIGUSR1, SIGUSR2, SIGXCPU) after some work
@@ -85,7 +86,7 @@ pub struct Arguments {
 const JSON_FORMAT: u32 = 2;
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
-    let stop = signals::catch()?;
+    let stop = catch_signals()?;
     let (sweep, root) = arguments.sweep_and_root()?;
     output::warn(&sweep.warnings());
     sweep::warn_of_partitions(&root, &sweep);
@@ -155,7 +156,7 @@ fn work(
             reporter.follow(event);
         }
     })?;
-    report.stopped |= signals::is_cancelled();
+    report.stopped |= is_cancelled();
     let is_complete = report.jobs_left == 0 && !report.stopped;
     let reduced = if is_complete && !arguments.no_reduce {
         reduce_once(joined, layout, arguments)
@@ -214,7 +215,7 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
         output::report(&stop_in_words(report, arguments));
         // A run that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
-        return if arguments.worker && has_worked && !signals::is_cancelled() {
+        return if arguments.worker && has_worked && !is_cancelled() {
             Exit::Done
         } else {
             Exit::Stopped
@@ -230,9 +231,8 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     }
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
-        output::report(&format!(
-            "{failed} failed; tables/jobs has the reasons. --retry-failed runs them again."
-        ));
+        let hint = "tables/jobs has the reasons. --retry-failed runs them again.";
+        output::report(&format!("{failed} failed; {hint}"));
     }
     if report.jobs_left > 0 && !arguments.worker {
         Exit::Stopped

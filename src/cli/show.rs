@@ -1,21 +1,18 @@
 //! `stickslip show`: the result of a sweep, a line for each set. `run` ends with its first lines.
 
-use super::exit::{Exit, UsageError};
 use super::output::{self, TextTable};
+use super::{Exit, UsageError, layout};
 use crate::model::Symbol;
 use crate::reduce::{
     EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing, read_reduced,
-    renew, sets_where,
+    read_sets, renew, sets_where,
 };
 use crate::results::Results;
-use crate::results::layout::Layout;
-use crate::sets::{Digits, label};
+use crate::sets::{Digits, label, with_decimals};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
-use crate::table::columns::{Kind, Table};
-use crate::table::file::Dataset;
+use crate::table::columns::Kind;
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
 use crate::table::value::floored;
 use anyhow::Result;
 use clap::Args;
@@ -82,8 +79,7 @@ const FOUND: [&str; 9] = [
 ];
 
 pub fn show(arguments: &Arguments) -> Result<Exit> {
-    let layout = Layout::new(&Disk, &arguments.directory);
-    let results = Results::read(&layout)?;
+    let results = Results::read(&layout(&arguments.directory))?;
     match &arguments.other {
         Some(other) => show_differences(arguments, &results, other)?,
         None => show_sets(arguments, &*renew(&results)?)?,
@@ -108,10 +104,8 @@ impl Arguments {
             let sets = (0..count).map(|set| record(columns, set).into_iter().collect());
             let sets: Vec<Map<String, Json>> = sets.collect();
             let edges: Vec<Json> = edges.iter().map(json).collect();
-            output::json(
-                JSON_FORMAT,
-                &serde_json::json!({ "sets": sets, "edges": edges }),
-            )
+            let found = serde_json::json!({ "sets": sets, "edges": edges });
+            output::json(JSON_FORMAT, &found)
         } else if self.csv {
             print_csv(columns, count)
         } else {
@@ -122,7 +116,7 @@ impl Arguments {
 
 /// Shows in what the sets of two directories differ.
 fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) -> Result<()> {
-    let others = Results::read(&Layout::new(&Disk, other))?;
+    let others = Results::read(&layout(other))?;
     let columns = compare(results, &others)?;
     let count = columns.first().map_or(0, |values| values.numbers.len());
     if count == 0 {
@@ -202,22 +196,10 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     Ok(text)
 }
 
-/// The first of the reduced sets, controls left out.
+/// The first of the reduced sets.
 fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
-    let file = results.layout().reduced_file(SetRow::NAME);
-    let mut sets = Vec::new();
-    for batch in Dataset::new(results.layout().storage, vec![file]).rows::<SetRow>() {
-        sets.extend(
-            batch?
-                .into_iter()
-                .filter(|row| !row.is_control)
-                .take(most - sets.len()),
-        );
-        if sets.len() == most {
-            break;
-        }
-    }
-    Ok(sets)
+    let sets = read_sets(results.layout()).take(most);
+    Ok(sets.collect::<Result<_, _>>()?)
 }
 
 /// The column that shows a parameter: of the period, the frequency.
@@ -388,11 +370,10 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
         };
         format!("{from}{} to {}", number(low), number(high))
     });
-    columns.words("", edges, |edge| {
-        let change = edge
-            .rises
-            .map(|rises| if rises { "rises" } else { "falls" });
-        change.unwrap_or_default().to_owned()
+    columns.words("", edges, |edge| match edge.rises {
+        Some(true) => "rises".to_owned(),
+        Some(false) => "falls".to_owned(),
+        None => String::new(),
     });
     columns.words("jobs", edges, |edge| edge.jobs.to_string());
     columns.words("ended by", edges, |edge| edge.ended.word().to_owned());
@@ -402,8 +383,8 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
 /// How far the middle of an interval may lie from its value, as a share of the half-width, to be shown as ±.
 const LOPSIDED: f64 = 0.2;
 
-/// A value and the half-width of its interval, with the digits that this leaves; or its ends, if the value is not in the
-/// middle, or ± would reach beyond zero and the interval does not.
+/// A value and the half-width of its interval, with the digits that this leaves; or its ends, if the value is not in
+/// the middle, or ± would reach beyond zero and the interval does not.
 fn with_interval(value: f64, low: f64, high: f64) -> String {
     let half = 0.5 * (high - low);
     if half.is_nan() || half <= 0.0 {
@@ -419,18 +400,16 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
         0.0
     } - exponent;
     let digits = floored(digits).min(18);
-    let rounded = |value: f64| format!("{value:.digits$}");
-    // Not -0.00, which is 0 with 0 added.
-    let [value, low, high] =
-        [value, low, high].map(|end| rounded(rounded(end).parse().unwrap_or(end) + 0.0));
+    let half = with_decimals(half, digits);
+    let [value, low, high] = [value, low, high].map(|end| with_decimals(end, digits));
     if is_lopsided {
         format!("{value} ({low} to {high})")
     } else {
-        format!("{value} ± {}", rounded(half))
+        format!("{value} ± {half}")
     }
 }
 
-/// Notes on jobs that ended otherwise, each kind with a command that shows one, and on sets that the sweep no longer has.
+/// Notes on jobs that ended early, each kind with a command that shows one, and on sets that left the sweep.
 fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     let sweep = results.sweep();
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
@@ -449,40 +428,36 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     notes.into_iter().flatten().collect()
 }
 
+/// The jobs of some kind, and of how many sets they are; `None` if there are none.
+fn jobs_of_sets(rows: &[SetRow], jobs: impl Fn(&SetRow) -> u64) -> Option<String> {
+    let counts: Vec<u64> = rows.iter().map(jobs).filter(|jobs| *jobs > 0).collect();
+    let jobs = output::count(counts.iter().sum(), "job");
+    let sets = output::count(counts.len() as u64, "set");
+    (!counts.is_empty()).then(|| format!("{jobs} of {sets}"))
+}
+
 fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
+    let jobs = jobs_of_sets(rows, |row| row.jobs_without_slips)?;
     let without = rows.iter().filter(|row| row.jobs_without_slips > 0);
-    let jobs: u64 = without.clone().map(|row| row.jobs_without_slips).sum();
-    if jobs == 0 {
-        return None;
-    }
-    let jobs = output::count(jobs, "job");
-    let sets = output::count(without.clone().count() as u64, "set");
     let mut places = without.filter_map(|row| sweep.set_with(&row.parameters.parameters));
     let job = places
         .next()
         .and_then(|set| sweep.jobs_at(set..set + 1).next());
-    let command = job.map_or_else(String::new, |job| {
-        format!("; a job of one such set: {}", sweep.command(&job))
-    });
+    let command = job.map(|job| format!("; a job of one such set: {}", sweep.command(&job)));
+    let command = command.unwrap_or_default();
     Some(format!(
-        "{jobs} of {sets} ended because no further slip came: the slider slides, or give_up_after is too short{command}"
+        "{jobs} ended because no further slip came: the slider slides, or give_up_after is too short{command}"
     ))
 }
 
 fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
+    let jobs = jobs_of_sets(rows, |row| row.jobs_cut.unwrap_or(0))?;
     let cut = rows.iter().filter(|row| row.jobs_cut > Some(0));
-    let jobs: u64 = cut.clone().filter_map(|row| row.jobs_cut).sum();
-    if jobs == 0 {
-        return None;
-    }
-    let jobs = output::count(jobs, "job");
-    let sets = output::count(cut.clone().count() as u64, "set");
     let off = cut.filter_map(|row| row.tau_off).reduce(f64::min);
-    let off = off.map_or_else(String::new, |off| {
-        format!(", by up to about {:.1} %", -100.0 * off)
-    });
+    let off = off.map(|off| format!(", by up to about {:.1} %", -100.0 * off));
+    let off = off.unwrap_or_default();
     Some(format!(
-        "{jobs} of {sets} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` \
+        "{jobs} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` \
          in place of max_time ends jobs with a slip"
     ))
 }

@@ -1,13 +1,12 @@
 //! `stickslip simulate`: one job, everything visible.
 //!
-//! The job is the only one of a sweep: of a file, or of the text that flags make. So values, messages and the id of the job
-//! are those of a sweep.
+//! The job is the only one of a sweep: of a file, or of the text that flags make. So values, messages and the id of the
+//! job are those of a sweep.
 
-use super::exit::{Exit, UsageError};
 use super::output::{self, TextTable};
 use super::plot::picture_file;
-use super::signals;
 use super::sweep::{self, PresetFlag, Variation, changes};
+use super::{Exit, UsageError, catch_signals};
 use crate::figure::simulation;
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
@@ -131,20 +130,13 @@ struct PlotFlags {
 
 impl Arguments {
     fn request(&self) -> Request {
-        let TableFlags {
-            sample,
-            trace,
-            map,
-            profile,
-            contacts,
-            ..
-        } = &self.tables;
+        let tables = &self.tables;
         Request {
-            sample: *sample,
-            trace: trace.is_some() || self.plot.draws(Panel::Force),
-            map: map.is_some() || self.plot.draws(Panel::Map),
-            profile: profile.is_some(),
-            contacts: contacts.is_some(),
+            sample: tables.sample,
+            trace: tables.trace.is_some() || self.plot.draws(Panel::Force),
+            map: tables.map.is_some() || self.plot.draws(Panel::Map),
+            profile: tables.profile.is_some(),
+            contacts: tables.contacts.is_some(),
         }
     }
 }
@@ -156,9 +148,8 @@ impl PlotFlags {
             return Err(format!("--from {from}: must be a finite number >= 0, in s"));
         }
         if from >= longest {
-            return Err(format!(
-                "--from {from}: must lie before the end, {longest} s"
-            ));
+            let problem = "must lie before the end";
+            return Err(format!("--from {from}: {problem}, {longest} s"));
         }
         match self.until {
             Some(until) if !(until > from && until.is_finite()) => Err(format!(
@@ -262,7 +253,7 @@ impl Tables<'_> {
     /// Writes a table, if there is a file for it.
     fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
-        Destination::new(path, Kind::PARQUET)?.write(signals::catch, |file| {
+        Destination::new(path, Kind::PARQUET)?.write(catch_signals, |file| {
             let mut writer = TableWriter::without(self.left_out, file, self.footer)?;
             for row in rows {
                 writer.push(&row)?;
@@ -313,15 +304,14 @@ impl Arguments {
             return Ok(());
         }
         let refused = |problem: String| UsageError(format!("--from {from}: {problem}"));
-        let last = records.trace.last().map(|row| row.time);
-        let last = last
-            .or(records.map.last().map(|row| row.time))
-            .unwrap_or(0.0);
+        let of_trace = records.trace.last().map(|row| row.time);
+        let of_map = records.map.last().map(|row| row.time);
+        let last = of_trace.or(of_map).unwrap_or(0.0);
         if *from >= last {
-            let problem = format!(
+            return Err(refused(format!(
                 "the simulation ended at {last} s; take an earlier instant, or a longer --time"
-            );
-            return Err(refused(problem).into());
+            ))
+            .into());
         }
         let shown = self.shown_times();
         let trace = records.trace.iter().filter(|row| shown.contains(&row.time));
@@ -362,9 +352,8 @@ impl JobFlags {
             ("tolerance", &self.tolerance),
             ("dt", &dt),
         ];
-        let flags = flags
-            .into_iter()
-            .filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
+        let flags = flags.into_iter();
+        let flags = flags.filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
         changes(&Variation {
             settings: self.settings.iter().cloned().chain(flags).collect(),
             axes: Vec::new(),
@@ -374,10 +363,8 @@ impl JobFlags {
 
 /// The parameters as JSON, under their keys.
 fn as_json(parameters: &Parameters) -> String {
-    let entries = Symbol::ALL
-        .into_iter()
-        .map(|symbol| (symbol.key().to_owned(), json!(parameters.get(symbol))));
-    serde_json::Value::Object(entries.collect()).to_string()
+    let entry = |symbol: Symbol| (symbol.key().to_owned(), json!(parameters.get(symbol)));
+    serde_json::Value::Object(Symbol::ALL.map(entry).into_iter().collect()).to_string()
 }
 
 /// What is printed of a job.
@@ -402,19 +389,15 @@ struct Report<'a> {
 
 impl<'a> Report<'a> {
     fn new(job_id: &'a str, measured: &Measurements, wall_seconds: f64) -> Self {
-        let Measurements {
-            slips,
-            summary,
-            averages,
-            ruptures,
-            ..
-        } = measured;
-        let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
+        let summary = &measured.summary;
+        let averages = measured.averages;
+        let slips = measured.slips.iter();
+        let intervals: Vec<f64> = slips.filter_map(|slip| slip.interval).collect();
         let mean = intervals.iter().sum::<f64>() / intervals.len() as f64;
         Self {
             job_id,
             simulated_seconds: summary.end_time,
-            slips: slips.len(),
+            slips: measured.slips.len(),
             mean_interval_seconds: Some(mean).filter(|mean| mean.is_finite()),
             outcome: JobOutcome::of(measured).word(),
             regime: measured.regime().map(Regime::word),
@@ -423,7 +406,7 @@ impl<'a> Report<'a> {
             slip_share: averages.map(|averages| averages.slip_share),
             breaks: summary.breaks,
             reattachments: summary.reattachments,
-            ruptures: *ruptures,
+            ruptures: measured.ruptures,
             steps: summary.steps,
             leaps: summary.leaps,
             wall_seconds,

@@ -1,12 +1,9 @@
 //! `stickslip status`: how far a results directory is.
 
-use super::exit::Exit;
-use super::output;
+use super::{Exit, layout, output};
 use crate::results::Results;
-use crate::results::layout::Layout;
 use crate::run::{Present, Status};
 use crate::table::shown::shown_text;
-use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -32,7 +29,7 @@ pub struct Arguments {
 const JSON_FORMAT: u32 = 3;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
-    let results = Results::read_plan(&Layout::new(&Disk, &arguments.directory))?;
+    let results = Results::read_plan(&layout(&arguments.directory))?;
     let status = crate::run::status(&results)?;
     let overview = status.overview;
     if arguments.json {
@@ -41,11 +38,10 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
         output::pairs(&pairs(&status))?;
         output::lines(status.workers.iter().map(worker_in_words))?;
         for failure in &status.failures {
+            let job = &failure.job_id;
             let reason = shown_text(&failure.reason);
-            output::print(&format!(
-                "failed  {}: {reason}\n  alone: {}\n",
-                failure.job_id, failure.command
-            ))?;
+            let command = &failure.command;
+            output::print(&format!("failed  {job}: {reason}\n  alone: {command}\n"))?;
         }
         if overview.jobs_failed > status.failures.len() as u64 {
             output::print(&output::by_reason(&status.failure_reasons))?;
@@ -69,10 +65,8 @@ fn pairs(status: &Status) -> Vec<(&'static str, String)> {
         let kept = overview.jobs_kept;
         done = format!("{done}, {kept} of them kept of values that the sweep no longer has");
     }
-    let parts = format!(
-        "{} done, {} missing",
-        overview.parts_done, overview.parts_missing
-    );
+    let parts_done = overview.parts_done;
+    let parts = format!("{parts_done} done, {} missing", overview.parts_missing);
     let mut pairs = vec![
         ("sweep", status.name.clone()),
         ("jobs done", done),

@@ -1,14 +1,11 @@
 //! The sweep that a command is about: a file, or a preset, one of the files of the folder `sweeps/`.
 
-use super::exit::UsageError;
-use super::output;
+use super::{UsageError, layout, output};
 use crate::results::Results;
-use crate::results::layout::Layout;
 use crate::results::tables::{recorded_schema, tables_of};
 use crate::single_job;
 use crate::sweep::{Change, Sweep, SweepError, varied};
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
 use anyhow::Result;
 use arrow_schema::FieldRef;
 use clap::Args;
@@ -162,9 +159,7 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
 pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result<Sweep> {
     let sweep = match (file, flag.preset) {
         // A results directory: its current sweep.
-        (Some(folder), _) if folder.is_dir() => {
-            Ok(Results::read(&Layout::new(&Disk, folder))?.sweep().clone())
-        }
+        (Some(folder), _) if folder.is_dir() => Ok(Results::read(&layout(folder))?.sweep().clone()),
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
         (None, None) => return of_flags(&single_job::sweep_text(changes)),

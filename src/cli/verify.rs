@@ -1,12 +1,9 @@
 //! `stickslip verify`: whether a results directory is whole, and what to do if not.
 
-use super::exit::Exit;
-use super::output;
+use super::{Exit, layout, output};
 use crate::results::Results;
-use crate::results::layout::Layout;
 use crate::results::verification::{Problem, Verification};
 use crate::table::shown::{shown, shown_text};
-use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
@@ -48,7 +45,7 @@ struct Report<'a> {
 }
 
 pub fn verify(arguments: &Arguments) -> Result<Exit> {
-    let layout = &Layout::new(&Disk, &arguments.directory);
+    let layout = &layout(&arguments.directory);
     let verification = if arguments.repair {
         Results::repair(layout)?
     } else {
@@ -112,12 +109,8 @@ impl Report<'_> {
             return "nothing".to_owned();
         }
         let count = output::count(parts.len() as u64, "part");
-        let Verification {
-            jobs_missing,
-            jobs_spilled,
-            ..
-        } = *self.verification;
-        let jobs = output::missing(jobs_missing, jobs_spilled);
+        let verification = self.verification;
+        let jobs = output::missing(verification.jobs_missing, verification.jobs_spilled);
         format!("{count}, {jobs}: {}", first_of(parts))
     }
 

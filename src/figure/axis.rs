@@ -1,6 +1,6 @@
 //! Axes: range, scale, and where ticks go.
 
-use crate::sets::{Digits, power_of_ten};
+use crate::sets::{Digits, power_of_ten, with_decimals};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub(super) struct Axis {
     /// What it shows, with its unit; an empty label is not drawn.
     pub(super) label: String,
     /// The same in short, for frames that have no room for it.
-    short_label: Option<String>,
+    pub(super) short_label: Option<String>,
     pub(super) low: f64,
     pub(super) high: f64,
     scale: Scale,
@@ -28,20 +28,20 @@ pub(super) struct Axis {
 const MAX_TICKS: f64 = 6.0;
 /// Fewest numbers that show the scale of an axis.
 const FEWEST: usize = 3;
-/// Mantissas with a number on logarithmic axes: over several decades, over few, and over so short a range that those give
-/// one or two numbers.
+/// Mantissas with a number on logarithmic axes: over several decades, over few, and over so short a range that those
+/// give one or two numbers.
 const MANTISSAS: [&[f64]; 3] = [
     &[1.0],
     &[1.0, 2.0, 5.0],
     &[1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0],
 ];
-/// Numbers of values within these limits are written out, if they need no more decimals than this; others are multiples of a
-/// power of ten that stands in the label.
+/// Numbers of values within these limits are written out, if they need no more decimals than this; others are multiples
+/// of a power of ten that stands in the label.
 const WRITTEN_OUT: std::ops::Range<f64> = 1e-2..1e6;
 const MAX_DECIMALS: usize = 3;
 /// Ratio of the largest to the least value above which a scale is logarithmic.
 const DECADES: f64 = 20.0;
-/// Most ticks of any kind: values of which nothing can come have no end of them.
+/// Largest number of ticks of any kind, as absurd values would give no end of them.
 const MAX_MULTIPLES: usize = 1000;
 /// No quantity is larger than this, nor smaller than its inverse.
 const LARGEST: f64 = 1e100;
@@ -68,22 +68,16 @@ impl Axis {
         } else {
             0
         };
-        let axis = Self {
-            power: Some(power),
-            ..Self::fixed(
-                &with_power(label, power),
-                (low, high),
-                Vec::new(),
-                Vec::new(),
-            )
-        };
-        axis.with_steps(nice_step((high - low) / max_ticks), power)
+        let mut axis = Self::bare(&with_power(label, power), low, high);
+        axis.power = Some(power);
+        axis.set_steps(nice_step((high - low) / max_ticks), power);
+        axis
     }
 
-    fn with_steps(self, step: f64, power: i32) -> Self {
+    fn set_steps(&mut self, step: f64, power: i32) {
         let unit = libm::exp10(f64::from(power));
         let decimals = decimals(step / unit);
-        let ticks = multiples(step, self.low, self.high)
+        self.ticks = multiples(step, self.low, self.high)
             .map(|tick| (tick, number(tick / unit, decimals)))
             .collect();
         // A step of 2 is halved, others are cut in five.
@@ -92,46 +86,26 @@ impl Axis {
         } else {
             5.0
         };
-        let minor = multiples(step / parts, self.low, self.high).collect();
-        Self {
-            ticks,
-            minor,
-            ..self
-        }
+        self.minor = multiples(step / parts, self.low, self.high).collect();
     }
 
-    /// The same axis without ticks between its numbers if they would stand close on this length.
-    pub(super) fn without_dense_ticks(self, length: f64) -> Self {
+    /// Leaves out the ticks between numbers if they would stand close on this length.
+    pub(super) fn thin_out(&mut self, length: f64) {
         const CLOSE: f64 = 5.0;
-        let is_dense = self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length;
-        if is_dense {
-            Self {
-                minor: Vec::new(),
-                ..self
-            }
-        } else {
-            self
+        if self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length {
+            self.minor.clear();
         }
     }
 
     /// The same axis with a number at each of these values, which differ, and no other tick.
-    pub(super) fn with_ticks_at(self, label: &str, values: &[f64]) -> Self {
+    pub(super) fn with_ticks_at(mut self, label: &str, values: &[f64]) -> Self {
         let digits = Digits::THREE.distinguishing(values);
         let ticks = values.iter().map(|&value| (value, digits.typeset(value)));
-        Self {
-            label: label.to_owned(),
-            power: None,
-            ticks: ticks.collect(),
-            minor: Vec::new(),
-            ..self
-        }
-    }
-
-    pub(super) fn with_short_label(self, short_label: Option<String>) -> Self {
-        Self {
-            short_label,
-            ..self
-        }
+        label.clone_into(&mut self.label);
+        self.power = None;
+        self.ticks = ticks.collect();
+        self.minor.clear();
+        self
     }
 
     /// The same axis with three numbers or more, where one or two would not show its scale.
@@ -139,32 +113,27 @@ impl Axis {
         if self.ticks.len() >= FEWEST {
             return self;
         }
-        let has_enough = |axis: &Self| axis.ticks.len() >= FEWEST;
+        let finer = |refine: &dyn Fn(&mut Self)| {
+            let mut axis = self.clone();
+            refine(&mut axis);
+            if self.minor.is_empty() {
+                axis.minor.clear();
+            }
+            (axis.ticks.len() >= FEWEST).then_some(axis)
+        };
         let finer = match (self.scale, self.power) {
             (Scale::Logarithmic, _) => MANTISSAS
                 .into_iter()
-                .map(|mantissas| self.clone().with_mantissas(mantissas))
-                .find(has_enough),
+                .find_map(|mantissas| finer(&|axis| axis.set_mantissas(mantissas))),
             (Scale::Linear, Some(power)) => {
                 let step = nice_step((self.high - self.low) / FEWEST as f64);
-                let steps = [1.0, 0.5, 0.4, 0.2, 0.1].map(|share| nice_step(share * step));
-                steps
+                [1.0, 0.5, 0.4, 0.2, 0.1]
                     .into_iter()
-                    .map(|step| self.clone().with_steps(step, power))
-                    .find(has_enough)
+                    .find_map(|share| finer(&|axis| axis.set_steps(nice_step(share * step), power)))
             }
             (Scale::Linear, None) => None,
         };
-        let is_bare = self.minor.is_empty();
-        let axis = finer.unwrap_or(self);
-        if is_bare {
-            Self {
-                minor: Vec::new(),
-                ..axis
-            }
-        } else {
-            axis
-        }
+        finer.unwrap_or(self)
     }
 
     /// For data: logarithmic where these lie decades apart, and a little wider than they are; `None` without any.
@@ -180,7 +149,11 @@ impl Axis {
 
     /// From `low` to `high`: logarithmic if these lie decades apart.
     pub(super) fn spanning(label: &str, (low, high): (f64, f64)) -> Self {
-        if is_wide((low, high)) {
+        Self::of_scale(is_wide((low, high)), label, low, high)
+    }
+
+    pub(super) fn of_scale(is_log: bool, label: &str, low: f64, high: f64) -> Self {
+        if is_log {
             Self::logarithmic(label, low, high)
         } else {
             Self::linear(label, low, high)
@@ -190,15 +163,14 @@ impl Axis {
     /// Logarithmic from `low` to `high`, both > 0.
     pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
         let [low, high] = [low, high].map(|end| end.clamp(1.0 / LARGEST, LARGEST));
-        let axis = Self {
-            scale: Scale::Logarithmic,
-            ..Self::fixed(label, (low, high), Vec::new(), Vec::new())
-        };
-        axis.with_mantissas(MANTISSAS[usize::from(libm::log10(high / low) < 2.0)])
+        let mut axis = Self::bare(label, low, high);
+        axis.scale = Scale::Logarithmic;
+        axis.set_mantissas(MANTISSAS[usize::from(libm::log10(high / low) < 2.0)]);
+        axis
     }
 
-    fn with_mantissas(self, mantissas: &[f64]) -> Self {
-        let Self { low, high, .. } = self;
+    fn set_mantissas(&mut self, mantissas: &[f64]) {
+        let Self { low, high, .. } = *self;
         // Every decade up to 7 of them, then every second, third, ...
         #[expect(
             clippy::cast_possible_truncation,
@@ -210,8 +182,8 @@ impl Axis {
         } else {
             power_of_ten
         };
-        let mut ticks = Vec::new();
-        let mut minor = Vec::new();
+        self.ticks.clear();
+        self.minor.clear();
         for power in exponent(low)..=exponent(high) {
             let decade = libm::exp10(f64::from(power));
             let between = mantissas
@@ -226,54 +198,42 @@ impl Axis {
                     continue;
                 }
                 if mantissas.contains(&mantissa) && power.rem_euclid(every) == 0 {
-                    ticks.push((value, number(mantissa, power)));
+                    self.ticks.push((value, number(mantissa, power)));
                 } else if every == 1 || mantissa == 1.0 {
-                    minor.push(value);
+                    self.minor.push(value);
                 }
             }
-        }
-        Self {
-            ticks,
-            minor,
-            ..self
         }
     }
 
     /// Angles in rad between multiples of π/2.
     pub(super) fn angle(label: &str, low: f64, high: f64) -> Self {
-        let ticks = multiples(FRAC_PI_2, low, high)
+        let mut axis = Self::bare(label, low, high);
+        axis.ticks = multiples(FRAC_PI_2, low, high)
             .map(|tick| (tick, halves_of_pi(tick)))
             .collect();
-        let minor = multiples(FRAC_PI_2 / 3.0, low, high).collect();
-        Self::fixed(label, (low, high), ticks, minor)
+        axis.minor = multiples(FRAC_PI_2 / 3.0, low, high).collect();
+        axis
     }
 
     /// Words at 0, 1, 2, ...
-    pub(super) fn categories(label: &str, words: &[&str]) -> Self {
-        let ticks = (0..)
-            .map(f64::from)
-            .zip(words.iter().map(|word| (*word).to_owned()))
-            .collect();
-        let high = words.len() as f64 - 0.5;
-        Self::fixed(label, (-0.5, high), ticks, Vec::new())
+    pub(super) fn categories(label: &str, words: &[String]) -> Self {
+        let mut axis = Self::bare(label, -0.5, words.len() as f64 - 0.5);
+        axis.ticks = (0..).map(f64::from).zip(words.iter().cloned()).collect();
+        axis
     }
 
-    fn fixed(
-        label: &str,
-        (low, high): (f64, f64),
-        ticks: Vec<(f64, String)>,
-        minor: Vec<f64>,
-    ) -> Self {
-        let label = label.to_owned();
+    /// Linear, without ticks.
+    fn bare(label: &str, low: f64, high: f64) -> Self {
         Self {
-            label,
+            label: label.to_owned(),
             short_label: None,
             low,
             high,
             scale: Scale::Linear,
             power: None,
-            ticks,
-            minor,
+            ticks: Vec::new(),
+            minor: Vec::new(),
         }
     }
 
@@ -308,17 +268,15 @@ impl Axis {
     }
 
     /// `count` >= 2 values from end to end, evenly placed.
-    pub(super) fn evenly_placed(&self, count: usize) -> impl Iterator<Item = f64> + use<> {
-        let low = self.low;
-        let high = self.high;
-        let scale = self.scale;
-        (0..count).map(move |step| {
+    pub(super) fn evenly_placed(&self, count: usize) -> Vec<f64> {
+        let value = |step: usize| {
             let place = step as f64 / (count - 1) as f64;
-            match scale {
-                Scale::Linear => low + place * (high - low),
-                Scale::Logarithmic => low * libm::exp(place * libm::log(high / low)),
+            match self.scale {
+                Scale::Linear => self.low + place * (self.high - self.low),
+                Scale::Logarithmic => self.low * libm::exp(place * libm::log(self.high / self.low)),
             }
-        })
+        };
+        (0..count).map(value).collect()
     }
 }
 
@@ -385,7 +343,7 @@ fn exponent(value: f64) -> i32 {
     (libm::log10(value) + 1e-9).floor() as i32
 }
 
-/// The least of 1, 2, 5 times a power of ten that is not below `step`.
+/// The smallest of 1, 2, 5 times a power of ten that is at least `step`.
 fn nice_step(step: f64) -> f64 {
     let decade = libm::exp10(f64::from(exponent(step)));
     let nice = [1.0, 2.0, 5.0]
@@ -411,7 +369,7 @@ fn decimals(step: f64) -> usize {
     usize::try_from(-exponent(step)).unwrap_or(0)
 }
 
-/// A label for numbers that are those of the values over a power of ten: with it before the unit.
+/// The label of an axis whose numbers are the values over a power of ten: the power stands before the unit.
 fn with_power(label: &str, power: i32) -> String {
     if power == 0 || label.is_empty() {
         return label.to_owned();
@@ -423,15 +381,9 @@ fn with_power(label: &str, power: i32) -> String {
     }
 }
 
-/// With a true minus sign, and none before zero.
+/// With a true minus sign.
 fn number(value: f64, decimals: usize) -> String {
-    let digits = format!("{:.decimals$}", value.abs());
-    let is_zero = digits.chars().all(|digit| digit == '0' || digit == '.');
-    if value < 0.0 && !is_zero {
-        format!("−{digits}")
-    } else {
-        digits
-    }
+    with_decimals(value, decimals).replace('-', "−")
 }
 
 fn plain_power(mantissa: f64, power: i32) -> String {
@@ -573,7 +525,10 @@ mod tests {
             "it has enough"
         );
         assert_eq!(
-            labels(&enough(Axis::categories("", &["one", "two"]))),
+            labels(&enough(Axis::categories(
+                "",
+                &["one", "two"].map(str::to_owned)
+            ))),
             ["one", "two"]
         );
         for exponent in -12..12 {
@@ -619,7 +574,7 @@ mod tests {
     #[test]
     fn even_places_go_from_end_to_end() {
         let axis = Axis::logarithmic("", 0.2, 1000.0);
-        let values: Vec<f64> = axis.evenly_placed(5).collect();
+        let values = axis.evenly_placed(5);
         assert!((values[0] - 0.2).abs() < 1e-12 && (values[4] - 1000.0).abs() < 1e-9);
         assert!((axis.place(values[2]) - 0.5).abs() < 1e-12);
     }

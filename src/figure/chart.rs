@@ -5,14 +5,17 @@ use super::BadOption;
 use super::axis::Axis;
 use super::frame::{Ends, LEFT, Layout, Place};
 use super::hues::Hues;
-use super::ink::{Dot, Ink, Stroke};
+use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Quantity, parameter, without_value};
-use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, drive_alone};
+use super::style::{
+    BAR_WIDTH, BLACK, Dot, GREY, INKS, Ink, Look, RADIUS, REFERENCE, STRIPE, Stroke, WHITE, dot,
+    drive_alone,
+};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, Swept, Values, ascending, is_same};
+use crate::reduce::{SetRow, Values, is_same};
 use std::collections::BTreeMap;
 
 /// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
@@ -32,14 +35,14 @@ const MAX_LINES: usize = 24;
 pub(super) const LINE_WIDTH: f64 = 1.0;
 /// Sets up to which dots and bars have their full size.
 const FEW_SETS: usize = 200;
-pub(super) const SMALL_RADIUS: f64 = 2.5;
+const SMALL_RADIUS: f64 = 2.5;
 /// By how much the hole in the dot of a set that slides is smaller.
-pub(super) const HOLE: f64 = 1.6;
+const HOLE: f64 = 1.6;
 
 /// Sets against a column: a panel for each quantity and each value of another column.
 pub(super) struct Chart<'a> {
     pub(super) rows: &'a [SetRow],
-    pub(super) swept: &'a [Swept],
+    pub(super) swept: &'a [Values],
     pub(super) x: Quantity<'a>,
     pub(super) ys: Vec<Quantity<'a>>,
     pub(super) colour: Option<Quantity<'a>>,
@@ -47,11 +50,14 @@ pub(super) struct Chart<'a> {
 }
 
 /// How the sets of a chart are drawn.
-pub(super) struct Dots {
-    pub(super) hues: Option<Hues>,
+struct Dots {
+    x_axis: Axis,
+    hues: Option<Hues>,
     radius: f64,
     /// Sets that are joined, line by line.
-    pub(super) lines: Vec<Vec<usize>>,
+    lines: Vec<Vec<usize>>,
+    /// Sets without modulation that are levels.
+    free: Vec<usize>,
 }
 
 impl<'a> Chart<'a> {
@@ -71,9 +77,8 @@ impl<'a> Chart<'a> {
         };
         let y_axes: Vec<Axis> = ys.iter().map(y_axis).collect::<Result<_, BadOption>>()?;
         let is_on = |axis: &Axis, quantity: &Quantity<'_>, set| {
-            quantity
-                .number(set)
-                .is_some_and(|value| axis.contains(value))
+            let number = quantity.number(set);
+            number.is_some_and(|value| axis.contains(value))
         };
         let is_inside = |set: &usize| {
             let mut pairs = ys.iter().zip(&y_axes);
@@ -81,28 +86,26 @@ impl<'a> Chart<'a> {
         };
         let inside: Vec<usize> = sets.iter().copied().filter(is_inside).collect();
         if inside.is_empty() {
-            let problem = format!(
-                "none of {} sets lies within --xlim and --ylim; give wider ones",
-                sets.len()
-            );
-            return Err(x.refuse(&problem));
+            let count = sets.len();
+            return Err(x.refuse(&format!(
+                "none of {count} sets lies within --xlim and --ylim; give wider ones"
+            )));
         }
+        let has_many = inside.len() > FEW_SETS;
         let dots = Dots {
             hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
-            radius: if inside.len() > FEW_SETS {
-                SMALL_RADIUS
-            } else {
-                RADIUS
-            },
+            radius: if has_many { SMALL_RADIUS } else { RADIUS },
             lines: self.lines(&sets),
+            x_axis,
+            free,
         };
         let groups = groups(self.panels.as_ref(), &sets)?;
         let (layout, height) = layout(ys.len(), groups.len());
         let mut panels: Vec<Panel<'_>> = Vec::new();
         for (y, axis) in ys.iter().zip(y_axes) {
             for (title, members) in &groups {
-                let layers = self.layers(y, &x_axis, &dots, members, &free);
-                let mut panel = Panel::new(height, x_axis.clone(), axis.clone(), layers);
+                let layers = self.layers(y, &dots, members);
+                let mut panel = Panel::new(height, dots.x_axis.clone(), axis.clone(), layers);
                 if groups.len() > 1 {
                     if !panels.len().is_multiple_of(layout.columns) {
                         panel.y.label.clear();
@@ -115,8 +118,8 @@ impl<'a> Chart<'a> {
                 panels.push(panel);
             }
         }
-        let look = look.with_note(&self.note(&inside, free.len()));
-        let legend = self.legend(&inside, &free, &dots);
+        let look = look.with_note(&self.note(&inside, dots.free.len()));
+        let legend = self.legend(&inside, &dots);
         Ok(panel::draw(name, &look, layout, &legend, panels))
     }
 
@@ -155,26 +158,19 @@ impl<'a> Chart<'a> {
             return Vec::new();
         };
         // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.
-        if self
-            .colour
-            .as_ref()
-            .is_some_and(|colour| colour.symbol.is_none())
+        let mut colour = self.colour.iter();
+        if colour.any(|colour| colour.symbol.is_none())
             || self.ys.iter().any(|y| y.symbol.is_some())
         {
             return Vec::new();
         }
-        let others: Vec<_> = self
-            .swept
-            .iter()
-            .filter(|other| parameter(other.name()) != Some(symbol))
-            .map(Swept::places)
-            .collect();
+        let is_other = |swept: &&Values| parameter(swept.name()) != Some(symbol);
+        let others = self.swept.iter().filter(is_other);
+        let others: Vec<_> = others.map(Values::places).collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
         for &set in sets {
-            lines
-                .entry(others.iter().map(|places| places[set]).collect())
-                .or_default()
-                .push(set);
+            let key = others.iter().map(|places| places[set]).collect();
+            lines.entry(key).or_default().push(set);
         }
         let mut lines: Vec<Vec<usize>> =
             lines.into_values().filter(|line| line.len() > 1).collect();
@@ -197,20 +193,10 @@ impl<'a> Chart<'a> {
     }
 
     /// Sets as dots, joined, with their intervals along both axes, over those without modulation and the drive's part.
-    fn layers(
-        &self,
-        y: &Quantity<'_>,
-        x_axis: &Axis,
-        dots: &Dots,
-        members: &[usize],
-        free: &[usize],
-    ) -> Vec<Layer<'a>> {
+    fn layers(&self, y: &Quantity<'_>, dots: &Dots, members: &[usize]) -> Vec<Layer<'a>> {
         let level = |set: &usize| {
-            let ink = if dots.hues.is_some() {
-                self.ink(dots, *set)
-            } else {
-                GREY
-            };
+            let hues = dots.hues.as_ref();
+            let ink = hues.map_or(GREY, |_| self.ink(dots, *set));
             Some(Layer::Level(y.number(*set)?, Stroke { ink, ..REFERENCE }))
         };
         let mut layers: Vec<Layer<'a>> = Vec::new();
@@ -218,13 +204,10 @@ impl<'a> Chart<'a> {
         if y.name() == "slip_share" {
             layers.extend(Regime::MIN_SHARES.map(|share| Layer::Level(share, REFERENCE)));
         }
-        layers.extend(free.iter().filter_map(level));
+        layers.extend(dots.free.iter().filter_map(level));
         for line in &dots.lines {
-            let line: Vec<usize> = line
-                .iter()
-                .copied()
-                .filter(|set| members.contains(set))
-                .collect();
+            let mut line = line.clone();
+            line.retain(|set| members.contains(set));
             self.add_line(&mut layers, y, dots, &line);
         }
         if dots.lines.is_empty() {
@@ -233,7 +216,7 @@ impl<'a> Chart<'a> {
             layers.push(Layer::Dots(alone.collect(), dot));
         }
         for &set in members {
-            self.add_bars(&mut layers, y, x_axis, dots, set);
+            self.add_bars(&mut layers, y, dots, set);
         }
         let mut all = vec![Layer::Inside(layers)];
         for &set in members {
@@ -278,55 +261,127 @@ impl<'a> Chart<'a> {
     }
 
     /// The intervals of a set along both axes.
-    fn add_bars(
-        &self,
-        layers: &mut Vec<Layer<'a>>,
-        y: &Quantity<'_>,
-        x_axis: &Axis,
-        dots: &Dots,
-        set: usize,
-    ) {
+    fn add_bars(&self, layers: &mut Vec<Layer<'a>>, y: &Quantity<'_>, dots: &Dots, set: usize) {
         let Some((at_x, at_y)) = self.place(y, set) else {
             return;
         };
-        let width = if dots.radius < RADIUS {
-            LINE_WIDTH
-        } else {
-            BAR_WIDTH
-        };
+        let is_small = dots.radius < RADIUS;
+        let width = if is_small { LINE_WIDTH } else { BAR_WIDTH };
         let stroke = Stroke::solid(self.ink(dots, set), width);
         if let Some(ends) = y.interval(set) {
             layers.push(Layer::Bars(vec![(at_x, ends)], stroke));
         }
         if let Some((low, high)) = self.x.interval(set) {
-            let left = if x_axis.place(low).is_finite() {
-                low
-            } else {
-                x_axis.low
-            };
+            let is_finite = dots.x_axis.place(low).is_finite();
+            let left = if is_finite { low } else { dots.x_axis.low };
             layers.push(Layer::Curve(vec![(left, at_y), (high, at_y)], stroke));
         }
     }
 
-    pub(super) fn slides(&self, set: usize) -> bool {
+    fn slides(&self, set: usize) -> bool {
         self.rows[set].regime == Some(Regime::Sliding)
     }
 
     /// Amplitudes at which the paper finds a significant reduction of the friction to begin, on the x axis.
-    pub(super) fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
+    fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
         let is_fixed = |symbol| {
-            self.swept
-                .iter()
-                .all(|swept| parameter(swept.name()) != Some(symbol))
+            let mut swept = self.swept.iter();
+            swept.all(|swept| parameter(swept.name()) != Some(symbol))
         };
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
-        let free = self
-            .rows
-            .iter()
-            .find(|row| row.parameters.modulation_period.is_none());
+        let mut rows = self.rows.iter();
+        let free = rows.find(|row| row.parameters.modulation_period.is_none());
         let free = free.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
         Some((REDUCTION.0 * unit, REDUCTION.1 * unit))
+    }
+}
+
+/// What the marks mean: the legend and the small print.
+impl Chart<'_> {
+    /// The meaning of each mark that is drawn.
+    fn legend(&self, inside: &[usize], dots: &Dots) -> Vec<Entry> {
+        let mut entries = Vec::new();
+        if let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) {
+            let numbers: Vec<Option<f64>> = inside.iter().map(|&set| colour.number(set)).collect();
+            entries.extend(hues.entries(RADIUS, |value| numbers.contains(&Some(value))));
+            if numbers.contains(&None) {
+                let text = without_value(&colour.column);
+                entries.push(entry(Mark::Dot(dot(GREY)), text));
+            }
+        }
+        if !dots.free.is_empty() {
+            entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
+        }
+        if inside.iter().any(|&set| self.slides(set)) {
+            entries.push(entry(Mark::Ring(BLACK, RADIUS, RADIUS - HOLE), "sliding"));
+        }
+        if self.ys.iter().any(|y| y.name() == "slip_share") {
+            let [mixed, sliding] = Regime::MIN_SHARES;
+            let text = format!("mixed above {mixed}, sliding above {sliding}");
+            entries.push(entry(Mark::Line(REFERENCE), text));
+        }
+        if self.ys.iter().any(|y| y.drive.is_some()) {
+            let mark = if dots.lines.is_empty() {
+                Mark::Dot(Dot::solid(GREY, SMALL_RADIUS))
+            } else {
+                Mark::Line(drive_alone(BLACK))
+            };
+            entries.push(entry(mark, "by the drive alone"));
+        }
+        if self.ys.iter().any(|y| self.reduction(y).is_some()) {
+            let text = "K_d Δ = 0.2 to 0.3 of the peak force: friction falls, says the paper";
+            entries.push(entry(Mark::Patch(STRIPE), text));
+        }
+        entries
+    }
+
+    /// Swept parameters that nothing shows.
+    fn pooled(&self) -> Option<String> {
+        let asked = [Some(&self.x), self.colour.as_ref()]
+            .into_iter()
+            .flatten()
+            .chain(&self.ys)
+            .map(Quantity::name);
+        let names = asked.chain(self.panels.as_ref().map(|panels| &*panels.column.name));
+        let words = names
+            .flat_map(|name| name.split(|letter: char| !letter.is_alphanumeric() && letter != '_'));
+        let shown: Vec<Option<Symbol>> = words.map(parameter).collect();
+        let pooled = self
+            .swept
+            .iter()
+            .filter(|swept| !shown.contains(&parameter(swept.name())));
+        let symbols: Vec<String> = pooled.map(|swept| swept.label().symbol).collect();
+        (!symbols.is_empty())
+            .then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))
+    }
+
+    /// What bars are, and what is not there.
+    fn note(&self, inside: &[usize], levels: usize) -> String {
+        let mut notes = Vec::new();
+        let has_bars = |y: &Quantity<'_>| inside.iter().any(|&set| y.interval(set).is_some());
+        if self.ys.iter().any(has_bars) {
+            notes.push("bars: 95 %".to_owned());
+        }
+        let count = self.rows.len();
+        let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));
+        let is_still = |set: &usize| {
+            shows_intervals && self.slides(*set) && self.rows[*set].tau_mean.is_none()
+        };
+        let still: Vec<usize> = (0..count).filter(is_still).collect();
+        if !still.is_empty() {
+            let slide = still.len();
+            notes.push(format!("{slide} of {count} sets slide: no intervals"));
+        }
+        let still_outside = still.iter().filter(|set| !inside.contains(set)).count();
+        let left_out = count - inside.len() - levels - still_outside;
+        if left_out > 0 {
+            notes.push(format!(
+                "not shown: {left_out} of {count} sets, without a value or outside the axes"
+            ));
+        }
+        notes.extend(self.pooled());
+        notes.join("; ")
     }
 }
 
@@ -357,24 +412,16 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
     let Some(values) = panels else {
         return Ok(vec![(String::new(), sets.to_vec())]);
     };
-    let of = |value: f64| {
+    let of = |&value: &f64| {
         let is_of = |set: &usize| values.numbers[*set].is_some_and(|number| is_same(value, number));
-        (
-            values.setting(value),
-            sets.iter().copied().filter(is_of).collect::<Vec<_>>(),
-        )
+        let sets: Vec<usize> = sets.iter().copied().filter(is_of).collect();
+        (values.setting(value), sets)
     };
-    let mut groups: Vec<_> = ascending(values.numbers.iter().copied().flatten())
-        .into_iter()
-        .map(of)
-        .collect();
+    let mut groups: Vec<_> = values.distinct.iter().map(of).collect();
     groups.retain(|(_, sets)| !sets.is_empty());
     // Sets without a value, such as a frequency at Δ = 0, have a separate panel.
-    let without: Vec<usize> = sets
-        .iter()
-        .copied()
-        .filter(|&set| values.numbers[set].is_none())
-        .collect();
+    let mut without = sets.to_vec();
+    without.retain(|&set| values.numbers[set].is_none());
     if !groups.is_empty() && !without.is_empty() {
         groups.insert(0, (without_value(values), without));
     }

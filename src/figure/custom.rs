@@ -3,7 +3,7 @@
 use super::chart::Chart;
 use super::quantity::{Limits, Quantity, parameter};
 use super::{BadOption, Look, Picture};
-use crate::reduce::{SetRow, Swept, swept};
+use crate::reduce::{SetRow, Values, swept};
 
 /// What a custom figure shows.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,7 +47,7 @@ pub(super) fn custom(
     };
     let panels = named("panels", &figure.panels)?;
     let swept = swept(rows);
-    let is_free = |swept: &&Swept| {
+    let is_free = |swept: &&Values| {
         let symbol = parameter(swept.name());
         x.symbol != symbol && panels.as_ref().is_none_or(|panels| panels.symbol != symbol)
     };
@@ -67,7 +67,7 @@ pub(super) fn custom(
         x,
         ys: vec![y],
         colour,
-        panels: panels.map(|panels| panels.column.values),
+        panels: panels.map(|panels| panels.column),
     }
     .draw(&name, look)
 }

@@ -2,14 +2,15 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::frame::{Ends, Layout};
-use super::ink::{Dot, Ink, Stroke};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Anchor, Picture};
-use super::sets::axis_of;
-use super::style::{GRID, INKS, LEGEND_TEXT, Look};
+use super::quantity::axis_of;
+use super::style::{Dot, GRID, INKS, Ink, LEGEND_TEXT, Look, Stroke};
 use crate::reduce::{Point, RampStage, quantile};
 use crate::sets::label;
+
+pub(super) const NAME: &str = "drag";
 
 /// Space right of the frames for the numbers of lines.
 const NUMBERS: f64 = 66.0;
@@ -32,57 +33,50 @@ const MIN_INTERVALS: usize = 8;
 /// Places of the medians of the stages, from the middle of their bin in its widths.
 const OFFSETS: [f64; 2] = [-0.12, 0.12];
 
-/// A slip under a ramp, in the units of the axes: its stage, T or Δ at the onset, the interval, and this in periods.
-type Slip = (usize, f64, f64, f64);
+/// A slip under a ramp, in the units of the axes.
+struct Slip {
+    /// Its place in [`STAGES`].
+    stage: usize,
+    /// T or Δ at the onset.
+    x: f64,
+    tau: f64,
+    /// τ/T.
+    ratio: f64,
+}
 
 /// Draws interval against period at the onset, or against amplitude if it is the amplitude alone that is ramped; `None`
 /// if no slip has an interval on a ramp.
 pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let stage = |point: &Point| {
-        STAGES
-            .iter()
-            .position(|(stage, ..)| point.ramp_stage == Some(*stage))
+        let mut stages = STAGES.iter();
+        stages.position(|(stage, ..)| point.ramp_stage == Some(*stage))
     };
-    let ramped = || {
-        points
-            .iter()
-            .filter(|point| stage(point).is_some() && point.interval.is_some())
-    };
-    let is_period =
-        bounds(ramped().filter_map(|point| point.period)).is_some_and(|(low, high)| high > low);
-    let modulation = |point: &Point| {
-        if is_period {
-            point.period
-        } else {
-            Some(point.amplitude)
-        }
-    };
-    let (x_label, x_factor) = axis_of(
-        if is_period { "T" } else { "Delta" },
-        ramped().filter_map(modulation),
-    );
-    let (factor, unit) =
-        label("tau_mean").scale(bounds(ramped().filter_map(|point| point.interval))?.1);
+    let is_ramped = |point: &&Point| stage(point).is_some() && point.interval.is_some();
+    let ramped = || points.iter().filter(is_ramped);
+    let periods = bounds(ramped().filter_map(|point| point.period));
+    let is_period = periods.is_some_and(|(low, high)| high > low);
+    let amplitude = |point: &Point| Some(point.amplitude).filter(|_| !is_period);
+    let modulation = |point: &Point| amplitude(point).or(point.period);
+    let column = if is_period { "T" } else { "Delta" };
+    let (x_label, x_factor) = axis_of(column, ramped().filter_map(modulation));
+    let longest = bounds(ramped().filter_map(|point| point.interval))?.1;
+    let (factor, unit) = label("tau_mean").scale(longest);
     let slip = |point: &Point| {
-        let period = point.period?;
-        let interval = point.interval?;
-        Some((
-            stage(point)?,
-            x_factor * modulation(point)?,
-            factor * interval,
-            interval / period,
-        ))
+        Some(Slip {
+            stage: stage(point)?,
+            x: x_factor * modulation(point)?,
+            tau: factor * point.interval?,
+            ratio: point.interval? / point.period?,
+        })
     };
     let slips: Vec<Slip> = ramped().filter_map(slip).collect();
-    let ends = bounds(slips.iter().map(|slip| slip.1))?;
-    let taus = widened(bounds(slips.iter().map(|slip| slip.2))?);
+    let ends = bounds(slips.iter().map(|slip| slip.x))?;
+    let taus = widened(bounds(slips.iter().map(|slip| slip.tau))?);
     let ratios = ratios(slips.iter());
     let [least, most] = [quantile(&ratios, RARE)?, quantile(&ratios, 1.0 - RARE)?];
-    let multiples = || {
-        (1..=u32::MAX)
-            .map(f64::from)
-            .take_while(|&n| ratios.last().is_some_and(|most| n < most + 0.5))
-    };
+    let largest = *ratios.last()?;
+    let whole = (1..=u32::MAX).map(f64::from);
+    let multiples = || whole.clone().take_while(|&n| n < largest + 0.5);
 
     let (low, high) = widened(ends);
     let x = Axis::linear(&x_label, low, high);
@@ -91,24 +85,16 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let entries: Vec<Entry> = medians.into_iter().chain([lines]).collect();
     // τ = nT is a curve in T, and level in Δ.
     let period = ramped().find_map(|point| point.period)?;
-    let line = |n: f64| {
-        [low, high].map(|at| {
-            (
-                at,
-                n * factor * if is_period { at / x_factor } else { period },
-            )
-        })
-    };
+    let period_at = |at: f64| if is_period { at / x_factor } else { period };
+    let line = |n: f64| [low, high].map(|at| (at, n * factor * period_at(at)));
     // Slip by slip, so that neither stage covers the other.
-    let dots = slips.iter().map(|&(stage, x, tau, _)| {
-        Layer::Dots(
-            vec![(x, tau)],
-            Dot {
-                ink: STAGES[stage].2,
-                radius: 2.0,
-                opacity: 0.45,
-            },
-        )
+    let dots = slips.iter().map(|slip| {
+        let dot = Dot {
+            ink: STAGES[slip.stage].2,
+            radius: 2.0,
+            opacity: 0.45,
+        };
+        Layer::Dots(vec![(slip.x, slip.tau)], dot)
     });
     // Where lines leave the frame: at its right, or through its top.
     let end = |n: f64| {
@@ -121,33 +107,19 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let numbers = Layer::Drawn(Box::new(move |sheet, frame| {
         for (n, end) in ends_of_lines {
             let (x, y) = frame.place(end);
-            let y = y.max(frame.top + BELOW_TOP);
-            sheet.centred_text(
-                (x + 6.0, y),
-                &format!("n = {n}"),
-                LEGEND_TEXT,
-                Anchor::Start,
-            );
+            let place = (x + 6.0, y.max(frame.top + BELOW_TOP));
+            sheet.centred_text(place, &format!("n = {n}"), LEGEND_TEXT, Anchor::Start);
         }
     }));
-    let lines = Layer::Inside(
-        multiples()
-            .map(|n| Layer::Curve(line(n).into(), GRID))
-            .chain(dots)
-            .collect(),
-    );
+    let lines = multiples().map(|n| Layer::Curve(line(n).into(), GRID));
+    let lines = Layer::Inside(lines.chain(dots).collect());
     let tau = Axis::linear(&format!("Slip interval τ ({unit})"), taus.0, taus.1);
     let upper = Panel::new(320.0, x.clone(), tau, vec![lines, numbers]);
     let ratio = Axis::linear("Median and quartiles of τ / T", least - 0.3, most + 0.3);
     let levels = multiples().map(|n| Layer::Level(n, GRID));
     let lower = Panel::inside(210.0, x, ratio, levels.chain(medians_of(&slips, ends)));
-    Some(panel::draw(
-        "drag",
-        look,
-        LAYOUT,
-        &entries,
-        vec![upper, lower],
-    ))
+    let panels = vec![upper, lower];
+    Some(panel::draw(NAME, look, LAYOUT, &entries, panels))
 }
 
 /// Medians and quartiles of τ/T in bins of the modulation, of both stages.
@@ -157,25 +129,21 @@ fn medians_of<'a>(slips: &[Slip], (low, high): Ends) -> Vec<Layer<'a>> {
     for (stage, (_, _, ink)) in STAGES.into_iter().enumerate() {
         for bin in 0..BINS {
             let start = low + f64::from(bin) * width;
-            let end = if bin + 1 == BINS {
+            let is_last = bin + 1 == BINS;
+            let end = if is_last {
                 f64::INFINITY
             } else {
                 start + width
             };
-            let ratios = ratios(
-                slips
-                    .iter()
-                    .filter(|slip| slip.0 == stage && (start..end).contains(&slip.1)),
-            );
+            let is_in_bin = |slip: &&Slip| slip.stage == stage && (start..end).contains(&slip.x);
+            let ratios = ratios(slips.iter().filter(is_in_bin));
             let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share));
             if let [Some(first), Some(median), Some(third)] = quartiles
                 && ratios.len() >= MIN_INTERVALS
             {
                 let x = start + (0.5 + OFFSETS[stage]) * width;
-                layers.push(Layer::Bars(
-                    vec![(x, (first, third))],
-                    Stroke::solid(ink, 2.0),
-                ));
+                let stroke = Stroke::solid(ink, 2.0);
+                layers.push(Layer::Bars(vec![(x, (first, third))], stroke));
                 layers.push(Layer::Dots(vec![(x, median)], Dot::solid(ink, 4.5)));
             }
         }
@@ -185,7 +153,7 @@ fn medians_of<'a>(slips: &[Slip], (low, high): Ends) -> Vec<Layer<'a>> {
 
 /// τ/T of some slips, ascending.
 fn ratios<'a>(slips: impl Iterator<Item = &'a Slip>) -> Vec<f64> {
-    let mut ratios: Vec<f64> = slips.map(|slip| slip.3).collect();
+    let mut ratios: Vec<f64> = slips.map(|slip| slip.ratio).collect();
     ratios.sort_by(f64::total_cmp);
     ratios
 }

@@ -2,15 +2,15 @@
 
 use super::axis::Axis;
 use super::frame::Layout;
-use super::ink::{Dot, Stroke};
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::MAX_TICKS;
-use super::sets::axis_of;
-use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
+use super::quantity::{MAX_TICKS, axis_of, distinct};
+use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, Stroke, dot};
 use crate::model::Symbol;
-use crate::reduce::{EdgeRow, FREQUENCY, ascending};
+use crate::reduce::{EdgeRow, FREQUENCY, Interval, ascending};
+
+pub(super) const NAME: &str = "edges";
 
 /// A parameter of a row, or the frequency.
 fn value(key: &str, edge: &EdgeRow) -> Option<f64> {
@@ -40,11 +40,8 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let (y_label, y_factor) = axis_of(refined, edges.iter().filter_map(|edge| edge.edge));
     let place = |edge: &EdgeRow| Some((x_factor * value(key, edge)?, y_factor * edge.edge?));
     let bar = |edge: &EdgeRow| {
-        let interval = edge.edge_interval?;
-        Some((
-            place(edge)?.0,
-            (y_factor * interval.low, y_factor * interval.high),
-        ))
+        let Interval { low, high } = edge.edge_interval?;
+        Some((place(edge)?.0, (y_factor * low, y_factor * high)))
     };
     let places = || edges.iter().filter_map(place);
     let ends = edges
@@ -59,36 +56,21 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
         x.with_ticks_at(&x_label, &known)
     };
     let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
-    let mut statistics: Vec<&str> = Vec::new();
-    for EdgeRow { statistic, .. } in edges {
-        if !statistics.contains(&&**statistic) {
-            statistics.push(statistic);
-        }
-    }
+    let statistics = distinct(edges.iter().map(|edge| &*edge.statistic));
     let mut legend = Vec::new();
     let mut layers = Vec::new();
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
-        legend.push(entry(
-            Mark::Bar(dot(ink)),
-            format!("{}, 95 %", of_it().next()?.crossed()),
-        ));
-        layers.push(Layer::Bars(
-            of_it().filter_map(bar).collect(),
-            Stroke::solid(ink, BAR_WIDTH),
-        ));
-        layers.push(Layer::Dots(
-            of_it().filter_map(place).collect(),
-            Dot::solid(ink, 0.7 * RADIUS),
-        ));
+        let text = format!("{}, 95 %", of_it().next()?.crossed());
+        legend.push(entry(Mark::Bar(dot(ink)), text));
+        let stroke = Stroke::solid(ink, BAR_WIDTH);
+        layers.push(Layer::Bars(of_it().filter_map(bar).collect(), stroke));
+        let dot = Dot::solid(ink, 0.7 * RADIUS);
+        layers.push(Layer::Dots(of_it().filter_map(place).collect(), dot));
     }
-    Some(panel::draw(
-        "edges",
-        look,
-        Layout::column(490.0),
-        &legend,
-        vec![Panel::new(300.0, x, y, layers)],
-    ))
+    let layout = Layout::column(490.0);
+    let panels = vec![Panel::new(300.0, x, y, layers)];
+    Some(panel::draw(NAME, look, layout, &legend, panels))
 }
 
 #[cfg(test)]
@@ -96,7 +78,6 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
-    use crate::reduce::Interval;
 
     fn edge(drive_velocity: f64, statistic: &str, edge: Option<f64>) -> EdgeRow {
         EdgeRow {

@@ -1,11 +1,12 @@
-//! Frames: rectangles with two axes and the data in them. A layout places them on a sheet, with the legend above and the
-//! small print under them.
+//! Frames: rectangles with two axes and the data in them. A layout places them on a sheet, with the legend above and
+//! the small print under them.
 
 use super::axis::Axis;
-use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
 use super::picture::{Anchor, Picture, snapped};
-use super::style::{AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT};
+use super::style::{
+    AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT, text_width,
+};
 
 /// A point of data.
 pub(super) type Place = (f64, f64);
@@ -46,7 +47,7 @@ const NOTE_ROW: f64 = 16.0;
 const Y_LABEL_RISE: f64 = 13.0;
 /// By how much a cell reaches under a neighbour that is drawn later: viewers that scale would show a seam.
 pub(super) const OVERLAP: f64 = 0.5;
-/// Shortest side of a frame; a sheet that is asked to be smaller becomes larger.
+/// Shortest side of a frame. If the requested sheet has no room for it, the sheet becomes larger.
 const SHORTEST: f64 = 60.0;
 
 /// Frames of a figure, in rows and columns; numbers and label of the x axes stand under the lowest row only.
@@ -75,7 +76,7 @@ impl Layout {
         }
     }
 
-    /// Frames with these heights of the rows on a sheet of the size that is asked for, under this legend.
+    /// Places rows of frames with these heights on a sheet of the requested size, under this legend.
     pub(super) fn page(
         self,
         name: &str,
@@ -145,7 +146,7 @@ fn wrapped(text: &str, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ').filter(|word| !word.is_empty()) {
         match lines.last_mut() {
-            Some(line) if font::width(&format!("{line} {word}"), NOTE_TEXT) <= width => {
+            Some(line) if text_width(&format!("{line} {word}"), NOTE_TEXT) <= width => {
                 line.push(' ');
                 line.push_str(word);
             }
@@ -171,22 +172,19 @@ pub(super) struct Page {
 impl Page {
     /// The frame in a row and a column, both from 0. One of several has a letter.
     pub(super) fn frame(&self, row: usize, column: usize, x: Axis, y: Axis) -> Frame {
-        let Layout {
-            columns,
-            width,
-            column_gap,
-            row_gap: gap,
-            ..
-        } = self.layout;
+        let Self {
+            layout, heading, ..
+        } = *self;
+        let columns = layout.columns;
         let above: f64 = self.heights[..row]
             .iter()
-            .map(|height| height + gap + self.heading)
+            .map(|height| height + layout.row_gap + heading)
             .sum();
         let is_alone = columns * self.heights.len() == 1;
         let letter = u8::try_from(row * columns + column)
             .ok()
             .and_then(|index| b'a'.checked_add(index));
-        let start = |column: usize| MARGIN + column as f64 * (width + column_gap);
+        let start = |column: usize| MARGIN + column as f64 * (layout.width + layout.column_gap);
         // The same in all columns, so that they are labelled alike.
         let end = if columns > 1 {
             self.end.min(start(column + 1) - LABEL_GAP)
@@ -197,13 +195,13 @@ impl Page {
             left: start(column) - MARGIN + LEFT,
             room: (start(column), end),
             // Over headings there is one for a row.
-            y_label_end: if self.heading > 0.0 { self.end } else { end },
-            top: self.top + above + self.heading,
-            width,
+            y_label_end: if heading > 0.0 { self.end } else { end },
+            top: self.top + above + heading,
+            width: layout.width,
             height: self.heights[row],
             x,
             y,
-            heading: self.heading,
+            heading,
             letter: letter.filter(|_| !is_alone).map(char::from),
             is_lowest: row + 1 == self.heights.len(),
         }
@@ -259,16 +257,16 @@ impl Frame {
     pub(super) fn axes(&self, sheet: &mut Picture) {
         let right = self.right();
         let bottom = self.bottom();
-        let [x_axis, y_axis] =
-            [(&self.x, self.width), (&self.y, self.height)].map(|(axis, length)| {
-                match sheet.style {
-                    Style::Screen => axis.clone(),
-                    Style::Print => axis
-                        .clone()
-                        .with_enough_numbers()
-                        .without_dense_ticks(length),
-                }
-            });
+        let for_style = |axis: &Axis, length| {
+            let mut axis = axis.clone();
+            if sheet.style == Style::Print {
+                axis = axis.with_enough_numbers();
+                axis.thin_out(length);
+            }
+            axis
+        };
+        let x_axis = for_style(&self.x, self.width);
+        let y_axis = for_style(&self.y, self.height);
         for (value, length) in ticks(&x_axis) {
             let x = self.x_of(value);
             sheet.line(vec![(x, bottom), (x, bottom - length)], AXIS);
@@ -288,6 +286,11 @@ impl Frame {
         for corner in 0..4 {
             sheet.line(vec![corners[corner], corners[(corner + 1) % 4]], AXIS);
         }
+        self.numbers(sheet, &x_axis, &y_axis);
+        self.labels(sheet);
+    }
+
+    fn numbers(&self, sheet: &mut Picture, x_axis: &Axis, y_axis: &Axis) {
         let height = f64::from(TICK_TEXT);
         // Where a frame is small, numbers that would meet their neighbours are left out, and those that would be cut.
         let mut free = f64::INFINITY;
@@ -302,43 +305,34 @@ impl Frame {
         let mut free = EDGE;
         for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
             let x = self.x_of(*value);
-            let half = 0.5 * font::width(number, TICK_TEXT);
+            let half = 0.5 * text_width(number, TICK_TEXT);
             if x - half >= free && x + half <= sheet.scene.width - EDGE {
-                sheet.text(
-                    (x, bottom + 1.3 * height),
-                    number,
-                    TICK_TEXT,
-                    Anchor::Middle,
-                );
+                let place = (x, self.bottom() + 1.3 * height);
+                sheet.text(place, number, TICK_TEXT, Anchor::Middle);
                 free = x + half + 0.3 * height;
             }
         }
+    }
+
+    fn labels(&self, sheet: &mut Picture) {
         let (label, size) = self.y_label();
         if !label.is_empty() {
-            sheet.text(
-                (self.room.0, self.top - self.heading - Y_LABEL_RISE),
-                &label,
-                size,
-                Anchor::Start,
-            );
+            let place = (self.room.0, self.top - self.heading - Y_LABEL_RISE);
+            sheet.text(place, &label, size, Anchor::Start);
         }
         if self.is_lowest {
             let (start, end) = self.room;
             let (label, size) = fitted_label("", &self.x, end - start);
-            let half = 0.5 * font::width(&label, size);
-            let middle = (self.left + 0.5 * self.width)
-                .min(end - half)
-                .max(start + half);
-            sheet.text(
-                (middle, bottom + UNDER - 12.0),
-                &label,
-                size,
-                Anchor::Middle,
-            );
+            let half = 0.5 * text_width(&label, size);
+            let middle = self.left + 0.5 * self.width;
+            let middle = middle.min(end - half).max(start + half);
+            let place = (middle, self.bottom() + UNDER - 12.0);
+            sheet.text(place, &label, size, Anchor::Middle);
         }
     }
 
-    /// Letter and label of the y axis, above its numbers, and their size; the letter of a frame with a heading goes there.
+    /// Letter and label of the y axis, above its numbers, and their size; the letter of a frame with a heading goes
+    /// there.
     fn y_label(&self) -> (String, u32) {
         let letter = self
             .letter
@@ -351,19 +345,16 @@ impl Frame {
     /// Where the label of the y axis ends.
     pub(super) fn y_label_end(&self) -> f64 {
         let (label, size) = self.y_label();
-        self.room.0 + font::width(&label, size)
+        self.room.0 + text_width(&label, size)
     }
 
     /// What the frame shows, above it, after its letter.
     pub(super) fn heading(&self, sheet: &mut Picture, text: &str) {
         let y = self.top - 9.0;
         if let Some(letter) = self.letter {
-            sheet.text(
-                (self.left - LEFT + MARGIN, y),
-                &format!("({letter})"),
-                LABEL_TEXT,
-                Anchor::Start,
-            );
+            let place = (self.left - LEFT + MARGIN, y);
+            let letter = format!("({letter})");
+            sheet.text(place, &letter, LABEL_TEXT, Anchor::Start);
         }
         let (text, size) = fitted(text, LEGEND_TEXT, self.room.1 - self.left);
         sheet.text((self.left, y), &text, size, Anchor::Start);
@@ -374,7 +365,7 @@ impl Frame {
 pub(super) fn fitting(text: &str, size: u32, room: f64) -> Option<u32> {
     (NOTE_TEXT..=size)
         .rev()
-        .find(|&size| font::width(text, size) <= room)
+        .find(|&size| text_width(text, size) <= room)
 }
 
 /// A text and its size, up to one: smaller where there is little room, and cut at worst.
@@ -383,14 +374,14 @@ fn fitted(text: &str, size: u32, room: f64) -> (String, u32) {
         return (text.to_owned(), size);
     }
     let mut cut = text.to_owned();
-    while cut.pop().is_some() && font::width(&format!("{cut}…"), NOTE_TEXT) > room {}
+    while cut.pop().is_some() && text_width(&format!("{cut}…"), NOTE_TEXT) > room {}
     (format!("{}…", cut.trim_end()), NOTE_TEXT)
 }
 
 /// The label of an axis after a letter, in short where there is little room, and its size.
 fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
     let [long, short] = [&axis.label, axis.short_label()].map(|label| format!("{letter}{label}"));
-    let label = if font::width(&long, LABEL_TEXT) <= room {
+    let label = if text_width(&long, LABEL_TEXT) <= room {
         long
     } else {
         short
@@ -476,7 +467,8 @@ mod tests {
     fn labels_and_numbers_of_small_figures_are_neither_cut_nor_overlap() {
         let long = "Standard deviation of the intervals between slips, tau_sd (s)";
         let x = Axis::linear(long, 0.0, 1000.0);
-        let y = Axis::logarithmic(long, 3e-9, 8e-9).with_short_label(Some("tau_sd (s)".to_owned()));
+        let mut y = Axis::logarithmic(long, 3e-9, 8e-9);
+        y.short_label = Some("tau_sd (s)".to_owned());
         for size in [(60.0, 40.0), (86.0, 60.0), (178.0, 60.0)] {
             let (width, texts) = texts(Style::Print, size, &x, &y);
             assert!(
@@ -521,7 +513,7 @@ mod tests {
     fn small_print_is_wrapped_at_spaces_and_complete() {
         let lines = wrapped(
             "alpha beta  gamma\u{a0}delta epsilon",
-            font::width("alpha beta g", NOTE_TEXT),
+            text_width("alpha beta g", NOTE_TEXT),
         );
         assert_eq!(lines, ["alpha beta", "gamma delta", "epsilon"]);
         assert_eq!(wrapped("longerthanaline", 10.0), ["longerthanaline"]);

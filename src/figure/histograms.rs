@@ -1,16 +1,16 @@
 //! Histograms of τ (Fig. 2d-f): one panel per set, one under the other on a common axis.
 
 use super::axis::{Axis, bounds, widened};
-use super::font;
 use super::frame::{Frame, Layout, OVERLAP, Place};
-use super::ink::{Fill, Ink, Stroke};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer};
 use super::picture::{Anchor, Picture};
-use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
+use super::style::{BLACK, Fill, Ink, LEGEND_TEXT, Look, RED, REFERENCE, Stroke, text_width};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{FREQUENCY, HistogramBin, SetRow, Values, differing};
 use crate::sets::label;
+
+pub(super) const NAME: &str = "tau-histograms";
 
 /// Panels that fit a page.
 const MAX_PANELS: usize = 4;
@@ -53,10 +53,9 @@ impl<'a> Panel<'a> {
     /// What it shows, and the size of the sample.
     fn heading(&self) -> String {
         let count = |bars: &[&HistogramBin]| bars.iter().map(|bar| bar.count).sum::<u64>();
-        let overlay = self
-            .overlay
-            .as_ref()
-            .map_or(String::new(), |bars| format!(" and {}", count(bars)));
+        let overlay = self.overlay.as_ref();
+        let overlay = overlay.map(|bars| format!(" and {}", count(bars)));
+        let overlay = overlay.unwrap_or_default();
         format!("{}: {}{overlay} intervals", self.title, count(&self.bars))
     }
 }
@@ -65,56 +64,40 @@ impl<'a> Panel<'a> {
 /// sets or none.
 pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) -> Option<Picture> {
     let (factor, unit) = label("tau_mean").scale(bounds(bins.iter().map(|bin| bin.high))?.1);
-    let bins: Vec<HistogramBin> = bins
-        .iter()
-        .map(|bin| HistogramBin {
-            low: factor * bin.low,
-            high: factor * bin.high,
-            density: bin.density / factor,
-            ..bin.clone()
-        })
-        .collect();
+    let in_unit = |bin: &HistogramBin| HistogramBin {
+        low: factor * bin.low,
+        high: factor * bin.high,
+        density: bin.density / factor,
+        ..bin.clone()
+    };
+    let bins: Vec<HistogramBin> = bins.iter().map(in_unit).collect();
     let panels = panels(sets, &bins);
-    let (low, high) = bounds(
-        panels
-            .iter()
-            .flat_map(Panel::all_bars)
-            .flat_map(|bar| [bar.low, bar.high]),
-    )?;
     if panels.len() > MAX_PANELS {
         return None;
     }
-    let (low, high) = widened((low, high));
+    let all = panels.iter().flat_map(Panel::all_bars);
+    let (low, high) = widened(bounds(all.flat_map(|bar| [bar.low, bar.high]))?);
     let panel = |(index, panel): (usize, &Panel<'_>)| {
         let x = Axis::linear(&format!("Slip interval τ ({unit})"), low.max(0.0), high);
         let period = factor * panel.period.unwrap_or(0.0);
-        let multiples = panel
-            .period
-            .map_or_else(Vec::new, |_| x.multiples_of(period, MAX_MULTIPLES));
+        let multiples = panel.period.map(|_| x.multiples_of(period, MAX_MULTIPLES));
+        let multiples = multiples.unwrap_or_default();
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
         let density = format!("Probability density (1/{unit})");
         // The numbers cover no bar.
         let head = if multiples.is_empty() { 1.1 } else { 1.25 };
         let y = Axis::sparse(if index == 0 { &density } else { "" }, 0.0, head * highest);
-        let bars = panel
-            .bars
-            .iter()
-            .map(|bar| (((bar.low, bar.high), (0.0, bar.density)), BAR.ink));
-        let outlines = outline(&panel.bars)
-            .into_iter()
-            .map(|line| Layer::Curve(line, OUTLINE));
-        let overlay = panel
-            .overlay
-            .iter()
-            .flat_map(|bars| outline(bars))
-            .map(|line| Layer::Curve(line, OVERLAY));
-        let inside = std::iter::once(Layer::Cells(bars.collect(), OVERLAP))
-            .chain(outlines)
-            .chain(overlay);
+        let bars = panel.bars.iter();
+        let bars = bars.map(|bar| (((bar.low, bar.high), (0.0, bar.density)), BAR.ink));
+        let outlines = outline(&panel.bars).into_iter();
+        let overlay = panel.overlay.iter().flat_map(|bars| outline(bars));
+        let mut inside = vec![Layer::Cells(bars.collect(), OVERLAP)];
+        inside.extend(outlines.map(|line| Layer::Curve(line, OUTLINE)));
+        inside.extend(overlay.map(|line| Layer::Curve(line, OVERLAY)));
         let numbered = Layer::Drawn(Box::new(move |sheet, frame| {
             draw_multiples(sheet, frame, multiples, period);
         }));
-        let layers = vec![numbered, Layer::Inside(inside.collect())];
+        let layers = vec![numbered, Layer::Inside(inside)];
         panel::Panel {
             heading: Some(panel.heading()),
             ..panel::Panel::new(HEIGHT, x, y, layers)
@@ -125,13 +108,7 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
         ..Layout::column(WIDTH)
     };
     let drawn = panels.iter().enumerate().map(panel).collect();
-    Some(panel::draw(
-        "tau-histograms",
-        look,
-        layout,
-        &legend(&panels),
-        drawn,
-    ))
+    Some(panel::draw(NAME, look, layout, &legend(&panels), drawn))
 }
 
 /// A panel per set by rising frequency, as in Fig. 2. One of identical contacts goes onto the panel of the set that it
@@ -208,10 +185,10 @@ fn draw_multiples(sheet: &mut Picture, frame: &Frame, multiples: Vec<f64>, perio
     for multiple in multiples {
         let x = frame.x_of(multiple);
         let n = format!("{}", (multiple / period).round());
-        let half = 0.5 * font::width(&n, LEGEND_TEXT);
+        let half = 0.5 * text_width(&n, LEGEND_TEXT);
         // Before the first number, where there is room.
         let is_led = free == f64::NEG_INFINITY
-            && x - half - font::width("n = ", LEGEND_TEXT) > frame.left + 4.0;
+            && x - half - text_width("n = ", LEGEND_TEXT) > frame.left + 4.0;
         let lead = if is_led { "n = " } else { "" };
         let mut top = frame.top;
         if x - half > free.max(frame.left + 4.0) && x + half < frame.right() - 4.0 {

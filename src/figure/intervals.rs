@@ -3,14 +3,15 @@
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Layout, Place};
 use super::hues::Hues;
-use super::ink::Dot;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::sets::axis_of;
-use super::style::{GREY, GRID, LIGHT_GREY, Look};
+use super::quantity::axis_of;
+use super::style::{Dot, GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::{Point, ascending};
 use crate::sets::{Digits, label};
+
+pub(super) const NAME: &str = "tau-T";
 
 const RADIUS: f64 = 1.8;
 const OTHER: Dot = Dot {
@@ -45,8 +46,10 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let few = Axis::linear(few, 0.0, f64::from(LINES) + 0.5)
         .with_ticks_at(few, &(0..=LINES).map(f64::from).collect::<Vec<_>>());
 
-    let phased = slips.iter().filter(|slip| slip.0.has_phase);
-    let phased: Vec<f64> = phased.map(|slip| slip.0.drive_velocity).collect();
+    let (phased, others): (Vec<&(&Point, Place)>, Vec<_>) =
+        slips.iter().partition(|slip| slip.0.has_phase);
+    let of_phased = phased.iter().map(|slip| slip.0.drive_velocity);
+    let of_phased: Vec<f64> = of_phased.collect();
     // The same colours whatever has a phase.
     let velocity = label("V0");
     let velocities = ascending(points.iter().map(|point| point.drive_velocity));
@@ -54,56 +57,37 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let hues = Hues::of(&velocity.short("m/s"), velocities.into_iter(), |value| {
         velocity.setting(value, digits)
     });
-    let mut entries: Vec<Entry> = hues.entries(3.0, |value| phased.contains(&value));
+    let mut entries: Vec<Entry> = hues.entries(3.0, |value| of_phased.contains(&value));
     if hues.bar().is_some() {
-        entries.push(entry(
-            Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)),
-            "slips of sets with a phase",
-        ));
+        let dot = Dot::solid(hues.ink(f64::INFINITY), RADIUS);
+        entries.push(entry(Mark::Dot(dot), "slips of sets with a phase"));
     }
-    if slips.iter().any(|slip| !slip.0.has_phase) {
-        entries.push(entry(
-            Mark::Dot(Dot { ink: GREY, ..OTHER }),
-            "slips of sets without a phase",
-        ));
+    if !others.is_empty() {
+        let dot = Dot { ink: GREY, ..OTHER };
+        entries.push(entry(Mark::Dot(dot), "slips of sets without a phase"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
         let mut layers: Vec<Layer<'_>> = (1..=lines)
             .map(|n| Layer::Level(f64::from(n), GRID))
             .collect();
-        let others = slips
-            .iter()
-            .filter(|slip| !slip.0.has_phase)
-            .map(|slip| slip.1);
-        layers.push(Layer::Dots(others.collect(), OTHER));
-        layers.extend(
-            slips
-                .iter()
-                .filter(|slip| slip.0.has_phase)
-                .map(|&(point, place)| {
-                    Layer::Dots(
-                        vec![place],
-                        Dot {
-                            ink: hues.ink(point.drive_velocity),
-                            radius: RADIUS,
-                            opacity: 0.8,
-                        },
-                    )
-                }),
-        );
+        let places = others.iter().map(|slip| slip.1);
+        layers.push(Layer::Dots(places.collect(), OTHER));
+        layers.extend(phased.iter().map(|&&(point, place)| {
+            let dot = Dot {
+                ink: hues.ink(point.drive_velocity),
+                radius: RADIUS,
+                opacity: 0.8,
+            };
+            Layer::Dots(vec![place], dot)
+        }));
         Panel {
             bar: hues.bar(),
             ..Panel::inside(height, x.clone(), y, layers)
         }
     });
-    Some(panel::draw(
-        "tau-T",
-        look,
-        Layout::column(560.0),
-        &entries,
-        panels.into(),
-    ))
+    let layout = Layout::column(560.0);
+    Some(panel::draw(NAME, look, layout, &entries, panels.into()))
 }
 
 #[cfg(test)]

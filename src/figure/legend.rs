@@ -1,9 +1,7 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
-use super::font;
-use super::ink::{Dot, Fill, Ink, Stroke};
 use super::picture::{Anchor, Picture};
-use super::style::{LEGEND_TEXT, WHITE};
+use super::style::{Dot, Fill, Ink, LEGEND_TEXT, Stroke, WHITE, text_width};
 
 /// Width of a line or a patch, and of a dot.
 const MARK: f64 = 26.0;
@@ -34,7 +32,7 @@ pub(super) fn entry(mark: Mark, text: impl Into<String>) -> Entry {
 }
 
 fn width((mark, text): &Entry) -> f64 {
-    mark_width(*mark) + GAP + font::width(text, LEGEND_TEXT)
+    mark_width(*mark) + GAP + text_width(text, LEGEND_TEXT)
 }
 
 const fn mark_width(mark: Mark) -> f64 {
@@ -77,12 +75,8 @@ pub(super) fn draw_legend(
         let mut start = left;
         for entry in entries {
             draw_mark(sheet, entry.0, (start, middle));
-            sheet.centred_text(
-                (start + mark_width(entry.0) + GAP, middle),
-                &entry.1,
-                LEGEND_TEXT,
-                Anchor::Start,
-            );
+            let place = (start + mark_width(entry.0) + GAP, middle);
+            sheet.centred_text(place, &entry.1, LEGEND_TEXT, Anchor::Start);
             start += width(entry) + ENTRY_GAP;
         }
     }
@@ -106,10 +100,8 @@ fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
             sheet.discs([centre], Dot::solid(WHITE, hole));
         }
         Mark::Bar(dot) => {
-            sheet.line(
-                vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)],
-                Stroke::solid(dot.ink, 1.6),
-            );
+            let ends = vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)];
+            sheet.line(ends, Stroke::solid(dot.ink, 1.6));
             sheet.discs([centre], dot);
         }
         Mark::Line(stroke) => sheet.line(vec![(start, middle), (end, middle)], stroke),

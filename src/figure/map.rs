@@ -1,22 +1,22 @@
-//! Maps: sets on a grid of two quantities, each a cell whose colour shows a statistic. The locking map lies over period and
-//! amplitude of the modulation, a regime map over two other parameters.
+//! Maps: sets on a grid of two quantities, each a cell whose colour shows a statistic. The locking map lies over period
+//! and amplitude of the modulation, a regime map over two other parameters.
 
 use super::axis::{Axis, bounds, is_wide};
-use super::colour_bar::ColourBar;
 use super::frame::{Cell, Layout, OVERLAP, Place};
-use super::ink::{Fill, Ink, Stroke};
+use super::hues::ColourBar;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::Quantity;
-use super::sets::{Grid, period_column};
-use super::style::{BLACK, Look, WHITE, diverging, shade};
+use super::quantity::{Grid, Quantity};
+use super::style::{BLACK, Fill, Ink, Look, Stroke, WHITE, diverging, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, differing};
+use crate::reduce::{FREQUENCY, SetRow, Values, differing, has_even_steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+pub(super) const LOCKING: &str = "locking-map";
+pub(super) const REGIMES: &str = "regime-map";
 /// Numbers of periods that have a colour each; larger numbers share one.
 const MAX_PERIODS: f64 = 12.0;
 /// Share of the scale at the least number of periods, which is not to be taken for the ground.
@@ -33,8 +33,9 @@ const FREE: Ink = Ink::new(0xf2_f2_f0);
 /// A column and a row of a map.
 type Position = (usize, usize);
 
-/// Draws the map of sets in which two parameters alone differ and fill at least half of a grid: of 8 amplitudes and periods or
-/// more, or of 4 values or more of two other parameters; `None` for others. Sets without modulation do not count.
+/// Draws the map of sets in which two parameters alone differ and fill at least half of a grid: of 8 amplitudes and
+/// periods or more, or of 4 values or more of two other parameters; `None` for others. Sets without modulation do not
+/// count.
 pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     // The drive velocity is the x axis wherever it is one.
     let [horizontal, vertical] = match differing(&sets.iter())[..] {
@@ -62,13 +63,10 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         Some(set) => {
             let amplitude =
                 |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
-            let places: Vec<Place> = x_axis
-                .evenly_placed(200)
-                .map(|place| (place, amplitude(place)))
-                .collect();
-            [CASING, LINE]
-                .map(|stroke| Layer::Curve(places.clone(), stroke))
-                .into()
+            let places = x_axis.evenly_placed(200).into_iter();
+            let places: Vec<Place> = places.map(|place| (place, amplitude(place))).collect();
+            let lines = [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke));
+            lines.into()
         }
         None => map.borders(|set| sets[set].regime, BORDER),
     };
@@ -77,22 +75,16 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let is_of_periods = column == "periods";
         let is_known = |set: &usize| !is_of_periods || sets[*set].has_phase;
         let number = |set: usize| quantity.number(set).filter(|_| is_known(&set));
-        let ends = || {
-            bounds((0..sets.len()).filter_map(number).map(|n| {
-                if is_of_periods {
-                    n.min(MAX_PERIODS + 1.0)
-                } else {
-                    n
-                }
-            }))
+        let most = if is_of_periods {
+            MAX_PERIODS + 1.0
+        } else {
+            f64::INFINITY
         };
+        let ends = || bounds((0..sets.len()).filter_map(number).map(|n| n.min(most)));
         let label = quantity.axis_label();
         let scale = scale_of(column, &label, ends())?;
-        let colour = if column == "resultant_excess" {
-            diverging
-        } else {
-            shade
-        };
+        let is_excess = column == "resultant_excess";
+        let colour = if is_excess { diverging } else { shade };
         let mut bar = ColourBar::of_axis(&scale, colour);
         if is_of_periods {
             mark_periods(&mut bar, &scale, ends().unwrap_or_default());
@@ -112,18 +104,21 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         ["slip_share", "mean_friction", "tau_mean"]
     };
     let panels = columns.into_iter().filter_map(panel).collect();
-    let (name, width) = if is_locking {
-        ("locking-map", 560.0)
+    let name = if is_locking { LOCKING } else { REGIMES };
+    let layout = Layout::column(if is_locking { 560.0 } else { 490.0 });
+    let legend = legend(is_locking);
+    Some(panel::draw(name, look, layout, &legend, panels))
+}
+
+/// T, or 1/T if its steps are even and those of T are not.
+fn period_column(sets: &[SetRow]) -> &'static str {
+    let is_even =
+        |column| Values::of(sets, column).is_ok_and(|swept| has_even_steps(&swept.distinct));
+    if !is_even("T") && is_even(FREQUENCY) {
+        FREQUENCY
     } else {
-        ("regime-map", 490.0)
-    };
-    Some(panel::draw(
-        name,
-        look,
-        Layout::column(width),
-        &legend(is_locking),
-        panels,
-    ))
+        "T"
+    }
 }
 
 /// The scale of the colours of a column, whose values lie between these ends.
@@ -207,7 +202,7 @@ impl Map {
                 rows.index_of(y.number(set)?),
             ))
         };
-        let sets: Vec<(usize, Position)> = (0..x.column.values.numbers.len())
+        let sets: Vec<(usize, Position)> = (0..x.column.numbers.len())
             .filter_map(|set| Some((set, position(set)?)))
             .collect();
         let counts = [columns.count(), rows.count()];
@@ -267,7 +262,7 @@ impl Map {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sets::tests::set;
+    use super::super::quantity::tests::set;
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
@@ -413,5 +408,15 @@ mod tests {
             map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(),
             "two rows"
         );
+    }
+
+    #[test]
+    fn what_was_swept_in_even_steps_becomes_the_axis() {
+        let sets = |periods: [f64; 4]| periods.map(|period| set(1e-6, period, 4.0));
+        assert_eq!(
+            period_column(&sets([0.1, 0.05, 1.0 / 30.0, 0.025])),
+            FREQUENCY
+        );
+        assert_eq!(period_column(&sets([0.1, 0.2, 0.4, 0.8])), "T");
     }
 }

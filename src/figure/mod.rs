@@ -1,31 +1,23 @@
-//! Figures: reduced data -> pictures, as SVG, PNG and PDF bytes; [`draw_all`] alone writes.
+//! Figures: reduced data -> pictures, as SVG, PNG and PDF bytes. Below: [`draw_all`], which alone writes.
 //!
 //! ```text
-//! draw.rs -> a file for each standing figure: its data, its panels; `None` where the data do not fit
-//! overview.rs, custom.rs -> sets against a column (chart.rs, chart_legend.rs, quantity.rs): the overview of a sweep, and
-//!            any column against any other
-//! map.rs  -> sets over two parameters
-//!            sets.rs                 in what sets differ, and the grid on which they lie
-//!            panel.rs                panels as data: axes, layers between them
-//!            frame.rs, axis.rs       frames on a sheet, axes; legend.rs, colour_bar.rs, hues.rs explain colours
-//!            style.rs                sizes, strokes and colours of all figures
-//!            ink.rs                  colours, strokes, dots, fills
-//!            picture.rs, pdf.rs      lines, discs, text -> SVG, PNG, PDF
+//! a file for each standing figure: its data, its panels; `None` where the data do not fit
+//! overview.rs, custom.rs -> sets against a column (chart.rs, quantity.rs): an overview, and any column against another
+//! map.rs                 -> sets over two parameters
+//!     panel.rs            panels as data: axes, layers between them
+//!     frame.rs, axis.rs   frames on a sheet, axes; legend.rs, hues.rs explain marks and colours
+//!     style.rs            sizes, font, strokes and colours of all figures
+//!     picture.rs, pdf.rs  lines, discs, text -> SVG, PNG, PDF
 //! ```
 
 mod axis;
 mod chart;
-mod chart_legend;
-mod colour_bar;
 mod custom;
 mod drag;
-mod draw;
 mod edge_values;
-mod font;
 mod frame;
 mod histograms;
 mod hues;
-mod ink;
 mod intervals;
 mod legend;
 mod map;
@@ -35,19 +27,26 @@ mod pdf;
 mod phase_eta;
 mod picture;
 mod quantity;
-mod sets;
 mod simulation;
 mod style;
 mod work_precision;
 
 pub use custom::CustomFigure;
-pub use draw::{draw_all, draw_custom, write_custom};
-pub use ink::Ink;
 pub use picture::{Format, Picture};
 pub use quantity::Limits;
 pub use simulation::simulation;
-pub use style::{INKS, Look, SCALE, Size, Style};
+pub use style::{INKS, Ink, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
+
+use crate::model::{Parameters, Symbol, Value};
+use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
+use crate::results::ResultsError;
+use crate::results::commit::{Commit, exclusive_lock};
+use crate::results::layout::Layout;
+use crate::sets::{Digits, label, symbol_of};
+use crate::table::columns::Table;
+use anyhow::Result;
+use std::path::PathBuf;
 
 /// What was asked of a figure that cannot be drawn so: the flag, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -57,5 +56,335 @@ pub struct BadOption(String);
 impl BadOption {
     fn new(option: &str, value: &str, problem: &str) -> Self {
         Self(format!("--{option} {value}: {problem}"))
+    }
+}
+
+/// The standing figures, which [`draw_all`] draws, in the order of the report.
+pub const STANDING: [&str; 8] = [
+    overview::NAME,
+    map::LOCKING,
+    map::REGIMES,
+    edge_values::NAME,
+    drag::NAME,
+    phase_eta::NAME,
+    intervals::NAME,
+    histograms::NAME,
+];
+
+/// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
+const MAX_SETS: usize = 100_000;
+const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
+
+/// Draws the figures of a results directory into `figures/`, each in these formats: those whose data are there.
+///
+/// Returns the files, in the order in which they were written.
+pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
+    let _alone = exclusive_lock(layout, WRITER)?;
+    let points = read(layout)?;
+    let sets = sets_with_results(layout).map_err(advise(ADVICE))?;
+    let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
+    let mut pictures: Vec<Picture> = Vec::new();
+    pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, &sets, look));
+    pictures.extend(intervals::intervals(&points, look));
+    pictures.extend(drag::drag(&points, look));
+    // Under a ramp a set has no one period.
+    if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
+        let map = map::map(&sets, look);
+        // More values than colours would be a net of lines, which a map shows better; a single set would be a dot.
+        let is_net = || {
+            swept(&sets)
+                .get(1)
+                .is_some_and(|second| second.distinct.len() > INKS.len())
+        };
+        if sets.len() > 1 && !(map.is_some() && is_net()) {
+            pictures.extend(overview::overview(&sets, look));
+        }
+        pictures.extend(map);
+    }
+    if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
+        pictures.extend(edge_values::edges(&read(layout)?, look));
+    }
+    if sets.len() <= histograms::MAX_SETS {
+        pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
+    }
+    if pictures.is_empty() {
+        pictures.extend(overview::overview(&sets, look));
+    }
+    write(layout, &pictures, look, formats)
+}
+
+/// Draws a custom figure from the sets of a results directory; writes nothing.
+pub fn draw_custom(layout: &Layout<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
+    let rows = read_sets(layout).collect::<Result<Vec<_>, _>>();
+    let rows = rows.map_err(advise(ADVICE))?;
+    let look = &look.with_note(&common(rows.iter().map(|row| &*row.parameters)));
+    let picture = custom::custom(&rows, figure, look)?;
+    check_size(&picture, look)?;
+    Ok(picture)
+}
+
+/// Puts a figure into `figures/`, in these formats.
+pub fn write_custom(
+    layout: &Layout<'_>,
+    picture: Picture,
+    look: &Look,
+    formats: &[Format],
+) -> Result<Vec<PathBuf>> {
+    let _alone = exclusive_lock(layout, WRITER)?;
+    write(layout, &[picture], look, formats)
+}
+
+/// The sets with at least one interval or a regime; none if these are too many.
+fn sets_with_results(layout: &Layout<'_>) -> Result<Vec<SetRow>, ResultsError> {
+    let mut sets = Vec::new();
+    for set in read_sets(layout) {
+        let set = set?;
+        if set.intervals > 0 || set.regime.is_some() {
+            sets.push(set);
+        }
+        if sets.len() > MAX_SETS {
+            return Ok(Vec::new());
+        }
+    }
+    Ok(sets)
+}
+
+fn read<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
+    read_reduced(layout).map_err(advise(ADVICE))
+}
+
+/// A picture is larger than it is asked to be if its frames would be too small to read.
+fn check_size(picture: &Picture, look: &Look) -> Result<(), BadOption> {
+    const SLACK: f64 = 1.001;
+    let size = picture.size();
+    match look.size {
+        Some(asked) if size.width > SLACK * asked.width || size.height > SLACK * asked.height => {
+            let problem = format!(
+                "--size: figure {} needs at least {:.0}mmx{:.0}mm with its legend and small print, and less in the style print",
+                picture.name(),
+                size.width.ceil(),
+                size.height.ceil()
+            );
+            Err(BadOption(problem))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn write(
+    layout: &Layout<'_>,
+    pictures: &[Picture],
+    look: &Look,
+    formats: &[Format],
+) -> Result<Vec<PathBuf>> {
+    pictures
+        .iter()
+        .try_for_each(|picture| check_size(picture, look))?;
+    let folder = layout.figures();
+    layout.ensure_folder(&folder)?;
+    let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
+    let mut files = Vec::new();
+    for picture in pictures {
+        for &format in formats {
+            let file = folder.join(format!("{}.{}", picture.name(), format.word()));
+            commit.stage_bytes(&file, &picture.encoded(format)?)?;
+            files.push(file);
+        }
+    }
+    commit.publish()?;
+    Ok(files)
+}
+
+/// A parameter and its value, in symbols.
+fn setting(parameters: &Parameters, symbol: Symbol) -> String {
+    match parameters.get(symbol) {
+        Value::Real(real) => label(symbol.key()).setting(real, Digits::THREE),
+        value => format!("{} = {value}", symbol_of(symbol)),
+    }
+}
+
+/// What some parameters have in common, in symbols.
+pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
+    let all: Vec<&Parameters> = all.collect();
+    let Some(first) = all.first() else {
+        return String::new();
+    };
+    // What is off, or enters nothing that figures show, is left out, and the default of what the paper has no symbol
+    // for.
+    let is_shown = |symbol: &Symbol| {
+        let value = first.get(*symbol);
+        !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
+            && value != Value::Null
+            && (value != Parameters::default().get(*symbol)
+                || !symbol.description().symbol.is_empty())
+            && all
+                .iter()
+                .all(|parameters| parameters.get(*symbol) == value)
+    };
+    let settings = Symbol::ALL
+        .into_iter()
+        .filter(is_shown)
+        .map(|symbol| setting(first, symbol));
+    // Lines are not broken within one.
+    settings
+        .map(|setting| setting.replace(' ', "\u{a0}"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantity::tests::set;
+    use super::*;
+    use crate::reduce::{BackboneBin, HistogramBin, Point, SetRow};
+    use crate::table::columns::Table;
+    use crate::table::file::{Footer, TableWriter};
+    use crate::table::storage::{Disk, Storage};
+    use std::fs;
+
+    fn write_rows<R: Table>(layout: &Layout<'_>, rows: &[R]) {
+        let file = Disk.create(&layout.reduced_file(R::NAME)).unwrap();
+        let mut writer = TableWriter::new(file, &Footer::default()).unwrap();
+        for row in rows {
+            writer.push(row).unwrap();
+        }
+        writer.finish().unwrap();
+    }
+
+    fn reduced(points: &[Point]) -> (tempfile::TempDir, Layout<'static>) {
+        let root = tempfile::tempdir().unwrap();
+        let layout = Layout::new(&Disk, root.path());
+        fs::create_dir_all(layout.reduced()).unwrap();
+        write_rows(&layout, points);
+        write_rows::<BackboneBin>(&layout, &[]);
+        write_rows::<SetRow>(&layout, &[]);
+        write_rows::<HistogramBin>(&layout, &[]);
+        (root, layout)
+    }
+
+    fn modulated(step: u32) -> Point {
+        let period = 0.01 * f64::from(1 + step % 5);
+        Point {
+            drive_velocity: 1e-4,
+            amplitude: 1e-6,
+            period: Some(period),
+            eta: 0.5 + f64::from(step),
+            ramp_stage: None,
+            onset: 1.0,
+            interval: Some(4.0 * period),
+            periods: Some(4),
+            phase: Some(-0.01 * f64::from(step)),
+            has_phase: step.is_multiple_of(2),
+        }
+    }
+
+    #[test]
+    fn figures_are_byte_identical_when_drawn_again() {
+        let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
+        let files = draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap();
+        let names: Vec<_> = files
+            .iter()
+            .map(|file| file.file_name().unwrap().to_string_lossy().into_owned())
+            .collect();
+        assert_eq!(
+            names,
+            ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"]
+        );
+        let stems = names.iter().filter_map(|name| name.split('.').next());
+        assert!(
+            stems.into_iter().all(|stem| STANDING.contains(&stem)),
+            "the report shows them"
+        );
+        let bytes = || {
+            files
+                .iter()
+                .map(|file| fs::read(file).unwrap())
+                .collect::<Vec<_>>()
+        };
+        let before = bytes();
+        assert_eq!(
+            draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap(),
+            files
+        );
+        assert!(bytes() == before);
+        let svg = String::from_utf8(before[0].clone()).unwrap();
+        let png = &before[1];
+        assert!(svg.contains("φ (rad)") && svg.ends_with("</svg>"));
+        assert!(png.starts_with(b"\x89PNG"));
+    }
+
+    #[test]
+    fn a_pdf_is_whole_and_byte_identical_when_drawn_again_and_has_the_size_of_its_style() {
+        let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
+        let look = Look {
+            style: Style::Print,
+            ..Look::default()
+        };
+        let drawn = || {
+            let files = draw_all(&layout, &look, &[Format::Pdf]).unwrap();
+            fs::read(&files[0]).unwrap()
+        };
+        let pdf = drawn();
+        assert!(pdf.starts_with(b"%PDF-") && pdf.trim_ascii_end().ends_with(b"%%EOF"));
+        assert!(drawn() == pdf);
+        let svg =
+            fs::read_to_string(&draw_all(&layout, &look, &[Format::Svg]).unwrap()[0]).unwrap();
+        assert!(svg.contains(r#"width="86.00mm""#), "{}", &svg[..200]);
+    }
+
+    #[test]
+    fn a_size_that_a_figure_does_not_fit_is_refused_with_the_least_one() {
+        let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
+        let drawn = |width, height| {
+            draw_all(
+                &layout,
+                &Look {
+                    size: Some(Size { width, height }),
+                    ..Look::default()
+                },
+                &[Format::Svg],
+            )
+        };
+        let error = drawn(5.0, 5.0).unwrap_err().to_string();
+        assert!(
+            error.starts_with("--size: figure phi-eta needs at least "),
+            "{error}"
+        );
+        assert!(drawn(150.0, 100.0).is_ok());
+    }
+
+    #[test]
+    fn without_modulation_no_phase_is_drawn() {
+        let still = Point {
+            period: None,
+            periods: None,
+            phase: None,
+            ..modulated(1)
+        };
+        let (_root, layout) = reduced(&[still]);
+        assert!(
+            draw_all(&layout, &Look::default(), &Format::DEFAULT)
+                .unwrap()
+                .is_empty()
+        );
+    }
+
+    #[test]
+    fn small_print_has_what_all_have_in_common_and_symbols_have_their_subscripts() {
+        let mut other = set(1e-6, 0.02, 4.0).parameters.parameters;
+        other.blocks = 9;
+        let all = [set(1e-6, 0.02, 4.0).parameters.parameters, other];
+        let found = common(all.iter()).replace('\u{a0}', " ");
+        assert!(
+            found.starts_with("Nₛ = 20, M = 11.5 kg, K = 10⁸ N/m, K_d = 4·10⁷ N/m"),
+            "{found}"
+        );
+        assert!(
+            found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1 µm, T = 20 ms"),
+            "{found}"
+        );
+        assert!(!found.contains("N = ") && !found.contains("seed") && common([].iter()).is_empty());
+        let symbols = [Symbol::RampTime, Symbol::Seed, Symbol::TauR, Symbol::V0].map(symbol_of);
+        assert_eq!(symbols, ["ramp time", "seed", "τᵣ", "V₀"]);
     }
 }

@@ -6,6 +6,8 @@ use super::{Look, Picture};
 use crate::observe::Regime;
 use crate::reduce::{SetRow, swept};
 
+pub(super) const NAME: &str = "overview";
+
 /// What is shown: intervals, friction, time within slips, phases.
 const QUANTITIES: [&str; 5] = [
     "tau_mean",
@@ -15,8 +17,8 @@ const QUANTITIES: [&str; 5] = [
     "resultant_length",
 ];
 
-/// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third panels.
-/// A single set is a dot over its velocity. `None` if nothing was found.
+/// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third
+/// panels. A single set is a dot over its velocity. `None` if nothing was found.
 pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     let swept = swept(rows);
     let quantity = |place: usize, option| Quantity::of(rows, option, swept.get(place)?.name()).ok();
@@ -55,7 +57,7 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
         None
     };
     let colour = quantity(if panels == Some(1) { 2 } else { 1 }, "colour");
-    let panels = panels.map(|place| swept[place].values.clone());
+    let panels = panels.map(|place| swept[place].clone());
     Chart {
         rows,
         swept: &swept,
@@ -64,13 +66,13 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
         colour,
         panels,
     }
-    .draw("overview", look)
+    .draw(NAME, look)
     .ok()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::sets::tests::set;
+    use super::super::quantity::tests::set;
     use super::super::style::REFERENCE;
     use super::*;
 

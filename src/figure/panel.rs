@@ -1,12 +1,11 @@
 //! Panels as data: axes and what lies between them, layer by layer. One engine draws the panels of every figure.
 
 use super::axis::Axis;
-use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::frame::{Cell, Ends, Frame, Layout, Place};
-use super::ink::{Dot, Fill, Ink, Stroke};
+use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::Entry;
 use super::picture::Picture;
-use super::style::Look;
+use super::style::{Dot, Fill, Ink, Look, Stroke};
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 
@@ -34,19 +33,17 @@ pub(super) enum Layer<'a> {
 impl Layer<'_> {
     fn draw(self, sheet: &mut Picture, frame: &Frame) {
         match self {
-            Self::Inside(layers) => sheet.clipped(
-                [frame.left, frame.top, frame.width, frame.height],
-                |sheet| {
+            Self::Inside(layers) => {
+                let inside = [frame.left, frame.top, frame.width, frame.height];
+                sheet.clipped(inside, |sheet| {
                     for layer in layers {
                         layer.draw(sheet, frame);
                     }
-                },
-            ),
+                });
+            }
             Self::Curve(points, stroke) => {
-                sheet.line(
-                    points.into_iter().map(|point| frame.place(point)).collect(),
-                    stroke,
-                );
+                let places = points.into_iter().map(|point| frame.place(point));
+                sheet.line(places.collect(), stroke);
             }
             Self::Level(y, stroke) => {
                 Self::Curve(vec![(frame.x.low, y), (frame.x.high, y)], stroke).draw(sheet, frame);
@@ -123,12 +120,8 @@ impl<'a> Panel<'a> {
         y: Axis,
         layers: impl IntoIterator<Item = Layer<'a>>,
     ) -> Self {
-        Self::new(
-            height,
-            x,
-            y,
-            vec![Layer::Inside(layers.into_iter().collect())],
-        )
+        let layers = Layer::Inside(layers.into_iter().collect());
+        Self::new(height, x, y, vec![layers])
     }
 }
 
@@ -152,12 +145,9 @@ pub(super) fn draw(
     let (page, mut sheet) = layout.page(name, look, legend, &heights);
     let count = panels.len();
     for (index, panel) in panels.into_iter().enumerate() {
-        let mut frame = page.frame(
-            index / layout.columns,
-            index % layout.columns,
-            panel.x,
-            panel.y,
-        );
+        let row = index / layout.columns;
+        let column = index % layout.columns;
+        let mut frame = page.frame(row, column, panel.x, panel.y);
         frame.is_lowest = index + layout.columns >= count;
         for layer in panel.layers {
             layer.draw(&mut sheet, &frame);

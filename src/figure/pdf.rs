@@ -1,8 +1,8 @@
 //! A scene as a PDF of one page: vectors, and text in the letters of one embedded font, so that it can be searched and
 //! looks the same everywhere. The same scene gives the same bytes on every machine.
 
-use super::font;
-use super::ink::parts;
+use super::style::{FACE, font_file};
+use kuva::render::color::Color;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 use pdf_writer::types::{
     CidFontType, FontFlags, LineCapStyle, LineJoinStyle, SystemInfo, UnicodeCmap,
@@ -10,10 +10,10 @@ use pdf_writer::types::{
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str};
 use std::collections::BTreeMap;
 use subsetter::GlyphRemapper;
-use ttf_parser::{Face, GlyphId};
+use ttf_parser::GlyphId;
 
 const FONT: Name = Name(b"F");
-/// Six letters and a plus mark a font that is not whole.
+/// Six letters and a plus mark a subset of a font.
 const FONT_NAME: Name = Name(b"STICKS+DejaVuSans");
 const SYSTEM: SystemInfo = SystemInfo {
     registry: Str(b"Adobe"),
@@ -25,12 +25,9 @@ const EM: f32 = 1000.0;
 const COMPRESSION: u8 = 8;
 
 /// The scene, with this many points per unit.
-pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
-    let font = font::file();
-    let face = Face::parse(font, 0).map_err(|error| error.to_string())?;
+pub(super) fn pdf(scene: &Scene, points: f64) -> Vec<u8> {
     let mut page = Page {
         content: Content::new(),
-        face,
         glyphs: GlyphRemapper::new(),
         letters: BTreeMap::new(),
         opacities: Vec::new(),
@@ -42,9 +39,9 @@ pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
         .transform([scale, 0.0, 0.0, -scale, 0.0, height]);
     page.content.set_line_join(LineJoinStyle::RoundJoin);
     for element in &scene.elements {
-        page.draw(element)?;
+        page.draw(element);
     }
-    page.write(font, single(points * scene.width), height)
+    page.write(single(points * scene.width), height)
 }
 
 #[expect(
@@ -55,9 +52,16 @@ const fn single(value: f64) -> f32 {
     value as f32
 }
 
-struct Page<'a> {
+/// Red, green and blue from 0 to 1.
+fn parts(color: &Color) -> [f32; 3] {
+    match color {
+        Color::Rgb(red, green, blue) => [*red, *green, *blue].map(|part| f32::from(part) / 255.0),
+        _ => [0.0; 3],
+    }
+}
+
+struct Page {
     content: Content,
-    face: Face<'a>,
     /// Numbers of the letters in the embedded font.
     glyphs: GlyphRemapper,
     /// Letter and width in ems / 1000 of each number.
@@ -66,8 +70,8 @@ struct Page<'a> {
     opacities: Vec<f64>,
 }
 
-impl Page<'_> {
-    fn draw(&mut self, element: &Primitive) -> Result<(), String> {
+impl Page {
+    fn draw(&mut self, element: &Primitive) {
         match element {
             Primitive::PolyLine {
                 points,
@@ -132,9 +136,8 @@ impl Page<'_> {
             Primitive::ClipEnd => {
                 self.content.restore_state();
             }
-            other => return Err(format!("there is no PDF of {other:?}")),
+            other => unreachable!("no picture has {other:?}"),
         }
-        Ok(())
     }
 
     fn line(&mut self, points: &[(f64, f64)], [red, green, blue]: [f32; 3], width: f64) {
@@ -202,12 +205,12 @@ impl Page<'_> {
         anchor: TextAnchor,
         fill: [f32; 3],
     ) {
-        let em = f32::from(self.face.units_per_em());
+        let em = f32::from(FACE.units_per_em());
         let mut codes = Vec::new();
         let mut width = 0.0;
         for letter in text.chars() {
-            let glyph = self.face.glyph_index(letter).unwrap_or(GlyphId(0));
-            let advance = EM * f32::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) / em;
+            let glyph = FACE.glyph_index(letter).unwrap_or(GlyphId(0));
+            let advance = EM * f32::from(FACE.glyph_hor_advance(glyph).unwrap_or(0)) / em;
             let code = self.glyphs.remap(glyph.0);
             self.letters.entry(code).or_insert((letter, advance));
             codes.extend(code.to_be_bytes());
@@ -227,19 +230,18 @@ impl Page<'_> {
         self.content.show(Str(&codes)).end_text();
     }
 
-    fn write(self, font: &[u8], width: f32, height: f32) -> Result<Vec<u8>, String> {
-        let mut next = (1..).map(Ref::new);
-        let mut id = || next.next().ok_or("there are too many objects");
-        let catalog = id()?;
-        let pages = id()?;
-        let page = id()?;
-        let content = id()?;
-        let font_id = id()?;
-        let states: Vec<Ref> = self
-            .opacities
-            .iter()
-            .map(|_| id())
-            .collect::<Result<_, _>>()?;
+    fn write(mut self, width: f32, height: f32) -> Vec<u8> {
+        let mut last = 0;
+        let mut id = || {
+            last += 1;
+            Ref::new(last)
+        };
+        let catalog = id();
+        let pages = id();
+        let page = id();
+        let content = id();
+        let font = id();
+        let states: Vec<Ref> = self.opacities.iter().map(|_| id()).collect();
         let mut pdf = Pdf::new();
         pdf.catalog(catalog).pages(pages);
         pdf.pages(pages).kids([page]).count(1);
@@ -249,7 +251,7 @@ impl Page<'_> {
             .parent(pages)
             .contents(content);
         let mut resources = written.resources();
-        resources.fonts().pair(FONT, font_id);
+        resources.fonts().pair(FONT, font);
         let mut named = resources.ext_g_states();
         for (index, state) in states.iter().enumerate() {
             named.pair(Name(state_name(index).as_bytes()), *state);
@@ -262,14 +264,20 @@ impl Page<'_> {
                 .non_stroking_alpha(single(opacity))
                 .stroking_alpha(single(opacity));
         }
-        let drawn = compressed(&self.content.finish());
-        pdf.stream(content, &drawn).filter(Filter::FlateDecode);
+        let drawn = std::mem::replace(&mut self.content, Content::new());
+        pdf.stream(content, &compressed(&drawn.finish()))
+            .filter(Filter::FlateDecode);
+        self.write_font(&mut pdf, font, id);
+        pdf.finish()
+    }
 
-        let descendant = id()?;
-        let descriptor = id()?;
-        let file = id()?;
-        let to_unicode = id()?;
-        let mut whole = pdf.type0_font(font_id);
+    /// Writes the letters in use: their shapes, their widths, and the text that they stand for.
+    fn write_font(&self, pdf: &mut Pdf, font: Ref, mut id: impl FnMut() -> Ref) {
+        let descendant = id();
+        let descriptor = id();
+        let file = id();
+        let to_unicode = id();
+        let mut whole = pdf.type0_font(font);
         whole
             .base_font(FONT_NAME)
             .encoding_predefined(Name(b"Identity-H"));
@@ -288,9 +296,9 @@ impl Page<'_> {
         }
         widths.finish();
         cid.finish();
-        let em = f32::from(self.face.units_per_em());
+        let em = f32::from(FACE.units_per_em());
         let ems = |units: i16| EM * f32::from(units) / em;
-        let bounds = self.face.global_bounding_box();
+        let bounds = FACE.global_bounding_box();
         let mut described = pdf.font_descriptor(descriptor);
         described
             .name(FONT_NAME)
@@ -305,23 +313,19 @@ impl Page<'_> {
             ems(bounds.y_max),
         ));
         described
-            .ascent(ems(self.face.ascender()))
-            .descent(ems(self.face.descender()));
-        described.cap_height(ems(self
-            .face
-            .capital_height()
-            .unwrap_or(self.face.ascender())));
+            .ascent(ems(FACE.ascender()))
+            .descent(ems(FACE.descender()));
+        described.cap_height(ems(FACE.capital_height().unwrap_or(FACE.ascender())));
         described.finish();
         let mut cmap: UnicodeCmap = UnicodeCmap::new(Name(b"Letters"), SYSTEM);
         for (&code, &(letter, _)) in &self.letters {
             cmap.pair(code, letter);
         }
         pdf.cmap(to_unicode, &cmap.finish());
-        let letters =
-            subsetter::subset(font, 0, &self.glyphs).map_err(|error| error.to_string())?;
+        let letters = subsetter::subset(font_file(), 0, &self.glyphs);
+        let letters = letters.expect("the font of the program has its letters");
         pdf.stream(file, &compressed(&letters))
             .filter(Filter::FlateDecode);
-        Ok(pdf.finish())
     }
 }
 

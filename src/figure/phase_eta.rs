@@ -1,19 +1,20 @@
 //! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and averages over sets that have a phase.
 
 use super::axis::{Axis, angle_bounds, bounds};
-use super::colour_bar::ColourBar;
 use super::frame::{Cell, Ends, Layout, OVERLAP, Place};
-use super::ink::{Dot, Stroke};
+use super::hues::ColourBar;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::sets::Grid;
-use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
+use super::quantity::Grid;
+use super::style::{BAR_WIDTH, BLUE, Dot, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point, SetRow};
 use crate::sets::label;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+
+pub(super) const NAME: &str = "phi-eta";
 
 const WIDTH: f64 = 580.0;
 const HEIGHT: f64 = 390.0;
@@ -48,11 +49,9 @@ pub(super) fn phase_eta(
     let (shades, cells) = density(&slips);
     let (low, high) = bounds(cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?;
     let averages = averages(bins, sets);
+    let of_bins = "mean of all sets with a phase in a bin of η, 95 %";
     let entries = [
-        entry(
-            Mark::Bar(AVERAGE),
-            "mean of all sets with a phase in a bin of η, 95 %",
-        ),
+        entry(Mark::Bar(AVERAGE), of_bins),
         entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
         entry(Mark::Line(REFERENCE), "η = 1"),
@@ -60,7 +59,8 @@ pub(super) fn phase_eta(
     let x = Axis::logarithmic(&label("eta").axis(""), low, high).with_enough_numbers();
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
     let curve = |phase: fn(f64) -> Option<f64>| {
-        let modulated = x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
+        let etas = x.evenly_placed(CURVE_POINTS).into_iter();
+        let modulated = etas.filter(|&eta| eta >= 1.0);
         modulated
             .filter_map(|eta| Some((eta, phase(eta)?)))
             .collect()
@@ -70,17 +70,14 @@ pub(super) fn phase_eta(
         .map(|&(cell, density)| (cell, shade(shades.place(density))));
     let mut layers = vec![Layer::Cells(coloured.collect(), OVERLAP)];
     let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
+    let bars = averages
+        .iter()
+        .filter_map(|&(eta, _, ends)| Some((eta, ends?)));
     layers.extend([
         Layer::Upright(1.0, REFERENCE),
         Layer::Curve(curve(|eta| Some(minimum_phase_asymptote(eta))), ASYMPTOTE),
         Layer::Curve(curve(minimum_phase), EXACT),
-        Layer::Bars(
-            averages
-                .iter()
-                .filter_map(|&(eta, _, ends)| Some((eta, ends?)))
-                .collect(),
-            Stroke::solid(BLUE, BAR_WIDTH),
-        ),
+        Layer::Bars(bars.collect(), Stroke::solid(BLUE, BAR_WIDTH)),
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
@@ -89,13 +86,8 @@ pub(super) fn phase_eta(
         bar,
         ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers)
     };
-    Some(panel::draw(
-        "phi-eta",
-        look,
-        Layout::column(WIDTH),
-        &entries,
-        vec![panel],
-    ))
+    let layout = Layout::column(WIDTH);
+    Some(panel::draw(NAME, look, layout, &entries, vec![panel]))
 }
 
 /// Mean η of the sets of each bin that have a phase, the mean of these phases in rad, and the ends of its interval.
@@ -170,14 +162,9 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
             let low = low.max(eta / WIDEST);
             let high = high.min(eta * WIDEST);
             // None reaches over η = 1, where the load begins to fall in each period.
-            (
-                if eta > SAME { low.max(1.0) } else { low },
-                if eta * SAME < 1.0 {
-                    high.min(1.0)
-                } else {
-                    high
-                },
-            )
+            let least = if eta > SAME { 1.0 } else { 0.0 };
+            let most = if eta * SAME < 1.0 { 1.0 } else { f64::INFINITY };
+            (low.max(least), high.min(most))
         };
         return cells.map(clipped).collect();
     }
@@ -193,7 +180,7 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sets::tests::set;
+    use super::super::quantity::tests::set;
     use super::*;
 
     #[test]

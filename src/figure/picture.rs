@@ -1,15 +1,14 @@
 //! Pictures: what is drawn, as SVG, PNG and PDF. The same data give the same bytes.
 
 use super::BadOption;
-use super::font;
-use super::ink::{Dot, Fill, Ink, Stroke, color};
 use super::pdf::pdf;
-use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
+use super::style::{BLACK, Dot, Fill, HALF_DIGIT, Ink, Look, Size, Stroke, Style, text_width};
 use crate::table::shown::shown_text;
 use crate::table::value::words;
 use anyhow::{Result, anyhow};
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
+use kuva::render::color::Color;
 pub(super) use kuva::render::render::TextAnchor as Anchor;
 use kuva::render::render::{Primitive, Scene};
 
@@ -36,7 +35,6 @@ pub struct Picture {
 words! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Format {
-        /// Vectors, for the browser and for changes by hand.
         Svg = "svg",
         Png = "png",
         Pdf = "pdf",
@@ -46,6 +44,14 @@ words! {
 impl Format {
     /// Those that figures get if none is asked for.
     pub const DEFAULT: [Self; 2] = [Self::Svg, Self::Png];
+
+    /// What the help says of it.
+    pub const fn description(self) -> Option<&'static str> {
+        match self {
+            Self::Svg => Some("Vectors, for the browser and for changes by hand"),
+            Self::Png | Self::Pdf => None,
+        }
+    }
 }
 
 impl Picture {
@@ -71,36 +77,20 @@ impl Picture {
         match format {
             Format::Svg => Ok(self.svg().into_bytes()),
             Format::Png => self.png(),
-            Format::Pdf => self.pdf(),
+            Format::Pdf => Ok(pdf(&self.scene, self.style.points())),
         }
     }
 
     pub fn svg(&self) -> String {
         let svg = SvgBackend::new().render_scene(&self.scene);
-        // XML has no way to write these.
-        let is_not_xml = |c| matches!(c, '\0'..='\x08' | '\x0b'..='\x0c' | '\x0e'..='\x1f' | '\u{fffe}'..='\u{ffff}');
-        let svg = svg.replace(is_not_xml, "\u{fffd}");
         if self.style == Style::Screen {
             return svg;
         }
-        // The library gives sizes in pixels only.
+        // The library gives sizes in pixels only, so a picture of this size holds it.
         let Size { width, height } = self.size();
-        let sides = format!(
-            r#"width="{width:.2}mm" height="{height:.2}mm" viewBox="0 0 {:.2} {:.2}""#,
-            self.scene.width, self.scene.height
-        );
-        match (svg.find("width="), svg.find(" font-family=")) {
-            (Some(start), Some(end)) if start < end => {
-                format!("{}{sides}{}", &svg[..start], &svg[end..])
-            }
-            _ => svg,
-        }
-    }
-
-    /// The figure as a PDF file of one page.
-    pub fn pdf(&self) -> Result<Vec<u8>> {
-        pdf(&self.scene, self.style.points())
-            .map_err(|reason| self.not_encoded(Format::Pdf, &reason))
+        let sides = format!(r#"width="{width:.2}mm" height="{height:.2}mm""#);
+        let units = format!("0 0 {:.2} {:.2}", self.scene.width, self.scene.height);
+        format!(r#"<svg xmlns="http://www.w3.org/2000/svg" {sides} viewBox="{units}">{svg}</svg>"#)
     }
 
     pub fn png(&self) -> Result<Vec<u8>> {
@@ -118,15 +108,7 @@ impl Picture {
         RasterBackend::new()
             .with_scale(self.style.pixels())
             .render_scene(&self.scene)
-            .map_err(|reason| self.not_encoded(Format::Png, &reason))
-    }
-
-    fn not_encoded(&self, format: Format, reason: &str) -> anyhow::Error {
-        anyhow!(
-            "figure {}: cannot be turned into {}: {reason}",
-            self.name,
-            format.word().to_uppercase()
-        )
+            .map_err(|reason| anyhow!("figure {}: cannot be turned into PNG: {reason}", self.name))
     }
 }
 
@@ -164,7 +146,7 @@ impl Picture {
             else {
                 return None;
             };
-            let width = font::width(content, *size);
+            let width = text_width(content, *size);
             let start = match anchor {
                 Anchor::Start => *x,
                 Anchor::Middle => x - 0.5 * width,
@@ -239,8 +221,9 @@ impl Picture {
         anchor: Anchor,
         ink: Option<Ink>,
     ) {
-        // An SVG may hold no control characters.
+        // XML has no way to write control characters, nor these two.
         let content = shown_text(text).to_string();
+        let content = content.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
         let Some((before, (lower, after))) = subscript(&content) else {
             self.scene.add(Primitive::Text {
                 x,
@@ -262,7 +245,7 @@ impl Picture {
         ];
         let width: f64 = parts
             .iter()
-            .map(|(part, size, _)| font::width(part, *size))
+            .map(|(part, size, _)| text_width(part, *size))
             .sum();
         let mut start = match anchor {
             Anchor::Start => x,
@@ -271,7 +254,7 @@ impl Picture {
         };
         for (part, size, y) in parts {
             self.coloured_text((start, y), part, size, Anchor::Start, ink);
-            start += font::width(part, size);
+            start += text_width(part, size);
         }
     }
 
@@ -294,9 +277,9 @@ impl Picture {
     ) {
         let id = format!("frame-{}", self.clips);
         self.clips += 1;
-        self.scene.defs.push(format!(
-            r#"<clipPath id="{id}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath>"#
-        ));
+        let inside = format!(r#"x="{x}" y="{y}" width="{width}" height="{height}""#);
+        let clip = format!(r#"<clipPath id="{id}"><rect {inside}/></clipPath>"#);
+        self.scene.defs.push(clip);
         self.scene.add(Primitive::ClipStart {
             x,
             y,
@@ -307,6 +290,11 @@ impl Picture {
         draw(self);
         self.scene.add(Primitive::ClipEnd);
     }
+}
+
+fn color(ink: Ink) -> Color {
+    let Ink([red, green, blue]) = ink;
+    Color::Rgb(red, green, blue)
 }
 
 /// What stands before the first symbol with a subscript such as `K_d`, that subscript, and what follows it.
@@ -331,10 +319,8 @@ fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
         let mut done = 0.0;
         while done < length {
             let at = |done: f64| {
-                (
-                    x + (end_x - x) * done / length,
-                    y + (end_y - y) * done / length,
-                )
+                let x = x + (end_x - x) * done / length;
+                (x, y + (end_y - y) * done / length)
             };
             let step = left.min(length - done);
             if draws {

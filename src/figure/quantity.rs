@@ -1,4 +1,4 @@
-//! A column of the table of sets as a quantity that a figure shows: on an axis, or as colours.
+//! Quantities that figures show: a column of the table of sets on an axis or as colours, and the grid of its values.
 
 use super::BadOption;
 use super::axis::{Axis, bounds, is_wide, logarithmic_bounds, widened};
@@ -6,8 +6,8 @@ use super::frame::Ends;
 use super::hues::Hues;
 use super::style::INKS;
 use crate::model::Symbol;
-use crate::reduce::{FREQUENCY, SetRow, Swept, Values};
-use crate::sets::Label;
+use crate::reduce::{FREQUENCY, SetRow, Values, has_even_steps, is_spread};
+use crate::sets::{Label, label};
 
 /// Values of a parameter up to which each has its tick.
 pub(super) const MAX_TICKS: usize = 6;
@@ -21,7 +21,7 @@ pub type Limits = (Option<f64>, Option<f64>);
 pub(super) struct Quantity<'a> {
     /// The option that named it.
     option: &'static str,
-    pub(super) column: Swept,
+    pub(super) column: Values,
     /// The parameter that it shows, if it shows one.
     pub(super) symbol: Option<Symbol>,
     /// What the drive alone explains of it.
@@ -46,14 +46,14 @@ pub(super) fn parameter(column: &str) -> Option<Symbol> {
 impl Quantity<'_> {
     pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, BadOption> {
         let column =
-            Swept::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
+            Values::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
         let drive = match name {
             "resultant_length" => Values::of(rows, "resultant_drive").ok(),
             "locking_index" => Values::of(rows, "locking_index_drive").ok(),
             _ => None,
         };
         let drive = drive.filter(|drive| drive.numbers.iter().any(Option::is_some));
-        let (factor, unit) = column.values.scale();
+        let (factor, unit) = column.scale();
         let symbol = parameter(name);
         let is_log = if symbol.is_some() {
             column.is_logarithmic()
@@ -78,7 +78,7 @@ impl Quantity<'_> {
     }
 
     pub(super) fn typeset(&self) -> Label {
-        self.column.values.label()
+        self.column.label()
     }
 
     pub(super) fn axis_label(&self) -> String {
@@ -101,11 +101,11 @@ impl Quantity<'_> {
     }
 
     pub(super) fn number(&self, set: usize) -> Option<f64> {
-        self.column.values.numbers[set].map(|number| self.factor * number)
+        self.column.numbers[set].map(|number| self.factor * number)
     }
 
     pub(super) fn interval(&self, set: usize) -> Option<Ends> {
-        self.column.values.intervals[set].map(|(low, high)| (self.factor * low, self.factor * high))
+        self.column.intervals[set].map(|(low, high)| (self.factor * low, self.factor * high))
     }
 
     pub(super) fn refuse(&self, problem: &str) -> BadOption {
@@ -121,7 +121,7 @@ impl Quantity<'_> {
     /// Whether a set has a place on the axis.
     pub(super) fn has(&self, set: usize) -> bool {
         self.number(set)
-            .is_some_and(|value| !self.is_log || self.column.values.is_worded() || value > 0.0)
+            .is_some_and(|value| !self.is_log || self.column.is_worded() || value > 0.0)
     }
 
     /// The axis, from one limit or end of the data to the other.
@@ -131,33 +131,28 @@ impl Quantity<'_> {
             .label
             .is_none()
             .then(|| self.typeset().short(self.unit));
-        if self.column.values.is_worded() {
-            let axis = self.axis_of_words(&label)?;
-            return Ok(axis.with_short_label(short_label));
+        if self.column.is_worded() {
+            let mut axis = self.axis_of_words(&label)?;
+            axis.short_label = short_label;
+            return Ok(axis);
         }
         let (low, high) = self.ends(sets)?;
-        let axis = |label: &str| {
-            if self.is_log {
-                Axis::logarithmic(label, low, high)
-            } else {
-                Axis::linear(label, low, high)
-            }
-        };
+        let axis = |label: &str| Axis::of_scale(self.is_log, label, low, high);
         let has_few = (2..=MAX_TICKS).contains(&self.column.distinct.len());
         if self.symbol.is_some() && self.limits == (None, None) && has_few {
             let values: Vec<f64> = self.distinct().collect();
-            let axis = axis(&label).with_ticks_at(&label, &values);
-            return Ok(axis.with_short_label(short_label));
+            let mut axis = axis(&label).with_ticks_at(&label, &values);
+            axis.short_label = short_label;
+            return Ok(axis);
         }
-        let short_label = short_label.map(|label| axis(&label).label);
-        Ok(axis(&label)
-            .with_short_label(short_label)
-            .with_enough_numbers())
+        let mut shown = axis(&label).with_enough_numbers();
+        shown.short_label = short_label.map(|label| axis(&label).label);
+        Ok(shown)
     }
 
     fn axis_of_words(&self, label: &str) -> Result<Axis, BadOption> {
         let name = self.name();
-        let words = &self.column.values.words;
+        let words = &self.column.words;
         if self.is_log {
             let problem = format!("{name} holds words; a logarithmic axis takes numbers");
             return Err(BadOption::new("log", self.option, &problem));
@@ -166,14 +161,12 @@ impl Quantity<'_> {
             return Err(self.refuse_limits(&format!("{name} holds words; limits are for numbers")));
         }
         if words.len() > MAX_WORDS {
-            let problem = format!(
-                "has {} words, and {MAX_WORDS} fit an axis; take another column",
-                words.len()
-            );
-            return Err(self.refuse(&problem));
+            let count = words.len();
+            return Err(self.refuse(&format!(
+                "has {count} words, and {MAX_WORDS} fit an axis; take another column"
+            )));
         }
-        let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        Ok(Axis::categories(label, &words))
+        Ok(Axis::categories(label, words))
     }
 
     /// Where the axis ends: at the limits, else a little beyond the data.
@@ -212,7 +205,7 @@ impl Quantity<'_> {
 
     /// Its values as colours.
     pub(super) fn hues(&self) -> Result<Hues, BadOption> {
-        let values = &self.column.values;
+        let values = &self.column;
         let words = values.words.len();
         let inks = INKS.len();
         if words > inks {
@@ -231,17 +224,27 @@ impl Quantity<'_> {
 }
 
 /// Whether the values of a statistic are seen on a logarithmic axis only.
-fn lies_decades_apart(column: &Swept) -> bool {
+fn lies_decades_apart(column: &Values) -> bool {
     let [least, .., _] = column.distinct[..] else {
         return false;
     };
     let values = &column.distinct;
-    let intervals = column.values.intervals.iter().flatten();
+    let intervals = column.intervals.iter().flatten();
     let low = intervals.map(|(low, _)| *low).fold(least, f64::min);
     // A single set, such as the only one that slides, changes no scale.
     let alone = usize::from(values.len() >= FEW_VALUES);
     let ends = (values[alone], values[values.len() - 1 - alone]);
-    !column.values.is_worded() && low > 0.0 && is_wide(ends)
+    !column.is_worded() && low > 0.0 && is_wide(ends)
+}
+
+/// Each name once, in the order of first appearance.
+pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    names.fold(Vec::new(), |mut known, name| {
+        if !known.contains(&name) {
+            known.push(name);
+        }
+        known
+    })
 }
 
 /// What sets without a value of a column are called: of a period, that they have no modulation.
@@ -251,5 +254,171 @@ pub(super) fn without_value(values: &Values) -> String {
         "Δ = 0".to_owned()
     } else {
         format!("no {}", values.label().symbol)
+    }
+}
+
+/// Of a column with these values: the label of its axis, and the factor to its unit.
+pub(super) fn axis_of(column: &str, values: impl Iterator<Item = f64>) -> (String, f64) {
+    let label = label(column);
+    let (factor, unit) = label.scale(values.fold(0.0, f64::max));
+    (label.axis(unit), factor)
+}
+
+/// Values of a swept quantity and how they are spaced.
+pub(super) struct Grid {
+    /// Ascending.
+    values: Vec<f64>,
+    is_linear: bool,
+}
+
+impl Grid {
+    /// Linear if the steps are even, or a value is not > 0, or all are close, else logarithmic. `values` ascend.
+    pub(super) fn of(values: Vec<f64>) -> Self {
+        let is_linear = has_even_steps(&values) || !is_spread(&values);
+        Self { values, is_linear }
+    }
+
+    /// The cells around `values` > 0 that ascend, spaced logarithmically.
+    pub(super) fn logarithmic_cells(values: Vec<f64>) -> Vec<(f64, f64)> {
+        let grid = Self {
+            values,
+            is_linear: false,
+        };
+        (0..grid.values.len())
+            .map(|index| grid.cell(index))
+            .collect()
+    }
+
+    /// An axis for cells: it ends half a step beyond the values.
+    pub(super) fn axis(&self, label: &str) -> Axis {
+        let low = self.cell(0).0;
+        let high = self.cell(self.values.len() - 1).1;
+        Axis::of_scale(!self.is_linear, label, low, high)
+    }
+
+    /// The ends of the cell around the value with this index: halfway to its neighbours.
+    pub(super) fn cell(&self, index: usize) -> (f64, f64) {
+        let at = |index: usize| {
+            if self.is_linear {
+                self.values[index]
+            } else {
+                libm::log(self.values[index])
+            }
+        };
+        let last = self.values.len() - 1;
+        let alone = if last == 0 { 1.0 } else { 0.0 };
+        let below = if index > 0 {
+            at(index) - at(index - 1)
+        } else {
+            at(1.min(last)) - at(0) + alone
+        };
+        let above = if index < last {
+            at(index + 1) - at(index)
+        } else {
+            below
+        };
+        let low = at(index) - 0.5 * below;
+        let high = at(index) + 0.5 * above;
+        if self.is_linear {
+            (low, high)
+        } else {
+            (libm::exp(low), libm::exp(high))
+        }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.values.len()
+    }
+
+    /// The index of a value of the grid.
+    pub(super) fn index_of(&self, value: f64) -> usize {
+        self.values
+            .partition_point(|&other| other < value)
+            .min(self.values.len() - 1)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::model::Parameters;
+    use crate::model::Selected;
+    use crate::observe::Regime;
+    use crate::reduce::Interval;
+
+    /// A set at Δ in m and T in s that locks to `periods` of T.
+    pub(in crate::figure) fn set(amplitude: f64, period: f64, periods: f64) -> SetRow {
+        let tau = periods * period;
+        let interval = |value: f64| {
+            Some(Interval {
+                low: 0.9 * value,
+                high: 1.1 * value,
+            })
+        };
+        let of_modulated = |value: f64| (amplitude > 0.0).then_some(value);
+        let locking_index = of_modulated(0.8);
+        let resultant_length = of_modulated(0.7);
+        let mean_friction = 280.0 - 1e7 * amplitude;
+        let parameters = Parameters {
+            modulation_amplitude: amplitude,
+            modulation_period: Some(period),
+            ..Parameters::default()
+        };
+        SetRow {
+            set_id: format!("{amplitude:e} {period:e}"),
+            frequency: of_modulated(1.0 / period),
+            eta: if amplitude > 0.0 {
+                parameters.eta()
+            } else {
+                0.0
+            },
+            parameters: Selected::new(parameters.validated().unwrap()),
+            tau_mean: Some(tau),
+            tau_interval: interval(tau),
+            tau_deviation: Some(0.1 * tau),
+            tau_25: Some(0.98 * tau),
+            tau_50: Some(tau),
+            tau_75: Some(1.02 * tau),
+            periods: (0..100_u32)
+                .find(|&n| (f64::from(n) - periods).abs() <= 0.5)
+                .map(u64::from),
+            has_phase: amplitude > 0.0,
+            locking_index,
+            locking_interval: locking_index.and_then(interval),
+            resultant_length,
+            length_interval: resultant_length.and_then(interval),
+            peak_force_mean: Some(480.0),
+            mean_friction: Some(mean_friction),
+            mean_friction_interval: interval(mean_friction),
+            regime: Some(Regime::StickSlip),
+            slip_share: Some(0.05),
+            ..SetRow::default()
+        }
+    }
+
+    #[test]
+    fn cells_meet_and_lie_around_their_values() {
+        for values in [
+            vec![1.0, 2.0, 3.0, 4.0],
+            vec![0.1, 0.2, 0.4, 3.0],
+            vec![0.0, 1.0, 5.0],
+        ] {
+            let grid = Grid::of(values.clone());
+            for index in 0..values.len() {
+                let (low, high) = grid.cell(index);
+                assert!(low < values[index] && values[index] < high, "{values:?}");
+                assert_eq!(grid.index_of(values[index]), index);
+                if index > 0 {
+                    assert!(
+                        (grid.cell(index - 1).1 / low - 1.0).abs() < 1e-12,
+                        "{values:?}"
+                    );
+                }
+            }
+        }
+        assert!(
+            Grid::of(vec![7.0]).axis("").ticks.len() < 9,
+            "a single value"
+        );
     }
 }

@@ -1,15 +1,14 @@
-//! One simulation: the modulation and the shear force over time (Fig. 1d), and under them the space-time map of detached
-//! contacts (Fig. 4b, d) with the onsets of slips.
+//! One simulation: the modulation and the shear force over time (Fig. 1d), and under them the space-time map of
+//! detached contacts (Fig. 4b, d) with the onsets of slips.
 
 use super::axis::{Axis, bounds, widened};
-use super::colour_bar::ColourBar;
+use super::common;
 use super::frame::{Cell, Layout, OVERLAP, Place};
-use super::ink::{Ink, Stroke};
+use super::hues::ColourBar;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::sets::common;
-use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
+use super::style::{BLACK, BLUE, GRID, Ink, Look, RED, REFERENCE, Stroke, shade};
 use crate::model::Parameters;
 use crate::observe::MapRow;
 use crate::sets::label;
@@ -34,23 +33,29 @@ const MAX_PERIODS: f64 = 80.0;
 const MAX_LINES: usize = 5;
 const POINTS_PER_PERIOD: f64 = 40.0;
 
-/// Draws what is given: the shear force in N against time in s, the map, instant by instant, or the map under the force;
-/// above them the modulation. Onsets of slips are marked in the map.
+/// What the panels have in common.
+struct Shared<'a> {
+    parameters: &'a Parameters,
+    time: Axis,
+    /// From s to the unit of the time axis.
+    factor: f64,
+    first: f64,
+    last: f64,
+    /// Peaks of the modulation, on the time axis.
+    peaks: Vec<f64>,
+    width: f64,
+}
+
+/// Draws what is given: the shear force in N against time in s, the map, instant by instant, or the map under the
+/// force; above them the modulation. Onsets of slips are marked in the map.
 pub fn simulation(
     parameters: &Parameters,
     trace: Option<&[(f64, f64)]>,
     map: Option<&[MapRow]>,
     onsets: &[f64],
 ) -> Result<Picture> {
-    let note = format!(
-        "{}, seed {}",
-        common(std::iter::once(parameters)),
-        parameters.seed
-    );
-    let look = &Look {
-        note,
-        ..Look::default()
-    };
+    let of_all = common(std::iter::once(parameters));
+    let look = &Look::default().with_note(&format!("{of_all}, seed {}", parameters.seed));
     let empty = |what| anyhow!("figure {NAME}: there are no {what} to draw");
     let blocks = parameters.blocks;
     if map.is_some_and(|map| map.len() < 2 * blocks || !map.len().is_multiple_of(blocks)) {
@@ -62,105 +67,95 @@ pub fn simulation(
         .filter(|(first, last)| last > first)
         .ok_or_else(|| empty("instants of the simulation"))?;
     let (factor, unit) = label("tau_mean").scale(last);
-    let x = || Axis::linear(&format!("Time t ({unit})"), factor * first, factor * last);
-    // One that is ramped, or too fast, is not drawn.
+    let time = Axis::linear(&format!("Time t ({unit})"), factor * first, factor * last);
+    // A ramped modulation is not drawn, nor one that is too fast.
     let is_drawn =
         |period: &f64| parameters.ramp_time == 0.0 && (last - first) / period <= MAX_PERIODS;
     let period = parameters.modulation_period.filter(is_drawn);
-    let onsets: Vec<f64> = onsets
-        .iter()
-        .copied()
-        .filter(|onset| (first..=last).contains(onset))
-        .collect();
+    let peaks = period.map(|period| time.multiples_of(factor * period, MAX_PEAKS));
+    let shared = Shared {
+        parameters,
+        time,
+        factor,
+        first,
+        last,
+        peaks: peaks.unwrap_or_default(),
+        width: WIDTHS[usize::from(map.is_some())],
+    };
+    let mut onsets = onsets.to_vec();
+    onsets.retain(|onset| (first..=last).contains(onset));
+    let mut legend = Vec::new();
+    if map.is_some() && !onsets.is_empty() {
+        legend.push(entry(Mark::Line(ONSET), "onset of a slip"));
+    }
+    if !shared.peaks.is_empty() {
+        legend.push(entry(Mark::Line(REFERENCE), "peaks of the modulation"));
+    }
+    let modulation = period.map(|period| shared.modulation(period));
+    let force = trace.map(|trace| shared.force(trace));
+    let contacts = map.map(|map| shared.contacts(map, &onsets));
+    let panels = [modulation, force, contacts].into_iter().flatten();
+    let layout = Layout::column(shared.width);
+    Ok(panel::draw(NAME, look, layout, &legend, panels.collect()))
+}
 
-    let peaks = period.map_or_else(Vec::new, |period| {
-        x().multiples_of(factor * period, MAX_PEAKS)
-    });
-    let legend = [
-        map.filter(|_| !onsets.is_empty())
-            .map(|_| entry(Mark::Line(ONSET), "onset of a slip")),
-        (!peaks.is_empty()).then(|| entry(Mark::Line(REFERENCE), "peaks of the modulation")),
-    ];
-    let legend: Vec<_> = legend.into_iter().flatten().collect();
-    let width = WIDTHS[usize::from(map.is_some())];
-    let peaks = || peaks.iter().map(|&peak| Layer::Upright(peak, REFERENCE));
-    let modulation = period.map(|period| {
-        let amplitude = MICROMETRES * parameters.modulation_amplitude;
-        let mut y = Axis::sparse(
-            "Modulation Δ cos(2πt/T) (µm)",
-            -1.2 * amplitude,
-            1.2 * amplitude,
-        );
+impl Shared<'_> {
+    /// A panel with these layers around the peaks of the modulation.
+    fn panel<'l>(
+        &self,
+        height: f64,
+        y: Axis,
+        under: Option<Layer<'l>>,
+        over: impl IntoIterator<Item = Layer<'l>>,
+    ) -> Panel<'l> {
+        let peaks = self.peaks.iter();
+        let peaks = peaks.map(|&peak| Layer::Upright(peak, REFERENCE));
+        let layers = under.into_iter().chain(peaks).chain(over);
+        Panel::inside(height, self.time.clone(), y, layers)
+    }
+
+    fn modulation(&self, period: f64) -> Panel<'static> {
+        let amplitude = MICROMETRES * self.parameters.modulation_amplitude;
+        let end = 1.2 * amplitude;
+        let mut y = Axis::sparse("Modulation Δ cos(2πt/T) (µm)", -end, end);
         y.minor.clear();
-        let points = floored(POINTS_PER_PERIOD * (last - first) / period) + 2;
-        let curve = x()
-            .evenly_placed(points)
-            .map(|time| (time, amplitude * libm::cos(TAU * time / (factor * period))));
-        let level = std::iter::once(Layer::Level(0.0, GRID));
-        Panel::inside(
-            64.0,
-            x(),
-            y,
-            level
-                .chain(peaks())
-                .chain([Layer::Curve(curve.collect(), MODULATION)]),
-        )
-    });
-    let force = trace.map(|trace| {
-        let (low, high) =
-            widened(bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0)));
+        let points = floored(POINTS_PER_PERIOD * (self.last - self.first) / period) + 2;
+        let phase = |time: f64| TAU * time / (self.factor * period);
+        let times = self.time.evenly_placed(points).into_iter();
+        let curve = times.map(|time| (time, amplitude * libm::cos(phase(time))));
+        let curve = Layer::Curve(curve.collect(), MODULATION);
+        self.panel(64.0, y, Some(Layer::Level(0.0, GRID)), [curve])
+    }
+
+    fn force(&self, trace: &[Place]) -> Panel<'static> {
+        let ends = bounds(trace.iter().map(|sample| sample.1));
+        let (low, high) = widened(ends.unwrap_or((0.0, 0.0)));
         let y = Axis::linear("Shear force Fₛ (N)", low, high);
-        let force = thinned(trace, width)
-            .into_iter()
-            .map(|(time, force)| (factor * time, force));
-        Panel::inside(
-            230.0,
-            x(),
-            y,
-            peaks().chain([Layer::Curve(force.collect(), TRACE)]),
-        )
-    });
-    let contacts = map.map(|map| {
-        let length = parameters.slider_length * MILLIMETRES;
+        let force = thinned(trace, self.width).into_iter();
+        let force = force.map(|(time, force)| (self.factor * time, force));
+        let force = Layer::Curve(force.collect(), TRACE);
+        self.panel(230.0, y, None, [force])
+    }
+
+    fn contacts(&self, map: &[MapRow], onsets: &[f64]) -> Panel<'static> {
+        let Self { factor, first, .. } = *self;
+        let length = self.parameters.slider_length * MILLIMETRES;
         let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, length);
-        let cells = cells(map, blocks, first, length, width).into_iter();
+        let cells = cells(map, self.parameters.blocks, first, length, self.width).into_iter();
         let cells = cells
             .map(|(((left, right), y), colour)| (((factor * left, factor * right), y), colour));
         let cells = Layer::Cells(cells.collect(), OVERLAP);
         // Many lines would cover the slips.
-        let bottom = if onsets.len() > MAX_LINES {
-            0.93 * length
-        } else {
-            0.0
-        };
-        let onsets = onsets.iter().map(|onset| {
-            Layer::Curve(
-                vec![(factor * onset, length), (factor * onset, bottom)],
-                ONSET,
-            )
-        });
-        let percent = ColourBar::of_axis(&Axis::linear("detached (%)", 0.0, 100.0), shade);
+        let are_marks = onsets.len() > MAX_LINES;
+        let bottom = if are_marks { 0.93 * length } else { 0.0 };
+        let onsets = onsets.iter().map(|onset| factor * onset);
+        let onsets = onsets.map(|at| Layer::Curve(vec![(at, length), (at, bottom)], ONSET));
+        let percent = Axis::linear("detached (%)", 0.0, 100.0);
         Panel {
-            bar: Some(percent),
-            ..Panel::inside(
-                260.0,
-                x(),
-                y,
-                std::iter::once(cells).chain(peaks()).chain(onsets),
-            )
+            bar: Some(ColourBar::of_axis(&percent, shade)),
+            ..self.panel(260.0, y, Some(cells), onsets)
         }
-    });
-    let panels = [modulation, force, contacts]
-        .into_iter()
-        .flatten()
-        .collect();
-    Ok(panel::draw(
-        NAME,
-        look,
-        Layout::column(width),
-        &legend,
-        panels,
-    ))
+    }
 }
 
 /// The least and the largest of the samples of each column of a figure: no peak is lost.
@@ -270,11 +265,9 @@ mod tests {
 
     #[test]
     fn the_requested_panels_are_drawn_and_labelled_once() {
-        let (force, position, bar) = (
-            "Shear force Fₛ (N)<",
-            "Position x (mm), trailing edge at 0<",
-            ">detached (%)<",
-        );
+        let force = "Shear force Fₛ (N)<";
+        let position = "Position x (mm), trailing edge at 0<";
+        let bar = ">detached (%)<";
         let panels = [
             (true, false, vec![force]),
             (false, true, vec![position, bar]),

@@ -1,17 +1,17 @@
-//! The look of all figures: paper, sizes of text, strokes, colours. Lengths on a sheet are units, of which a style says how
-//! long they are: text has the same size in every figure, whatever the size of the sheet.
+//! The look of all figures: paper, font, sizes of text, strokes, dots, colours. Lengths on a sheet are units; a style
+//! says how long a unit is. Text has the same size in every figure, whatever the size of the sheet.
 
-use super::ink::{Dot, Fill, Ink, Stroke};
 use crate::table::value::{floored, words};
+use std::fmt;
+use std::sync::LazyLock;
+use ttf_parser::{Face, GlyphId};
 
 words! {
     /// What a figure is for.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Style {
-        /// Pages and slides: 192 pixels per inch, as large as the data need.
         #[default]
         Screen = "screen",
-        /// Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch; no small print.
         Print = "print",
     }
 }
@@ -24,6 +24,16 @@ const COLUMNS: [f64; 2] = [86.0, 178.0];
 const MAX_ONE_COLUMN: f64 = 800.0;
 
 impl Style {
+    /// What the help says of it.
+    pub const fn description(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Screen => "Pages and slides: 192 pixels per inch, as large as the data need",
+            Self::Print => {
+                "Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch; no small print"
+            }
+        })
+    }
+
     pub(super) const fn points(self) -> f64 {
         match self {
             Self::Screen => 0.75,
@@ -39,7 +49,7 @@ impl Style {
         }
     }
 
-    /// Width of a sheet of which no size is asked and that is this wide in units.
+    /// Width of a sheet of this natural width, in units, if no size is requested.
     pub(super) fn width(self, natural: f64) -> f64 {
         match self {
             Self::Screen => natural,
@@ -92,13 +102,10 @@ impl Look {
 
     /// The same look with more small print.
     pub fn with_note(&self, more: &str) -> Self {
-        let between = if self.note.is_empty() || more.is_empty() {
-            ""
-        } else {
-            "; "
-        };
+        let notes = [&*self.note, more].into_iter();
+        let notes: Vec<&str> = notes.filter(|note| !note.is_empty()).collect();
         Self {
-            note: format!("{}{between}{more}", self.note),
+            note: notes.join("; "),
             ..self.clone()
         }
     }
@@ -113,6 +120,92 @@ pub(super) const LEGEND_TEXT: u32 = 15;
 pub(super) const NOTE_TEXT: u32 = 12;
 /// The digits' middle over their base line, over the size of the text.
 pub(super) const HALF_DIGIT: f64 = 0.36;
+
+/// The font of all figures.
+pub(super) fn font_file() -> &'static [u8] {
+    dejavu::sans::regular()
+}
+
+pub(super) static FACE: LazyLock<Face<'static>> =
+    LazyLock::new(|| Face::parse(font_file(), 0).expect("the font of the program can be read"));
+
+/// Width of a text of this size.
+pub(super) fn text_width(text: &str, size: u32) -> f64 {
+    let advance = |letter: char| {
+        let glyph = FACE.glyph_index(letter).unwrap_or(GlyphId(0));
+        f64::from(FACE.glyph_hor_advance(glyph).unwrap_or(0)) / f64::from(FACE.units_per_em())
+    };
+    f64::from(size) * text.chars().map(advance).sum::<f64>()
+}
+
+/// An opaque colour: red, green and blue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ink(pub [u8; 3]);
+
+impl Ink {
+    /// From `0xrrggbb`.
+    pub(super) const fn new(code: u32) -> Self {
+        let [_, red, green, blue] = code.to_be_bytes();
+        Self([red, green, blue])
+    }
+}
+
+/// `#rrggbb`.
+impl fmt::Display for Ink {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [red, green, blue] = self.0;
+        write!(f, "#{red:02x}{green:02x}{blue:02x}")
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stroke {
+    pub(super) ink: Ink,
+    pub(super) width: f64,
+    /// Lengths of dash and gap.
+    pub(super) dashes: Option<(f64, f64)>,
+}
+
+impl Stroke {
+    pub(super) const fn solid(ink: Ink, width: f64) -> Self {
+        Self {
+            ink,
+            width,
+            dashes: None,
+        }
+    }
+
+    pub(super) const fn dashed(ink: Ink, width: f64, dashes: (f64, f64)) -> Self {
+        Self {
+            ink,
+            width,
+            dashes: Some(dashes),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Dot {
+    pub(super) ink: Ink,
+    pub(super) radius: f64,
+    pub(super) opacity: f64,
+}
+
+impl Dot {
+    pub(super) const fn solid(ink: Ink, radius: f64) -> Self {
+        Self {
+            ink,
+            radius,
+            opacity: 1.0,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fill {
+    pub(super) ink: Ink,
+    pub(super) opacity: f64,
+}
 
 /// Black for axes and text.
 pub(super) const BLACK: Ink = Ink::new(0x00_00_00);
@@ -134,18 +227,8 @@ pub const INKS: [Ink; 6] = [
 ];
 
 /// For dots on a scale: the darker of the shades, which are seen on white.
-pub const SCALE: [Ink; 10] = [
-    Ink::new(0xab_d4_ce),
-    Ink::new(0x8f_c7_c7),
-    Ink::new(0x74_b9_c1),
-    Ink::new(0x5b_a9_ba),
-    Ink::new(0x45_98_b2),
-    Ink::new(0x35_86_a8),
-    Ink::new(0x2a_74_9c),
-    Ink::new(0x22_61_8e),
-    Ink::new(0x1e_4e_7c),
-    Ink::new(0x1b_3a_68),
-];
+pub static SCALE: LazyLock<[Ink; 10]> =
+    LazyLock::new(|| std::array::from_fn(|step| shade(0.3 + 0.7 * step as f64 / 9.0)));
 
 /// Border and ticks of a frame.
 pub(super) const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
@@ -154,7 +237,7 @@ pub(super) const GRID: Stroke = Stroke::solid(LIGHT_GREY, 1.0);
 /// What the data are compared with.
 pub(super) const REFERENCE: Stroke = Stroke::dashed(GREY, 1.4, (6.0, 4.0));
 pub(super) const BAR_WIDTH: f64 = 1.6;
-/// A range that is pointed out.
+/// A highlighted range.
 pub(super) const STRIPE: Fill = Fill {
     ink: LIGHT_GREY,
     opacity: 0.35,
@@ -250,5 +333,12 @@ mod tests {
     fn print_is_one_or_two_columns_wide() {
         let width = |natural| Style::Print.millimetres(Style::Print.width(natural));
         assert!((width(660.0) - 86.0).abs() < 1e-9 && (width(1000.0) - 178.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn widths_are_those_of_the_letters() {
+        assert!((text_width("nn", 10) - 2.0 * text_width("n", 10)).abs() < 1e-12);
+        assert!(text_width("m", 10) > 2.0 * text_width("i", 10) && text_width("", 10) == 0.0);
+        assert!(text_width("φₘᵢₙ", 10) < text_width("φmin", 10));
     }
 }

@@ -1,13 +1,13 @@
 //! Work against precision: what an error costs with each method, a panel for each kind of error; all logarithmic. A
-//! method has an ink, a drive a pattern of the line and a mark. Errors that are chance are not joined by lines.
+//! method has an ink, a drive a pattern of the line and a mark. Dots are not joined where errors are chance.
 
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Ends, Layout};
-use super::ink::{Dot, Ink, Stroke};
-use super::legend::{Mark, entry};
+use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::style::{INKS, Look, RADIUS, STRIPE, WHITE};
+use super::quantity::distinct;
+use super::style::{Dot, INKS, Ink, Look, RADIUS, STRIPE, Stroke, WHITE};
 use anyhow::{Result, anyhow};
 
 const NAME: &str = "work-precision";
@@ -17,15 +17,43 @@ const HEIGHT: f64 = 340.0;
 /// Width of the bars of uncertainty.
 const UNCERTAINTY: f64 = 1.0;
 
-/// The look of a drive: dashes and gaps of its line, and radii of its dots and of the holes in them.
-type Pattern = (Option<(f64, f64)>, f64, f64);
+/// The line of a method under a drive.
+struct Line<'a> {
+    method: &'a str,
+    drive: &'a str,
+    ink: Ink,
+    dashes: Option<(f64, f64)>,
+    /// Of its dots, and of the holes in them.
+    radius: f64,
+    hole: f64,
+}
 
-/// No two of twelve drives look the same.
-fn pattern(drive: usize) -> Pattern {
-    let radius = RADIUS * [1.0, 1.5, 2.0, 0.7][drive / 3 % 4];
-    let hole = radius * [0.0, 0.62, 0.3][drive % 3];
-    let dashes = (drive > 0).then_some((5.0 + drive as f64, 3.0));
-    (dashes, radius, hole)
+impl<'a> Line<'a> {
+    /// No two of twelve drives look the same.
+    fn new(method: &'a str, ink: Ink, drive: &'a str, number: usize) -> Self {
+        let radius = RADIUS * [1.0, 1.5, 2.0, 0.7][number / 3 % 4];
+        Self {
+            method,
+            drive,
+            ink,
+            dashes: (number > 0).then_some((5.0 + number as f64, 3.0)),
+            radius,
+            hole: radius * [0.0, 0.62, 0.3][number % 3],
+        }
+    }
+
+    fn has(&self, point: &WorkPrecision) -> bool {
+        point.method == self.method && point.drive == self.drive
+    }
+
+    fn entry(&self) -> Entry {
+        let mark = if self.hole > 0.0 {
+            Mark::Ring(self.ink, self.radius, self.hole)
+        } else {
+            Mark::Dot(Dot::solid(self.ink, self.radius))
+        };
+        entry(mark, format!("{}, {}", self.method, self.drive))
+    }
 }
 
 /// Error and cost of a method at one setting, under one drive.
@@ -57,49 +85,30 @@ impl ErrorPanel {
             .filter(|point| point.error > 0.0 && point.work > 0.0)
     }
 
-    /// A method under a drive, on an axis of errors that begins at `least`: joined by a line unless errors are chance.
-    fn layer<'a>(
-        &self,
-        of: (&str, &str),
-        (ink, (dashes, radius, hole)): (Ink, Pattern),
-        least: f64,
-    ) -> Layer<'a> {
-        let points = || {
-            self.usable()
-                .filter(|point| (&*point.method, &*point.drive) == of)
-        };
+    /// A line on an axis of errors that begins at `least`: dots are joined unless errors are chance.
+    fn layer<'a>(&self, line: &Line<'_>, least: f64) -> Layer<'a> {
+        let Line { ink, dashes, .. } = *line;
+        let points = || self.usable().filter(|point| line.has(point));
         let places = || points().map(|point| (point.error, point.work)).collect();
-        let line = self.by_chance.is_none().then(|| {
-            Layer::Curve(
-                places(),
-                Stroke {
-                    ink,
-                    width: 1.8,
-                    dashes,
-                },
-            )
-        });
-        let bars = points().map(
-            |WorkPrecision {
-                 uncertainty: (low, high),
-                 work,
-                 ..
-             }| {
-                Layer::Curve(
-                    vec![(low.max(least), *work), (*high, *work)],
-                    Stroke::solid(ink, UNCERTAINTY),
-                )
-            },
-        );
-        let dots = Layer::Dots(places(), Dot::solid(ink, radius));
-        let holes = (hole > 0.0).then(|| Layer::Dots(places(), Dot::solid(WHITE, hole)));
-        Layer::Inside(
-            line.into_iter()
-                .chain(bars)
-                .chain([dots])
-                .chain(holes)
-                .collect(),
-        )
+        let mut layers = Vec::new();
+        if self.by_chance.is_none() {
+            let stroke = Stroke {
+                ink,
+                width: 1.8,
+                dashes,
+            };
+            layers.push(Layer::Curve(places(), stroke));
+        }
+        for point in points() {
+            let (low, high) = point.uncertainty;
+            let ends = vec![(low.max(least), point.work), (high, point.work)];
+            layers.push(Layer::Curve(ends, Stroke::solid(ink, UNCERTAINTY)));
+        }
+        layers.push(Layer::Dots(places(), Dot::solid(ink, line.radius)));
+        if line.hole > 0.0 {
+            layers.push(Layer::Dots(places(), Dot::solid(WHITE, line.hole)));
+        }
+        Layer::Inside(layers)
     }
 }
 
@@ -107,42 +116,22 @@ impl ErrorPanel {
 /// given order; values that are not > 0 are left out.
 pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> Result<Picture> {
     let empty = || anyhow!("figure {NAME}: there are no errors and costs to draw");
-    let works = panels
-        .iter()
-        .flat_map(ErrorPanel::usable)
-        .map(|point| point.work);
-    let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
+    let usable = panels.iter().flat_map(ErrorPanel::usable);
+    let (least, most) = logarithmic_bounds(usable.map(|point| point.work)).ok_or_else(empty)?;
     let all = || panels.iter().flat_map(|panel| &panel.points);
     let methods = distinct(all().map(|point| &*point.method));
     let drives = distinct(all().map(|point| &*point.drive));
-    let inks = methods.iter().zip(INKS.into_iter().cycle());
-    let looks = inks.flat_map(|(method, ink)| {
-        drives
-            .iter()
-            .enumerate()
-            .map(move |(place, drive)| ((*method, *drive), (ink, pattern(place))))
-    });
-    let is_known = |of: (&str, &str)| all().any(|point| (&*point.method, &*point.drive) == of);
-    let looks: Vec<_> = looks.filter(|(of, _)| is_known(*of)).collect();
-    let lines = looks
-        .iter()
-        .map(|&((method, drive), (ink, (_, radius, hole)))| {
-            let dot = Mark::Dot(Dot::solid(ink, radius));
-            let mark = if hole > 0.0 {
-                Mark::Ring(ink, radius, hole)
-            } else {
-                dot
-            };
-            entry(mark, format!("{method}, {drive}"))
-        });
-    let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
-    let chance = has_chance.then(|| {
-        entry(
-            Mark::Patch(STRIPE),
-            "what chance alone gives in 95 of 100 cases",
-        )
-    });
-    let legend: Vec<_> = lines.chain(chance).collect();
+    let mut lines = Vec::new();
+    for (&method, ink) in methods.iter().zip(INKS.into_iter().cycle()) {
+        let of_drive = |(number, &drive): (usize, &_)| Line::new(method, ink, drive, number);
+        lines.extend(drives.iter().enumerate().map(of_drive));
+    }
+    lines.retain(|line| all().any(|point| line.has(point)));
+    let mut legend: Vec<Entry> = lines.iter().map(Line::entry).collect();
+    if panels.iter().any(|panel| panel.by_chance.is_some()) {
+        let text = "what chance alone gives in 95 of 100 cases";
+        legend.push(entry(Mark::Patch(STRIPE), text));
+    }
     let layout = Layout {
         columns: panels.len(),
         column_gap: COLUMN_GAP,
@@ -150,39 +139,20 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
     };
     let panel = |(column, panel): (usize, &ErrorPanel)| {
         // Lower ends may be 0: they run out of the panel.
-        let ends = panel
-            .usable()
-            .flat_map(|point| [point.error, point.uncertainty.1]);
+        let points = panel.usable();
+        let ends = points.flat_map(|point| [point.error, point.uncertainty.1]);
         let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance))?;
         let y = Axis::logarithmic(if column == 0 { work_label } else { "" }, least, most);
         let x = Axis::logarithmic(&panel.label, low, high);
-        let chance = panel
-            .by_chance
-            .map(|by_chance| Layer::Stripe((low, by_chance), STRIPE));
-        let layers = chance
-            .into_iter()
-            .chain(looks.iter().map(|&(of, look)| panel.layer(of, look, x.low)))
-            .collect();
+        let chance = panel.by_chance.into_iter();
+        let chance = chance.map(|by_chance| Layer::Stripe((low, by_chance), STRIPE));
+        let lines = lines.iter().map(|line| panel.layer(line, x.low));
+        let layers = chance.chain(lines).collect();
         Some(Panel::new(HEIGHT, x, y, layers))
     };
     let panels: Option<Vec<Panel<'_>>> = panels.iter().enumerate().map(panel).collect();
-    Ok(panel::draw(
-        NAME,
-        look,
-        layout,
-        &legend,
-        panels.ok_or_else(empty)?,
-    ))
-}
-
-/// Each name once, in the order of first appearance.
-fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-    names.fold(Vec::new(), |mut known, name| {
-        if !known.contains(&name) {
-            known.push(name);
-        }
-        known
-    })
+    let panels = panels.ok_or_else(empty)?;
+    Ok(panel::draw(NAME, look, layout, &legend, panels))
 }
 
 #[cfg(test)]
@@ -192,8 +162,8 @@ mod tests {
     #[test]
     fn twelve_drives_look_different() {
         let looks: Vec<(f64, f64)> = (0..12)
-            .map(pattern)
-            .map(|(_, radius, hole)| (radius, hole))
+            .map(|number| Line::new("", INKS[0], "", number))
+            .map(|line| (line.radius, line.hole))
             .collect();
         assert!(
             looks
@@ -244,7 +214,8 @@ mod tests {
         }
         // Of each solid line in a panel the line itself, two bars and two dots, and the mark in the legend.
         assert_eq!(svg.matches(&INKS[0].to_string()).count(), 5 + 1);
-        // Where errors are chance there is no line: of the two methods in either panel two, one, two bars, and two dots.
+        // Where errors are chance there is no line: of the two methods in either panel two, one, two bars, and two
+        // dots.
         assert_eq!(svg.matches(&INKS[1].to_string()).count(), 5 + 2 * 4 + 2);
         assert!(work_precision("cost", &[], &Look::default()).is_err());
     }

@@ -177,25 +177,28 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
     let of_b = pairs.iter().map(|pair| (&*pair.b.id, &*pair.seeds));
     let rows_of_b = rows_of(b, &of_b.collect())?;
 
-    let mut seeds = Values::computed("seeds", Kind::Count);
-    for pair in &pairs {
-        seeds.push(Some(pair.seeds.len() as f64), None);
-    }
-    let mut found = vec![seeds];
+    let seeds = pairs
+        .iter()
+        .map(|pair| (Some(pair.seeds.len() as f64), None));
+    let mut found = vec![Values::computed("seeds", Kind::Count, seeds)];
     for (name, sum) in STATISTICS {
-        let column = |which| Values::computed(&format!("{name}_{which}"), Kind::Real);
-        let [mut in_a, mut in_b, mut difference] = ["a", "b", "difference"].map(column);
-        for pair in &pairs {
-            let of_a = rows_of_a[&pair.a.id].number(name);
-            let of_b = rows_of_b[&pair.b.id].number(name);
-            let whole = of_b.zip(of_a).map(|(b, a)| b - a);
+        let of_a = |pair: &Pair<'_>| rows_of_a[&pair.a.id].number(name);
+        let of_b = |pair: &Pair<'_>| rows_of_b[&pair.b.id].number(name);
+        let difference = |pair: &Pair<'_>| {
+            let whole = of_b(pair).zip(of_a(pair)).map(|(b, a)| b - a);
             let interval = whole.zip(pair.error(sum));
             let interval = interval.map(|(whole, error)| (whole + error.low, whole + error.high));
-            in_a.push(of_a, None);
-            in_b.push(of_b, None);
-            difference.push(whole, interval);
-        }
-        found.extend([in_a, in_b, difference]);
+            (whole, interval)
+        };
+        let in_a = pairs.iter().map(|pair| (of_a(pair), None));
+        let in_b = pairs.iter().map(|pair| (of_b(pair), None));
+        let differences = pairs.iter().map(difference);
+        let name = |which| format!("{name}_{which}");
+        found.extend([
+            Values::computed(&name("a"), Kind::Real, in_a),
+            Values::computed(&name("b"), Kind::Real, in_b),
+            Values::computed(&name("difference"), Kind::Real, differences),
+        ]);
     }
     found.retain(|values| values.numbers.iter().any(Option::is_some));
     let rows = pairs.iter().map(|pair| rows_of_a[&pair.a.id].clone());

@@ -45,8 +45,8 @@ pub use sample::{Point, RampStage};
 #[cfg(test)]
 pub(crate) use set_writer::RoundOfSet;
 pub use set_writer::{SetInRounds, error_over_target};
-pub use swept::{Swept, differing, has_even_steps, is_spread, swept};
-pub use values::{Values, ascending, is_same, set_columns, sets_where};
+pub use swept::{differing, has_even_steps, is_spread, swept};
+pub use values::{Values, ascending, is_same, sets_where};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};

@@ -115,16 +115,15 @@ pub fn read_reduced<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsErro
     Ok(batches.into_iter().flatten().collect())
 }
 
-/// The sets with at least one interval or a regime, controls left out, in order; empty if there are more than `max`.
-pub fn read_sets(layout: &Layout<'_>, max: usize) -> Result<Vec<SetRow>, ResultsError> {
-    let mut sets = Vec::new();
+/// The rows of the reduced sets, controls left out, in order.
+pub fn read_sets<'a>(
+    layout: &Layout<'a>,
+) -> impl Iterator<Item = Result<SetRow, ResultsError>> + use<'a> {
     let file = layout.reduced_file(SetRow::NAME);
-    for batch in Dataset::new(layout.storage, vec![file]).rows::<SetRow>() {
-        let rows = batch?.into_iter().filter(|row| !row.is_control);
-        sets.extend(rows.filter(|row| row.intervals > 0 || row.regime.is_some()));
-        if sets.len() > max {
-            return Ok(Vec::new());
-        }
-    }
-    Ok(sets)
+    let batches = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
+    let rows = batches.flat_map(|batch| match batch {
+        Ok(rows) => rows.into_iter().map(Ok).collect(),
+        Err(error) => vec![Err(error)],
+    });
+    rows.filter(|row| !matches!(row, Ok(row) if row.is_control))
 }

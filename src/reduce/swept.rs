@@ -1,7 +1,7 @@
 //! What was swept, inferred from the sets: the columns in which they differ. The first makes the axis of a figure, the second
 //! its colours, the third its panels.
 
-use super::values::{Values, ascending, is_same};
+use super::values::{Values, is_same};
 use crate::model::Symbol;
 use crate::sets::{FREQUENCY, SetRow};
 
@@ -12,26 +12,8 @@ const WIDE: f64 = 9.0;
 /// Ratio of the ends up to which no axis is logarithmic: values would fall on one place.
 const NARROW: f64 = 1.1;
 
-/// A parameter in which sets differ. The period appears as the quantity that was swept: 1/T, η or T.
-#[derive(Clone, Debug)]
-pub struct Swept {
-    pub values: Values,
-    /// Each value once, in SI.
-    pub distinct: Vec<f64>,
-}
-
-impl Swept {
-    /// A column, whether it was swept or not.
-    pub fn of(rows: &[SetRow], column: &str) -> Result<Self, String> {
-        let values = Values::of(rows, column)?;
-        let distinct = ascending(values.numbers.iter().copied().flatten());
-        Ok(Self { values, distinct })
-    }
-
-    pub fn name(&self) -> &str {
-        &self.values.column.name
-    }
-
+/// As one of the parameters in which sets differ.
+impl Values {
     /// Whether its values are spaced logarithmically.
     pub fn is_logarithmic(&self) -> bool {
         let [least, .., largest] = self.distinct[..] else {
@@ -39,7 +21,7 @@ impl Swept {
         };
         let is_even =
             has_even_steps(&self.distinct) && (self.distinct.len() > 2 || largest < WIDE * least);
-        !self.values.is_worded() && is_spread(&self.distinct) && !is_even
+        !self.is_worded() && is_spread(&self.distinct) && !is_even
     }
 
     /// Whether each of its values goes with one of another: both have few values, or both ascend.
@@ -59,7 +41,7 @@ impl Swept {
             let mut distinct = self.distinct.iter();
             distinct.position(|&value| is_same(value, number))
         };
-        let numbers = self.values.numbers.iter();
+        let numbers = self.numbers.iter();
         numbers.map(|number| place((*number)?)).collect()
     }
 }
@@ -74,25 +56,24 @@ pub fn differing<'a>(rows: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<S
     Symbol::ALL.into_iter().filter(differs).collect()
 }
 
-/// What was swept, the column with most values first. Left out is a column that another one determines, such as the amplitude
+/// What was swept, the column with most values first; the period as 1/T, η or T, whichever was swept. Left out is a column that another one determines, such as the amplitude
 /// that is 0 where there is no period, or the second of two parameters that an axis moves together.
-pub fn swept(rows: &[SetRow]) -> Vec<Swept> {
+pub fn swept(rows: &[SetRow]) -> Vec<Values> {
     let column = |symbol: Symbol| {
         let names: &[&str] = if symbol == Symbol::T {
             &[FREQUENCY, "eta", "T"]
         } else {
             &[symbol.key()]
         };
-        let columns = names.iter().filter_map(|name| Swept::of(rows, name).ok());
+        let columns = names.iter().filter_map(|name| Values::of(rows, name).ok());
         columns.min_by_key(|swept| (swept.distinct.len(), !has_even_steps(&swept.distinct)))
     };
     let symbols = differing(&rows.iter()).into_iter();
-    let mut all: Vec<Swept> = symbols.filter_map(column).collect();
+    let mut all: Vec<Values> = symbols.filter_map(column).collect();
     // A missing period counts as a value.
-    let count =
-        |swept: &Swept| swept.distinct.len() + usize::from(swept.values.numbers.contains(&None));
+    let count = |swept: &Values| swept.distinct.len() + usize::from(swept.numbers.contains(&None));
     all.sort_by_key(|swept| std::cmp::Reverse(count(swept)));
-    let mut kept: Vec<Swept> = Vec::new();
+    let mut kept: Vec<Values> = Vec::new();
     for swept in all {
         if !kept.iter().any(|other| other.fixes(&swept)) {
             kept.retain(|other| !swept.fixes(other));

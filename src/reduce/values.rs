@@ -18,19 +18,16 @@ pub struct Values {
     pub numbers: Vec<Option<f64>>,
     /// Ends of the confidence intervals, where there are any.
     pub intervals: Vec<Option<(f64, f64)>>,
+    /// Each number once, ascending.
+    pub distinct: Vec<f64>,
     /// The words that occur, sorted; empty for a column of numbers.
     pub words: Vec<String>,
-}
-
-/// The columns of the sets that can be shown.
-pub fn set_columns() -> Vec<Column> {
-    SetRow::columns()
 }
 
 impl Values {
     /// The values of a column, or of a formula such as `tau_sd / tau_mean`. An error says what is wrong with the name.
     pub fn of(rows: &[SetRow], name: &str) -> Result<Self, String> {
-        let columns = set_columns();
+        let columns = SetRow::columns();
         let index = |name: &str| columns.iter().position(|column| column.name == name);
         let Some(column) = index(name) else {
             return Self::of_formula(rows, name, &columns);
@@ -52,18 +49,27 @@ impl Values {
         for (number, word) in numbers.iter_mut().zip(given) {
             *number = number.or_else(|| words.binary_search(&word?).ok().map(|index| index as f64));
         }
-        Ok(Self {
-            column: columns[column].clone(),
+        Ok(Self::new(
+            columns[column].clone(),
             numbers,
             intervals,
             words,
-        })
+        ))
     }
 
-    /// Adds the value of a set, and the ends of its interval.
-    pub(super) fn push(&mut self, number: Option<f64>, interval: Option<(f64, f64)>) {
-        self.numbers.push(number);
-        self.intervals.push(interval);
+    fn new(
+        column: Column,
+        numbers: Vec<Option<f64>>,
+        intervals: Vec<Option<(f64, f64)>>,
+        words: Vec<String>,
+    ) -> Self {
+        Self {
+            column,
+            distinct: ascending(numbers.iter().copied().flatten()),
+            numbers,
+            intervals,
+            words,
+        }
     }
 
     fn of_formula(rows: &[SetRow], text: &str, columns: &[Column]) -> Result<Self, String> {
@@ -74,30 +80,31 @@ impl Values {
         let formula = Expression::formula(text, &|name| number_column(name, columns));
         let formula = formula.map_err(|error| error.to_string())?;
         let numbers = rows.iter().map(|row| evaluate(&formula, row));
-        let numbers = numbers.map(|number| number.is_finite().then_some(number));
-        Ok(Self {
-            numbers: numbers.collect(),
-            intervals: vec![None; rows.len()],
-            ..Self::computed(text, Kind::Real)
-        })
+        let found = numbers.map(|number| (number.is_finite().then_some(number), None));
+        Ok(Self::computed(text, Kind::Real, found))
     }
 
-    /// A column of computed values, without any yet.
-    pub(super) fn computed(name: &str, kind: Kind) -> Self {
-        Self {
-            column: Column {
-                name: name.to_owned().into(),
-                unit: "",
-                meaning: "",
-                symbol: "",
-                words: "",
-                kind,
-                nullable: true,
-            },
-            numbers: Vec::new(),
-            intervals: Vec::new(),
-            words: Vec::new(),
-        }
+    /// A column of computed values and the ends of their intervals.
+    pub(super) fn computed(
+        name: &str,
+        kind: Kind,
+        found: impl Iterator<Item = (Option<f64>, Option<(f64, f64)>)>,
+    ) -> Self {
+        let column = Column {
+            name: name.to_owned().into(),
+            unit: "",
+            meaning: "",
+            symbol: "",
+            words: "",
+            kind,
+            nullable: true,
+        };
+        let (numbers, intervals) = found.unzip();
+        Self::new(column, numbers, intervals, Vec::new())
+    }
+
+    pub fn name(&self) -> &str {
+        &self.column.name
     }
 
     /// Whether it holds words, or yes and no.
@@ -111,7 +118,7 @@ impl Values {
     }
 
     pub fn label(&self) -> Label {
-        label(&self.column.name)
+        label(self.name())
     }
 
     /// The factor to the unit in which they are read best, and that unit.
@@ -123,11 +130,10 @@ impl Values {
     /// The digits that distinguish its values if it is a parameter, or computed from parameters; three for a statistic, whose
     /// interval says how many are certain.
     pub fn digits(&self) -> Digits {
-        let name = &*self.column.name;
         let numbers = self.numbers.iter().flatten().copied();
-        match name {
-            "T" | "eta" | FREQUENCY => Digits::THREE.distinguishing(&ascending(numbers)),
-            _ if Symbol::from_key(name).is_some() => {
+        match self.name() {
+            "T" | "eta" | FREQUENCY => Digits::THREE.distinguishing(&self.distinct),
+            name if Symbol::from_key(name).is_some() => {
                 Digits::THREE.distinguishing(&numbers.collect::<Vec<_>>())
             }
             _ => Digits::THREE,
@@ -155,7 +161,7 @@ fn word(cell: Value<'_>) -> Option<String> {
 
 /// The sets for which a condition on their columns holds, such as `V0 < 1e-4 and resultant_length > 0.5`.
 pub fn sets_where(rows: Vec<SetRow>, condition: &str) -> Result<Vec<SetRow>, String> {
-    let columns = set_columns();
+    let columns = SetRow::columns();
     let condition = Expression::condition(condition, &|name| number_column(name, &columns));
     let condition = condition.map_err(|error| error.to_string())?;
     let holds = |row: &SetRow| evaluate(&condition, row) == 1.0;
@@ -249,7 +255,7 @@ mod tests {
             [Some(50.0), None]
         );
         assert!(
-            set_columns()
+            SetRow::columns()
                 .iter()
                 .any(|column| column.name == FREQUENCY && column.unit == "Hz")
         );

@@ -70,7 +70,7 @@ impl Results<'_> {
         let total = self.tables().count() as u64 * exported.parts;
         let mut done = 0;
         for table in self.tables() {
-            let name = format!("{table}.{}", format.extension());
+            let name = format!("{table}.{}", format.word());
             let path = to.draft.path().join(&name);
             let joined = JoinedTable::new(self, table, &self.exported_columns(table));
             let file = storage.create(&path)?;

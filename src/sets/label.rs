@@ -1,4 +1,5 @@
-//! Labels of columns in figures and printed tables: symbol, a few words, the unit that suits the values, and their digits.
+//! Labels of columns in figures and printed tables: symbol, a few words, the unit that suits the values, and their
+//! digits.
 
 use super::SetRow;
 use crate::model::Symbol;
@@ -33,12 +34,10 @@ const COMPARED: [(&str, &str); 5] = [
 pub fn label(column: &str) -> Label {
     for (end, words) in COMPARED {
         if let Some(column) = column.strip_suffix(end) {
-            let Label { symbol, what, unit } = label(column);
-            return Label {
-                symbol: symbol + words,
-                what: what + words,
-                unit,
-            };
+            let mut label = label(column);
+            label.symbol += words;
+            label.what += words;
+            return label;
         }
     }
     let is_of_formula = |letter: char| !letter.is_alphanumeric() && letter != '_';
@@ -212,6 +211,12 @@ impl Digits {
         };
         typeset.replace('-', "−")
     }
+}
+
+/// With this many decimals, and no sign before zero.
+pub fn with_decimals(value: f64, decimals: usize) -> String {
+    let rounded: f64 = format!("{value:.decimals$}").parse().unwrap_or(value);
+    format!("{:.decimals$}", rounded + 0.0)
 }
 
 pub fn power_of_ten(mantissa: f64, power: i32) -> String {

@@ -1,9 +1,11 @@
-//! What is known of a set: the columns of the reduced table of sets, with their names in figures. Reduction fills them in; a
-//! sweep file may name those that are statistics. `label.rs`: columns and their values as figures write them.
+//! What is known of a set: the columns of the reduced table of sets, with their names in figures. Reduction fills them
+//! in; a sweep file may name those that are statistics. `label.rs`: columns and their values as figures write them.
 
 mod label;
 
-pub use label::{Digits, Label, capitalised, first_clause, label, power_of_ten, symbol_of};
+pub use label::{
+    Digits, Label, capitalised, first_clause, label, power_of_ten, symbol_of, with_decimals,
+};
 
 use crate::model::Symbol;
 use crate::model::{Selected, Selection};
@@ -140,8 +142,8 @@ impl Statistic {
         self.unit == "rad"
     }
 
-    /// Whether it can cross a threshold: the population has a value of it, whose error a jackknife over seeds gives. Quantiles
-    /// jump, bounds change with the number of values, and angles have no order.
+    /// Whether it can cross a threshold: the population has a value of it, whose error a jackknife over seeds gives.
+    /// Quantiles jump, bounds change with the number of values, and angles have no order.
     pub fn can_cross(self) -> bool {
         let is_of_sample =
             self.key.starts_with("tau_") && !["tau_mean", "tau_sd"].contains(&self.key);

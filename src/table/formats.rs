@@ -1,9 +1,11 @@
-//! Rows of any schema, in the formats of other programs.
+//! Rows of any schema, in the formats of other programs. A format is a variant of [`Format`], its description, its arm in
+//! [`RowWriter::new`], and an `Encoder`.
 
 use crate::table::arrow;
 use crate::table::error::ResultsError;
-use crate::table::file::{FILE_EXTENSION, Footer};
+use crate::table::file::Footer;
 use crate::table::storage::StoredFile;
+use crate::table::value::words;
 use arrow_array::RecordBatch;
 use arrow_ipc::writer::FileWriter;
 use arrow_schema::SchemaRef;
@@ -12,40 +14,78 @@ use parquet::errors::ParquetError;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    Parquet,
-    /// Plain text with a line of names; real numbers with as many digits as they have.
-    Csv,
-    /// The file format of Arrow.
-    Arrow,
+words! {
+    /// The word is also the extension of its files.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Format {
+        Parquet = "parquet",
+        Csv = "csv",
+        Arrow = "arrow",
+    }
 }
 
 impl Format {
-    pub const ALL: [Self; 3] = [Self::Parquet, Self::Csv, Self::Arrow];
-
-    pub const fn extension(self) -> &'static str {
+    /// What the help says of it.
+    pub const fn description(self) -> Option<&'static str> {
         match self {
-            Self::Parquet => FILE_EXTENSION,
-            Self::Csv => "csv",
-            Self::Arrow => "arrow",
+            Self::Parquet => None,
+            Self::Csv => Some(
+                "Plain text with a line of names; real numbers with as many digits as they have",
+            ),
+            Self::Arrow => Some("The file format of Arrow"),
         }
+    }
+}
+
+/// Turns rows into the bytes of a file.
+trait Encoder {
+    fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError>;
+
+    /// Writes what is left.
+    fn finish(self: Box<Self>) -> Result<StoredFile, ParquetError>;
+}
+
+impl Encoder for ArrowWriter<StoredFile> {
+    fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
+        self.write(rows)
+    }
+
+    fn finish(self: Box<Self>) -> Result<StoredFile, ParquetError> {
+        self.into_inner()
+    }
+}
+
+impl Encoder for csv::Writer<StoredFile> {
+    fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
+        arrow::texts(rows)
+            .try_for_each(|texts| self.write_record(texts))
+            .map_err(of_csv)
+    }
+
+    fn finish(self: Box<Self>) -> Result<StoredFile, ParquetError> {
+        self.into_inner()
+            .map_err(|error| of_csv(error.into_error()))
+    }
+}
+
+fn of_csv(error: impl Into<csv::Error>) -> ParquetError {
+    ParquetError::External(error.into().into())
+}
+
+impl Encoder for FileWriter<StoredFile> {
+    fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
+        Ok(self.write(rows)?)
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<StoredFile, ParquetError> {
+        FileWriter::finish(&mut self)?;
+        Ok(self.into_inner()?)
     }
 }
 
 pub struct RowWriter {
     path: PathBuf,
-    encoder: Encoder,
-}
-
-enum Encoder {
-    Parquet(Box<ArrowWriter<StoredFile>>),
-    Csv(Box<csv::Writer<StoredFile>>),
-    Arrow(Box<FileWriter<StoredFile>>),
-}
-
-fn of_csv(error: impl Into<csv::Error>) -> ParquetError {
-    ParquetError::External(error.into().into())
+    encoder: Box<dyn Encoder>,
 }
 
 impl RowWriter {
@@ -56,20 +96,19 @@ impl RowWriter {
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
         let path = file.path().to_owned();
-        let encoder = || -> Result<Encoder, ParquetError> {
+        let encoder = || -> Result<Box<dyn Encoder>, ParquetError> {
             Ok(match format {
                 Format::Parquet => {
                     let properties = Some(footer.properties(schema)?);
-                    let writer = ArrowWriter::try_new(file, Arc::clone(schema), properties)?;
-                    Encoder::Parquet(Box::new(writer))
+                    Box::new(ArrowWriter::try_new(file, Arc::clone(schema), properties)?)
                 }
                 Format::Csv => {
                     let mut writer = csv::Writer::from_writer(file);
                     let names = schema.fields().iter().map(|field| field.name());
                     writer.write_record(names).map_err(of_csv)?;
-                    Encoder::Csv(Box::new(writer))
+                    Box::new(writer)
                 }
-                Format::Arrow => Encoder::Arrow(Box::new(FileWriter::try_new(file, schema)?)),
+                Format::Arrow => Box::new(FileWriter::try_new(file, schema)?),
             })
         };
         let encoder = encoder().map_err(ResultsError::unwritten(&path))?;
@@ -77,28 +116,13 @@ impl RowWriter {
     }
 
     pub fn write(&mut self, rows: &RecordBatch) -> Result<(), ResultsError> {
-        let written = match &mut self.encoder {
-            Encoder::Parquet(writer) => writer.write(rows),
-            Encoder::Csv(writer) => arrow::texts(rows)
-                .try_for_each(|texts| writer.write_record(texts))
-                .map_err(of_csv),
-            Encoder::Arrow(writer) => writer.write(rows).map_err(ParquetError::from),
-        };
+        let written = self.encoder.write(rows);
         written.map_err(ResultsError::unwritten(&self.path))
     }
 
     /// Writes what is left and brings the file to the disk.
     pub fn finish(self) -> Result<(), ResultsError> {
-        let file = match self.encoder {
-            Encoder::Parquet(writer) => writer.into_inner(),
-            Encoder::Csv(writer) => writer
-                .into_inner()
-                .map_err(|error| of_csv(error.into_error())),
-            Encoder::Arrow(mut writer) => writer
-                .finish()
-                .and_then(|()| writer.into_inner())
-                .map_err(ParquetError::from),
-        };
+        let file = self.encoder.finish();
         Ok(file.map_err(ResultsError::unwritten(&self.path))?.sync()?)
     }
 }

@@ -6,6 +6,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::PathBuf;
 use std::process::Child;
+use stickslip::table::formats::Format;
 
 /// Cheap jobs in several parts, and a parameter that no table of slips has.
 fn sweep(seeds: u64) -> String {
@@ -70,7 +71,7 @@ fn an_export_has_the_same_bytes_whatever_threads_shards_kills_and_retries_came_b
                 folder.ends(0, &format!("{command} --retry-failed"));
             }
         }
-        for format in ["parquet", "csv", "arrow"] {
+        for format in Format::ALL.map(Format::word) {
             let found = exported(&folder, &directory, format);
             let first = expected
                 .entry((extended, format))

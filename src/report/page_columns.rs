@@ -1,10 +1,11 @@
-//! Reduced tables, column by column: a reader of the page needs each column as a whole, and columns compress best.
+//! Tables of the page, column by column: a reader of the page needs each column as a whole, and columns compress best.
 
-use crate::observe::Regime;
-use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, swept};
-use crate::results::ResultsError;
+use crate::observe::{Regime, Slip};
+use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, read_sets, swept};
 use crate::results::layout::Layout;
-use crate::sets::{Label, label};
+use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
+use crate::results::{Results, ResultsError};
+use crate::sets::{Label, capitalised, first_clause, label};
 use crate::sweep::Sweep;
 use crate::table::columns::{Column, Row, Table, Value, columns};
 use crate::table::file::Dataset;
@@ -30,7 +31,7 @@ pub(super) struct Columns {
 
 impl Columns {
     /// The columns of a row type with these names.
-    pub(super) fn of<R: Row>(is_shown: impl Fn(&str) -> bool) -> Self {
+    fn of<R: Row>(is_shown: impl Fn(&str) -> bool) -> Self {
         let mut columns = Self {
             described: Vec::new(),
             values: Vec::new(),
@@ -53,7 +54,7 @@ impl Columns {
     }
 
     /// Gives each column its label in the unit in which its values are read best, and the factor to that.
-    pub(super) fn label(&mut self, label: impl Fn(&Column) -> Label) {
+    fn label(&mut self, label: impl Fn(&Column) -> Label) {
         let shown = self.all.iter().filter(|column| column.1);
         let labels = shown.map(|column| label(&column.0));
         for ((column, values), label) in self.described.iter_mut().zip(&self.values).zip(labels) {
@@ -66,7 +67,7 @@ impl Columns {
         }
     }
 
-    pub(super) fn push<R: Row>(&mut self, row: &R) {
+    fn push<R: Row>(&mut self, row: &R) {
         let mut all = self.all.iter();
         let mut values = self.values.iter_mut();
         row.cells(&mut |cell| {
@@ -120,7 +121,8 @@ impl Census {
             regimes,
             ..Self::default()
         };
-        for batch in sets_file(layout).rows::<Counted>() {
+        let file = layout.reduced_file(SetRow::NAME);
+        for batch in Dataset::new(layout.storage, vec![file]).rows::<Counted>() {
             for set in batch?.into_iter().filter(|set| !set.is_control) {
                 census.sets += 1;
                 census.slips += set.slips;
@@ -138,10 +140,6 @@ impl Census {
     pub(super) fn spacing(&self) -> u64 {
         self.sets.div_ceil(MAX_SETS).max(1)
     }
-}
-
-fn sets_file<'a>(layout: &Layout<'a>) -> Dataset<'a> {
-    Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)])
 }
 
 /// The sets that are shown.
@@ -176,15 +174,12 @@ impl Sets {
             swept: Vec::new(),
             places: HashMap::new(),
         };
-        let mut number = 0_u64;
         let mut shown = Vec::new();
-        for batch in sets_file(layout).rows::<SetRow>() {
-            for row in batch?.into_iter().filter(|row| !row.is_control) {
-                if number.is_multiple_of(spacing) {
-                    sets.push(sweep, &row);
-                    shown.push(row);
-                }
-                number += 1;
+        for (row, number) in read_sets(layout).zip(0_u64..) {
+            let row = row?;
+            if number.is_multiple_of(spacing) {
+                sets.push(sweep, &row);
+                shown.push(row);
             }
         }
         sets.columns.label(|column| label(&column.name));
@@ -221,6 +216,85 @@ pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
     Ok(columns)
 }
 
+/// Slips up to which all are shown; of more, every k-th in table order. Each takes some 30 bytes of the page.
+const MAX_SLIPS: u64 = 100_000;
+/// Their columns that are shown, with their symbols. All of them would be twice as many bytes.
+const SLIP_COLUMNS: [(&str, &str); 14] = [
+    ("slip", "slip"),
+    ("onset", "t"),
+    ("interval", "τ"),
+    ("T_onset", "T"),
+    ("Delta_onset", "Δ"),
+    ("periods", "n"),
+    ("phase", "φ"),
+    ("peak_force", "F"),
+    ("drop", "ΔF"),
+    ("duration", "duration"),
+    ("size", "size"),
+    ("slip_distance", "distance"),
+    ("front_speed", "speed"),
+    ("precursors", "precursors"),
+];
+
+/// What the page says of its slips.
+#[derive(Debug, Serialize)]
+pub(super) struct Slips {
+    /// One of this many slips is shown.
+    every: u64,
+    #[serde(flatten)]
+    columns: Columns,
+    /// Of each slip, the number of its job.
+    job: Vec<usize>,
+    /// Of each job with a slip that is shown: the place of its set, and its seed.
+    jobs: Vec<(usize, u64)>,
+}
+
+impl Slips {
+    /// Every k-th of `total` slips, those of sets with a place.
+    pub(super) fn read(
+        results: &Results<'_>,
+        places: &HashMap<String, usize>,
+        total: u64,
+    ) -> Result<Self, ResultsError> {
+        let symbol = |name: &str| {
+            let found = SLIP_COLUMNS.iter().find(|(known, _)| *known == name);
+            found.map(|found| found.1)
+        };
+        let mut slips = Self {
+            every: total.div_ceil(MAX_SLIPS).max(1),
+            columns: Columns::of::<Slip>(|name| symbol(name).is_some()),
+            job: Vec::new(),
+            jobs: Vec::new(),
+        };
+        let mut number = 0_u64;
+        let mut last: Option<JobOfSlip> = None;
+        let files = results.committed_files(SLIPS, &results.dataset(JOBS)?)?;
+        for batch in files.rows::<(JobOfSlip, Slip)>() {
+            for (job, slip) in batch? {
+                let Some(&place) = places.get(&job.set_id) else {
+                    continue;
+                };
+                number += 1;
+                if !(number - 1).is_multiple_of(slips.every) {
+                    continue;
+                }
+                if last.as_ref() != Some(&job) {
+                    slips.jobs.push((place, job.seed));
+                    last = Some(job);
+                }
+                slips.job.push(slips.jobs.len() - 1);
+                slips.columns.push(&slip);
+            }
+        }
+        slips.columns.label(|column| Label {
+            symbol: symbol(&column.name).unwrap_or_default().to_owned(),
+            what: capitalised(first_clause(column.meaning)),
+            unit: column.unit,
+        });
+        Ok(slips)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -242,5 +316,15 @@ mod tests {
             };
             assert!(sets.div_ceil(census.spacing()) <= MAX_SETS, "{sets}");
         }
+    }
+
+    #[test]
+    fn the_columns_that_are_shown_are_there() {
+        let described = Slip::columns();
+        assert!(
+            SLIP_COLUMNS
+                .iter()
+                .all(|(name, _)| described.iter().any(|column| column.name == *name))
+        );
     }
 }
