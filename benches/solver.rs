@@ -46,18 +46,10 @@ fn fixed_step(bencher: Bencher<'_, '_>, blocks: usize) {
         drive_velocity: 1e-3,
         ..Parameters::default()
     };
-    let steps = run(
-        &parameters,
-        Solver::FixedStep { time_step: STEP },
-        STEP * STEPS as f64,
-    );
-    bencher.counter(ItemsCount::new(steps)).bench(|| {
-        run(
-            &parameters,
-            Solver::FixedStep { time_step: STEP },
-            STEP * STEPS as f64,
-        )
-    });
+    let steps = run(&parameters, Solver::fixed_step(STEP), STEP * STEPS as f64);
+    bencher
+        .counter(ItemsCount::new(steps))
+        .bench(|| run(&parameters, Solver::fixed_step(STEP), STEP * STEPS as f64));
 }
 
 /// The same physics by both solvers: 0.6 s at V0 = 1e-4 m/s.
@@ -70,5 +62,5 @@ fn event_driven(bencher: Bencher<'_, '_>, tolerance: f64) {
 #[divan::bench(args = [1e-6])]
 fn fixed_step_for_comparison(bencher: Bencher<'_, '_>, time_step: f64) {
     let parameters = Parameters::default();
-    bencher.bench(|| run(&parameters, Solver::FixedStep { time_step }, STRETCH));
+    bencher.bench(|| run(&parameters, Solver::fixed_step(time_step), STRETCH));
 }

@@ -5,6 +5,7 @@ use crate::model::{Description, Parameters, Symbol, Value};
 use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, TraceRow};
 use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, RoundOfSet, SetRow};
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
+use crate::solver::{Solver, SolverKey};
 use crate::table::Table;
 use crate::table::columns::{Column, Kind, Row};
 use std::fmt::Write as _;
@@ -208,4 +209,10 @@ fn documented_parameters_are_those_of_the_model() {
 fn documented_keys_are_those_of_a_recording() {
     let rows = RecordingKey::ALL.map(|key| (key.description(), Recording::default().get(key)));
     assert_table_documented("sweeps.md", "## [record]", &rows);
+}
+
+#[test]
+fn documented_settings_are_those_of_a_solver() {
+    let rows = SolverKey::ALL.map(|key| (key.description(), Solver::default().get(key)));
+    assert_table_documented("sweeps.md", "## [solver]", &rows);
 }

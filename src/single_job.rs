@@ -6,7 +6,7 @@ use crate::observe::{
     AttachedMap, ContactLog, ContactRow, MapRow, Measurements, Observers, Profile, ProfileRow,
     Recording, SlipObserver, Trace, TraceRow,
 };
-use crate::solver::{self, Observer, SimulationError};
+use crate::solver::{Observer, SimulationError};
 use crate::sweep::{Change, Job, Sweep};
 use crate::table::tables;
 use std::sync::atomic::AtomicBool;
@@ -135,27 +135,18 @@ pub fn simulate(
     let mut map = AttachedMap::new(parameters, request.sample);
     let mut profile = Profile::new(parameters);
     let mut log = ContactLog::default();
-    let all: [(bool, &mut dyn Observer); 4] = [
+    let mut observers: Vec<&mut dyn Observer> = vec![&mut slips];
+    let others: [(bool, &mut dyn Observer); 4] = [
         (request.trace, &mut trace),
         (request.map, &mut map),
         (request.profile, &mut profile),
         (request.contacts, &mut log),
     ];
-    let others = all
-        .into_iter()
-        .filter_map(|(wanted, observer)| wanted.then_some(observer))
-        .collect();
-    let observer = &mut Observers {
-        lead: &mut slips,
-        others,
-    };
-    let limits = recording.limits(interrupt);
+    let requested = others.into_iter().filter(|(wanted, _)| *wanted);
+    observers.extend(requested.map(|(_, observer)| observer));
     let solver = sweep.solver();
-    let summary = if recording.energies {
-        solver::simulate_audited(parameters, solver, limits, observer)?.0
-    } else {
-        solver::simulate(parameters, solver, limits, observer)?
-    };
+    let observer = &mut Observers(observers);
+    let summary = recording.simulate(parameters, solver, interrupt, observer)?;
     let records = Records {
         trace: trace.rows,
         map: map.rows,

@@ -6,6 +6,7 @@ use crate::table::Table;
 use crate::watched::watched;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stickslip::observe::ContactRow;
@@ -108,7 +109,7 @@ pub fn simulate<'py>(
             let slips = measured
                 .slips
                 .iter()
-                .map(|slip| -> SlipRow<'_> { (&names, slip) });
+                .map(|slip| -> SlipRow<'_> { (Cow::Borrowed(&names), Cow::Borrowed(slip)) });
             tables.insert(
                 "slips",
                 Table::without(&sweep.recording().left_out(), slips)?,
@@ -117,7 +118,9 @@ pub fn simulate<'py>(
                 let rows = measured
                     .precursors
                     .iter()
-                    .map(|precursor| -> PrecursorRow<'_> { (&names, precursor) });
+                    .map(|precursor| -> PrecursorRow<'_> {
+                        (Cow::Borrowed(&names), Cow::Borrowed(precursor))
+                    });
                 tables.insert("precursors", Table::of_rows(rows)?);
             }
             if trace {

@@ -1,7 +1,6 @@
 //! The files of a study: everything as JSON, and figures.
 
-use super::study::{Findings, MethodRow, Study};
-use super::{other_settings, verdict};
+use super::{Findings, MethodRow, Study, other_settings, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::destination::{Destination, Kind, refuse_reserved};
@@ -195,12 +194,11 @@ fn points(
 
 #[cfg(test)]
 mod tests {
-    use super::super::Method;
-    use super::super::bias::{Bias, Sample};
-    use super::super::breaks::BreakErrors;
-    use super::super::study::BiasRow;
+    use super::super::BiasRow;
+    use super::super::SolverColumns;
+    use super::super::comparison::{Bias, BreakErrors, Sample};
     use super::*;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::solver::Solver;
     use crate::table::columns::{Column, Row};
 
@@ -208,7 +206,7 @@ mod tests {
 
     fn findings() -> Findings {
         let parameters = Parameters::default();
-        let solver = Method::from(Solver::FixedStep { time_step: 1e-6 });
+        let solver = SolverColumns::from(Solver::fixed_step(1e-6));
         let break_times = BreakErrors {
             breaks: Some(100),
             missing: Some(0),

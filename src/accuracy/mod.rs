@@ -1,75 +1,66 @@
 //! Accuracy: speed against error of every solver in one run.
 //!
 //! ```text
-//! breaks.rs     before chaos: break times, contact by contact
-//! bias.rs       after chaos: biases of mean and standard deviation, with intervals
+//! comparison.rs break times, contact by contact; biases of mean and standard deviation, with intervals
 //! study.rs      every solver at every set of parameters, timed on one thread
 //! verdict.rs    what that says of a sweep's solver
 //! files.rs      everything as JSON, figures
 //! ```
 
-pub mod bias;
-pub mod breaks;
+pub mod comparison;
 mod files;
 mod study;
 mod verdict;
 
 pub use files::{check, processor, to_json, write};
-pub use study::{BiasRow, Findings, MethodRow, Study};
+pub use study::Study;
 pub use verdict::{shows_bias, verdict};
 
-use crate::model::{Parameters, Symbol, Value};
-use crate::solver::{Resolve, Solver};
+use self::comparison::{Bias, BreakErrors};
+use crate::model::{Description, Parameters, Selected, Selection, Symbol, Value};
+use crate::solver::{Method, Resolve, Solver};
 use crate::table::columns::columns;
 use std::fmt;
 
-const FIXED_STEP: &str = "fixed-step";
-
 columns! {
-    /// A solver, with its one setting.
+    /// A solver, by the main setting of its method.
     #[derive(Clone, Debug, PartialEq)]
-    pub struct Method {
-        method: String = "", "event-driven, or how it resolves motion: grid or taylor; or fixed-step";
+    pub struct SolverColumns {
+        method: String = "", "grid or taylor, by which the event-driven method resolves motion; else the method";
         setting: f64 = "", "tolerance, or dt in s";
     }
 }
 
-impl From<Solver> for Method {
+impl From<Solver> for SolverColumns {
     fn from(solver: Solver) -> Self {
-        let (method, setting) = match solver {
-            Solver::EventDriven {
-                resolve: Resolve::Auto,
-                tolerance,
-            } => ("event-driven", tolerance),
-            Solver::EventDriven { resolve, tolerance } => (resolve.word(), tolerance),
-            Solver::FixedStep { time_step } => (FIXED_STEP, time_step),
+        let method = match solver.resolve {
+            Resolve::Auto => solver.method.word(),
+            resolve => resolve.word(),
         };
         Self {
             method: method.to_owned(),
-            setting,
+            setting: solver.setting(),
         }
     }
 }
 
-impl Method {
+impl SolverColumns {
     /// The method without its setting, in words.
     pub fn name(&self) -> &str {
         match self.method.as_str() {
             "taylor" => "Taylor steps",
-            FIXED_STEP => "fixed step",
+            "fixed-step" => "fixed step",
             name => name,
         }
     }
 }
 
-impl fmt::Display for Method {
+impl fmt::Display for SolverColumns {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (setting, unit) = if self.method == FIXED_STEP {
-            ("dt", " s")
-        } else {
-            ("tolerance", "")
-        };
-        write!(f, "{}, {setting} {:e}{unit}", self.name(), self.setting)
+        let method = Method::from_word(&self.method).unwrap_or(Method::EventDriven);
+        let Description { key, unit, .. } = method.settings()[0].description();
+        let setting = format!("{}, {key} {:e} {unit}", self.name(), self.setting);
+        f.write_str(setting.trim_end())
     }
 }
 
@@ -91,6 +82,62 @@ impl Cost {
     /// Whether the cost per slip follows from that of a step.
     pub const fn is_extrapolated(&self) -> bool {
         self.timed_slips == 0
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveAlone;
+
+impl Selection for DriveAlone {
+    const SYMBOLS: &'static [Symbol] = &[Symbol::V0, Symbol::Delta, Symbol::T];
+}
+
+columns! {
+    /// One solver at one set of parameters. Costs are those of its cheapest realisation per step: other work on the machine
+    /// can only add to them. Errors of break times are left out where they would take too long.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct MethodRow {
+        parameters: Selected<DriveAlone>;
+        case: String = "", "the drive, and what else differs from the defaults";
+        solver: SolverColumns;
+        cost: Cost;
+        break_times: BreakErrors;
+    }
+}
+
+columns! {
+    /// A quantity of the slips of one solver at one set of parameters, beside that of the reference ensemble.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct BiasRow {
+        parameters: Selected<DriveAlone>;
+        case: String = "", "the drive, and what else differs from the defaults";
+        solver: SolverColumns;
+        quantity: String = "", "interval, phase, drop, peak_force, duration or front_speed";
+        slips: u64 = "", "size of the sample";
+        reference_slips: u64 = "", "size of the reference sample";
+        mean: f64 = "", "mean";
+        reference_mean: f64 = "", "mean of the reference";
+        deviation: f64 = "", "standard deviation";
+        reference_deviation: f64 = "", "standard deviation of the reference";
+        bias: Bias;
+    }
+}
+
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    /// Set by set, solver by solver.
+    pub methods: Vec<MethodRow>,
+    pub biases: Vec<BiasRow>,
+}
+
+impl Findings {
+    /// The bias of a quantity, for the solver and set of a row.
+    pub fn bias_of(&self, row: &MethodRow, quantity: &str) -> Option<&BiasRow> {
+        self.biases.iter().find(|other| {
+            other.quantity == quantity
+                && other.parameters == row.parameters
+                && other.solver == row.solver
+        })
     }
 }
 

@@ -6,15 +6,12 @@
 //! enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its slips: it is
 //! timed over a short stretch, and its cost per slip follows from the steps of an interval.
 
-use super::bias::{Bias, Sample};
-use super::breaks::{BreakErrors, Comparison, Reference};
-use super::{Cost, Method, set_in_words};
-use crate::model::selected::{Selected, Selection};
-use crate::model::{Parameters, Symbol};
+use super::comparison::{Bias, BreakErrors, Comparison, Reference, Sample};
+use super::{BiasRow, Cost, Findings, MethodRow, SolverColumns, set_in_words};
+use crate::model::{Parameters, Selected};
 use crate::observe::{Measurements, Recording, Slip, measure};
 use crate::run::limits;
-use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate};
-use crate::table::columns::columns;
+use crate::solver::{Limits, Observer, Resolve, Solver, Summary, simulate};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -23,6 +20,8 @@ use std::sync::atomic::AtomicBool;
 /// Amplitude and frequency of the modulated drive, in m and Hz: those of Fig. 2f.
 const MODULATION: (f64, f64) = (1e-6, 58.0);
 const DISCARD: u64 = 5;
+/// Tolerance of the reference of break times, the tightest that there is.
+const TIGHTEST_TOLERANCE: f64 = 1e-12;
 /// Tolerance of the reference ensemble.
 const ENSEMBLE_TOLERANCE: f64 = 1e-10;
 /// Seeds of the reference ensemble are so far from those of the methods: the samples are independent.
@@ -100,16 +99,13 @@ impl Study {
         let mut time_steps = Vec::new();
         let mut on_the_grid = vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
         let mut in_taylor_steps = vec![1e-3, 1e-4, 1e-6, 1e-8];
-        let (settings, setting, own) = match solver {
-            Solver::FixedStep { time_step } => (&mut time_steps, time_step, solver),
-            Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => {
-                (&mut on_the_grid, tolerance, grid(tolerance))
-            }
-            Solver::EventDriven { tolerance, .. } => {
-                (&mut in_taylor_steps, tolerance, taylor(tolerance))
-            }
+        let tolerance = solver.tolerance;
+        let (settings, own) = match solver.time_step {
+            Some(_) => (&mut time_steps, solver),
+            None if solver.resolve.takes_grid(tolerance) => (&mut on_the_grid, grid(tolerance)),
+            None => (&mut in_taylor_steps, taylor(tolerance)),
         };
-        settings.push(setting);
+        settings.push(solver.setting());
         settings.sort_by(|a, b| b.total_cmp(a));
         settings.dedup();
         Self {
@@ -140,43 +136,23 @@ fn plain_and_modulated(drive_velocity: f64) -> [Parameters; 2] {
 fn solvers(time_steps: &[f64], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> Vec<Solver> {
     let fixed = time_steps
         .iter()
-        .map(|&time_step| Solver::FixedStep { time_step });
+        .map(|&time_step| Solver::fixed_step(time_step));
     let grid = on_the_grid.iter().map(|&tolerance| grid(tolerance));
     let taylor = in_taylor_steps.iter().map(|&tolerance| taylor(tolerance));
     fixed.chain(grid).chain(taylor).collect()
 }
 
 const fn grid(tolerance: f64) -> Solver {
-    Solver::EventDriven {
-        tolerance,
+    Solver {
         resolve: Resolve::Grid,
+        ..Solver::event_driven(tolerance)
     }
 }
 
 const fn taylor(tolerance: f64) -> Solver {
-    Solver::EventDriven {
-        tolerance,
+    Solver {
         resolve: Resolve::Taylor,
-    }
-}
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct DriveAlone;
-
-impl Selection for DriveAlone {
-    const SYMBOLS: &'static [Symbol] = &[Symbol::V0, Symbol::Delta, Symbol::T];
-}
-
-columns! {
-    /// One solver at one set of parameters. Costs are those of its cheapest realisation per step: other work on the machine
-    /// can only add to them. Errors of break times are left out where they would take too long.
-    #[derive(Clone, Debug, PartialEq)]
-    pub struct MethodRow {
-        parameters: Selected<DriveAlone>;
-        case: String = "", "the drive, and what else differs from the defaults";
-        solver: Method;
-        cost: Cost;
-        break_times: BreakErrors;
+        ..Solver::event_driven(tolerance)
     }
 }
 
@@ -192,42 +168,6 @@ const QUANTITIES: [Quantity; 6] = [
     ("duration", |slip| Some(slip.duration)),
     ("front_speed", |slip| slip.front_speed),
 ];
-
-columns! {
-    /// A quantity of the slips of one solver at one set of parameters, beside that of the reference ensemble.
-    #[derive(Clone, Debug, PartialEq)]
-    pub struct BiasRow {
-        parameters: Selected<DriveAlone>;
-        case: String = "", "the drive, and what else differs from the defaults";
-        solver: Method;
-        quantity: String = "", "interval, phase, drop, peak_force, duration or front_speed";
-        slips: u64 = "", "size of the sample";
-        reference_slips: u64 = "", "size of the reference sample";
-        mean: f64 = "", "mean";
-        reference_mean: f64 = "", "mean of the reference";
-        deviation: f64 = "", "standard deviation";
-        reference_deviation: f64 = "", "standard deviation of the reference";
-        bias: Bias;
-    }
-}
-
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Findings {
-    /// Set by set, solver by solver.
-    pub methods: Vec<MethodRow>,
-    pub biases: Vec<BiasRow>,
-}
-
-impl Findings {
-    /// The bias of a quantity, for the solver and set of a row.
-    pub fn bias_of(&self, row: &MethodRow, quantity: &str) -> Option<&BiasRow> {
-        self.biases.iter().find(|other| {
-            other.quantity == quantity
-                && other.parameters == row.parameters
-                && other.solver == row.solver
-        })
-    }
-}
 
 /// Slips and cost of one solver, seed by seed.
 #[derive(Clone, Debug, Default)]
@@ -285,7 +225,7 @@ impl Study {
                 ..parameters.clone()
             };
             let mut first_breaks = Reference::new(&of_first, self.breaks);
-            let tightest = taylor(*TOLERANCES.start());
+            let tightest = taylor(TIGHTEST_TOLERANCE);
             simulated(&of_first, tightest, &mut first_breaks)?;
             let mut errors = Vec::new();
             for &solver in &self.solvers {
@@ -373,7 +313,7 @@ impl Study {
         reference: &Reference,
     ) -> Result<BreakErrors> {
         let takes_too_long = parameters.drive_velocity < self.fixed_step_breaks_from;
-        if takes_too_long && matches!(solver, Solver::FixedStep { .. }) {
+        if takes_too_long && solver.time_step.is_some() {
             return Ok(BreakErrors::default());
         }
         let mut comparison = Comparison::new(reference);
@@ -383,8 +323,7 @@ impl Study {
 
     /// Whether slips of this solver would take too long.
     fn is_stretch_only(&self, parameters: &Parameters, solver: Solver) -> bool {
-        matches!(solver, Solver::FixedStep { .. })
-            && parameters.drive_velocity < self.fixed_step_slips_from
+        solver.time_step.is_some() && parameters.drive_velocity < self.fixed_step_slips_from
     }
 
     /// Seed by seed, every solver in turn, so that whatever slows the machine down slows down all.
@@ -398,7 +337,7 @@ impl Study {
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
                 let is_stretch = self.is_stretch_only(&parameters, solver);
                 let mut recording = self.recording();
-                if is_stretch && let Solver::FixedStep { time_step } = solver {
+                if is_stretch && let Some(time_step) = solver.time_step {
                     recording.max_time = Some(time_step * self.timed_steps as f64);
                 }
                 let (cpu_seconds, measured) = measured(&parameters, solver, &recording)?;
@@ -449,7 +388,7 @@ fn in_words(parameters: &Parameters, solver: Solver) -> String {
         "{}, seed {}, {}",
         set_in_words(parameters),
         parameters.seed,
-        Method::from(solver)
+        SolverColumns::from(solver)
     )
 }
 
@@ -542,7 +481,7 @@ mod tests {
     fn the_slips_of_a_stretch_are_no_sample() {
         let study = Study {
             sets: plain_and_modulated(1e-4).into(),
-            solvers: vec![Solver::FixedStep { time_step: 4e-6 }],
+            solvers: vec![Solver::fixed_step(4e-6)],
             seeds: 1,
             slips: 4,
             fixed_step_slips_from: 1.0,

@@ -4,8 +4,7 @@
 //! A bias counts if it survives the number of comparisons (Bonferroni): among all of a solver that has none, one counts by
 //! chance in one study of twenty. With few slips, or one realisation, no bias counts.
 
-use super::study::{BiasRow, Findings, MethodRow, Study};
-use super::{Method, set_in_words};
+use super::{BiasRow, Findings, MethodRow, SolverColumns, Study, set_in_words};
 
 /// Least number of slips on either side with which a bias counts.
 const MIN_SLIPS: u64 = 100;
@@ -24,7 +23,7 @@ fn can_tell(row: &BiasRow) -> bool {
 
 /// The lines, the answer first.
 pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
-    let own = Method::from(study.own);
+    let own = SolverColumns::from(study.own);
     let compared: Vec<&BiasRow> = findings
         .biases
         .iter()
@@ -174,17 +173,16 @@ fn tighter(findings: &Findings, rows: &[&MethodRow]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::Cost;
-    use super::super::bias::Bias;
-    use super::super::breaks::BreakErrors;
+    use super::super::comparison::{Bias, BreakErrors};
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::solver::{Resolve, Solver};
     use crate::table::columns::Interval;
 
-    const GRID: Solver = Solver::EventDriven {
-        tolerance: 1e-3,
+    const GRID: Solver = Solver {
         resolve: Resolve::Grid,
+        ..Solver::event_driven(1e-3)
     };
 
     fn row(quantity: &str, slips: u64, bias: f64) -> BiasRow {
@@ -230,9 +228,9 @@ mod tests {
     }
 
     fn lines(slips_of_set: u64, biases: Vec<BiasRow>) -> Vec<String> {
-        let tighter = Solver::EventDriven {
-            tolerance: 1e-5,
+        let tighter = Solver {
             resolve: Resolve::Grid,
+            ..Solver::event_driven(1e-5)
         };
         let study = Study {
             sets: vec![Parameters::default()],

@@ -167,9 +167,7 @@ impl Exit {
         }
         if let Some(error) = cause.downcast_ref::<SimulationError>() {
             return Some(match error {
-                SimulationError::UnstableStep { .. } | SimulationError::BadTolerance { .. } => {
-                    Self::Usage
-                }
+                SimulationError::BadSetting { .. } => Self::Usage,
                 SimulationError::Interrupted { .. } => Self::Stopped,
                 _ => Self::Failed,
             });

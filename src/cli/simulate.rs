@@ -14,6 +14,7 @@ use crate::results::destination::{Destination, Kind};
 use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
 use crate::sets::Digits;
 use crate::single_job::{self, Records, Request};
+use crate::solver::{Method, SolverKey};
 use crate::sweep::{Change, Sweep};
 use crate::table::Table;
 use crate::table::file::{Footer, TableWriter};
@@ -61,7 +62,7 @@ struct JobFlags {
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     time: Option<String>,
     /// Method [default: event-driven]
-    #[arg(long, value_parser = ["event-driven", "fixed-step"])]
+    #[arg(long, value_parser = Method::ALL.map(Method::word))]
     solver: Option<String>,
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
     #[arg(long, allow_negative_numbers = true, value_name = "X")]
@@ -214,7 +215,8 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let wall = begin.elapsed().as_secs_f64();
 
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
-    let slips = (measured.slips.iter()).map(|slip| -> SlipRow<'_> { (&label, slip) });
+    let slips = (measured.slips.iter())
+        .map(|slip| -> SlipRow<'_> { (Cow::Borrowed(&label), Cow::Borrowed(slip)) });
     let contacts = records.contacts.iter().map(ContactRow::from);
     let footer = Footer::default()
         .with_sweep(sweep.name(), sweep.text())
@@ -338,8 +340,10 @@ impl Arguments {
 impl JobFlags {
     /// What the flags set, each as a key of a sweep file.
     fn changes(&self) -> Result<Vec<Change>, UsageError> {
-        let is_fixed = self.solver.as_deref() == Some("fixed-step");
-        let default = is_fixed.then(|| "1e-6".to_owned());
+        let method = self.solver.as_deref().and_then(Method::from_word);
+        let takes_steps =
+            method.is_some_and(|method| method.settings().contains(&SolverKey::TimeStep));
+        let default = takes_steps.then(|| "1e-6".to_owned());
         let dt = self.dt.clone().or(default);
         let flags = [
             ("slips", &self.slips),

@@ -78,7 +78,7 @@ pub(super) mod tests {
     use super::super::style::{BAR_WIDTH, Style};
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::reduce::Interval;
 
     /// Sets at rising V0, and two amplitudes.

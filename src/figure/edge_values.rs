@@ -77,7 +77,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
 mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
 
     fn edge(drive_velocity: f64, statistic: &str, edge: Option<f64>) -> EdgeRow {
         EdgeRow {

@@ -225,7 +225,7 @@ fn outline(bars: &[&HistogramBin]) -> Vec<Vec<Place>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
 
     fn set(id: &str, deviation: f64, frequency: Option<f64>) -> SetRow {
         let parameters = Parameters {

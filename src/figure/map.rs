@@ -265,7 +265,7 @@ mod tests {
     use super::super::quantity::tests::set;
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
 
     fn grid(amplitudes: u32, periods: u32) -> Vec<SetRow> {
         let row = |row: u32| {

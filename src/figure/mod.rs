@@ -45,7 +45,6 @@ use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::sets::{Digits, label, symbol_of};
 use crate::table::Table;
-use crate::table::columns::FromRow;
 use anyhow::Result;
 use std::path::PathBuf;
 
@@ -150,7 +149,7 @@ fn sets_with_results(layout: &Layout<'_>) -> Result<Vec<SetRow>, ResultsError> {
     Ok(sets)
 }
 
-fn read<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
+fn read<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
     read_reduced(layout).map_err(advise(ADVICE))
 }
 

@@ -342,7 +342,7 @@ impl Grid {
 pub(super) mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::observe::Regime;
     use crate::reduce::Interval;
 

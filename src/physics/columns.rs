@@ -23,7 +23,7 @@
 pub use super::value::{Field, Kind, Value};
 use std::borrow::Cow;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Column {
     pub name: Cow<'static, str>,
     /// SI unit; empty for a pure number or a text.
@@ -38,30 +38,33 @@ pub struct Column {
     pub nullable: bool,
 }
 
-/// A type whose values are rows, or parts of rows.
-pub trait Row {
-    /// Its columns, in order.
-    fn columns() -> Vec<Column>;
-
-    /// Gives the cells of a row, in the order of the columns.
-    fn cells(&self, give: &mut dyn FnMut(Value<'_>));
-}
-
-/// A row that can be read back.
-pub trait FromRow: Row + Sized {
-    /// The row with these cells, in the order of the columns.
-    fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String>;
-}
-
-/// A field of a row type: one cell, several that belong together, or all the cells of another row. What the macro `columns` is built on.
+/// A field of a row type: one cell, several that belong together, or all the cells of another row.
 pub trait Part: Sized {
-    /// The columns of a field that is described so; its type says of which kind they are.
+    /// The columns of a field that is described so; its type says of which kind they are. Rows describe their own.
     fn columns_as(described: Column) -> Vec<Column>;
 
     fn give(&self, give: &mut dyn FnMut(Value<'_>));
 
     /// Reads the cells of a field with this name.
     fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String>;
+}
+
+/// A type whose values are rows, or parts of rows.
+pub trait Row: Part {
+    /// Its columns, in order.
+    fn columns() -> Vec<Column> {
+        Self::columns_as(Column::default())
+    }
+
+    /// Gives the cells of a row, in the order of the columns.
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
+        self.give(give);
+    }
+
+    /// The row with these cells, in the order of the columns.
+    fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        Self::take("", next)
+    }
 }
 
 impl<T: Field> Part for T {
@@ -159,30 +162,6 @@ impl Part for Option<Interval> {
     }
 }
 
-/// Row types as fields of other row types.
-#[macro_export]
-macro_rules! part {
-    ($row:ty $(where $($parameter:ident: $bound:path),*)?) => {
-        impl $(<$($parameter: $bound),*>)? $crate::columns::Part for $row {
-            fn columns_as(_: $crate::columns::Column) -> Vec<$crate::columns::Column> {
-                <Self as $crate::columns::Row>::columns()
-            }
-
-            fn give(&self, give: &mut dyn FnMut($crate::columns::Value<'_>)) {
-                $crate::columns::Row::cells(self, give);
-            }
-
-            fn take<'a>(
-                _: &str,
-                next: &mut dyn FnMut() -> $crate::columns::Value<'a>,
-            ) -> Result<Self, String> {
-                $crate::columns::FromRow::from_cells(next)
-            }
-        }
-    };
-}
-pub use part;
-
 /// Describes the columns of a row type: see the head of `columns.rs`.
 #[macro_export]
 macro_rules! columns {
@@ -206,26 +185,24 @@ macro_rules! columns {
             )*
         }
 
-        impl $crate::columns::Row for $row {
-            fn columns() -> Vec<$crate::columns::Column> {
+        impl $crate::columns::Part for $row {
+            fn columns_as(_: $crate::columns::Column) -> Vec<$crate::columns::Column> {
                 [$(<$type as $crate::columns::Part>::columns_as($crate::columns::Column {
                     name: $crate::columns!(@name $field $($name)?).into(),
                     unit: $crate::columns!(@text $($unit)?),
                     meaning: $crate::columns!(@text $($meaning)?),
                     symbol: $crate::columns!(@text $($($symbol)?)?),
                     words: $crate::columns!(@text $($($($words)?)?)?),
-                    kind: $crate::columns::Kind::Real,
-                    nullable: false,
+                    ..$crate::columns::Column::default()
                 })),*].concat()
             }
 
-            fn cells(&self, give: &mut dyn FnMut($crate::columns::Value<'_>)) {
+            fn give(&self, give: &mut dyn FnMut($crate::columns::Value<'_>)) {
                 $($crate::columns::Part::give(&self.$field, give);)*
             }
-        }
 
-        impl $crate::columns::FromRow for $row {
-            fn from_cells<'a>(
+            fn take<'a>(
+                _: &str,
                 next: &mut dyn FnMut() -> $crate::columns::Value<'a>,
             ) -> Result<Self, String> {
                 $(let $field = $crate::columns::Part::take(
@@ -236,41 +213,48 @@ macro_rules! columns {
             }
         }
 
-        $crate::part!($row);
+        impl $crate::columns::Row for $row {}
     };
 }
 pub use columns;
 
-impl<T: Row> Row for &T {
-    fn columns() -> Vec<Column> {
+/// Rows that many rows share need not be cloned to be written.
+impl<T: Row + Clone> Part for Cow<'_, T> {
+    fn columns_as(_: Column) -> Vec<Column> {
         T::columns()
     }
 
-    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
-        (*self).cells(give);
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        self.as_ref().give(give);
+    }
+
+    fn take<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        T::from_cells(next).map(Cow::Owned)
     }
 }
+
+impl<T: Row + Clone> Row for Cow<'_, T> {}
 
 /// Rows side by side are a row.
 macro_rules! side_by_side {
     ($($part:ident),*) => {
-        impl<$($part: Row),*> Row for ($($part,)*) {
-            fn columns() -> Vec<Column> {
+        impl<$($part: Row),*> Part for ($($part,)*) {
+            fn columns_as(_: Column) -> Vec<Column> {
                 [$($part::columns()),*].concat()
             }
 
             #[allow(non_snake_case, reason = "a part is called as its type")]
-            fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
+            fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
                 let ($($part,)*) = self;
-                $($part.cells(give);)*
+                $($part.give(give);)*
             }
-        }
 
-        impl<$($part: FromRow),*> FromRow for ($($part,)*) {
-            fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+            fn take<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
                 Ok(($($part::from_cells(next)?,)*))
             }
         }
+
+        impl<$($part: Row),*> Row for ($($part,)*) {}
     };
 }
 

@@ -48,6 +48,7 @@ macro_rules! words {
 
         impl $crate::value::Field for $Enum {
             const KIND: $crate::value::Kind = $crate::value::Kind::Text;
+            const WORDS: &'static [&'static str] = &[$($word),+];
 
             fn value(&self) -> $crate::value::Value<'static> {
                 $crate::value::Value::Text(self.word())
@@ -63,8 +64,9 @@ pub use words;
 
 words! {
     /// What a field holds.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Kind {
+        #[default]
         Real = "real",
         Count = "count",
         Flag = "flag",
@@ -139,6 +141,8 @@ pub trait Field: Sized {
     const KIND: Kind;
     /// Whether it may be null.
     const NULLABLE: bool = false;
+    /// The words that it can be, if it is one.
+    const WORDS: &'static [&'static str] = &[];
 
     fn value(&self) -> Value<'static>;
 
@@ -179,6 +183,7 @@ field_types! {
 impl<T: Field> Field for Option<T> {
     const KIND: Kind = T::KIND;
     const NULLABLE: bool = true;
+    const WORDS: &'static [&'static str] = T::WORDS;
 
     fn value(&self) -> Value<'static> {
         self.as_ref().map_or(Value::Null, T::value)

@@ -14,7 +14,7 @@ use super::confidence::student;
 use super::drive_alone::Explained;
 use super::gather::{Gathered, each_chosen};
 use crate::model::Parameters;
-use crate::model::selected::Selected;
+use crate::model::Selected;
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, Digits, Statistic, label};
 use crate::sweep::{Refinement, Sweep};

@@ -238,7 +238,7 @@ impl Passage {
 mod tests {
     use super::super::confidence::tests::Draws;
     use super::*;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::sets::SetRow;
     use crate::sweep::{Extension, Sweep};
     use std::path::Path;

@@ -11,8 +11,8 @@
 
 use super::drive_alone::{Controls, Explained};
 use super::set::{FinishedSet, JobFacts, SetJobs, SetSlips};
-use crate::model::selected::{Selected, Selection as _};
 use crate::model::{Parameters, Symbol, Value};
+use crate::model::{Selected, Selection as _};
 use crate::observe::Slip;
 use crate::results::tables::{All, JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};

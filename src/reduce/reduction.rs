@@ -14,7 +14,7 @@ use crate::results::{ErrorKind, Results, ResultsError};
 use crate::sets::SetRow;
 use crate::sweep::{Goal, Precision, Sweep, Target};
 use crate::table::checksum::hexadecimal;
-use crate::table::columns::{FromRow, Row, columns};
+use crate::table::columns::{Row, columns};
 use crate::table::file::{DataFile, Dataset, Footer, TableWriter};
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
@@ -387,7 +387,7 @@ pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
 }
 
 /// The rows of a reduced table, such as [`Point`].
-pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
+pub fn read_reduced<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
     let file = layout.reduced_file(R::NAME);
     let batches = Dataset::new(layout.storage, vec![file]).rows();
     let batches: Vec<Vec<R>> = batches.collect::<Result<_, _>>()?;
@@ -414,7 +414,7 @@ mod tests {
     use super::super::set::tests::{jobs, slip};
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{
@@ -425,6 +425,7 @@ mod tests {
     use crate::sweep::Sweep;
     use crate::table::file::Footer;
     use crate::table::storage::{Disk, Storage};
+    use std::borrow::Cow;
     use std::fs;
     use std::path::Path;
 
@@ -518,10 +519,10 @@ mod tests {
                 .map(|label| job_result(label, slips))
                 .collect();
             for (job, result) in labels.iter().zip(&measured) {
-                result
-                    .slips
-                    .iter()
-                    .for_each(|slip| slip_writer.push(&(job, slip)).unwrap());
+                for slip in &result.slips {
+                    let row = (Cow::Borrowed(job), Cow::Borrowed(slip));
+                    slip_writer.push(&row).unwrap();
+                }
             }
             slip_writer.finish().unwrap();
             if part < 2 {

@@ -5,7 +5,7 @@ use super::confidence::{OF_INTERVALS, OF_PHASES, Tongue};
 use super::sequence::{Centred, Estimate, Sequences, at_rank, unit};
 use super::top_of_phases;
 use crate::model::Parameters;
-use crate::model::selected::Selected;
+use crate::model::Selected;
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
 use crate::sets::SetRow;

@@ -308,7 +308,7 @@ pub fn has_even_steps(values: &[f64]) -> bool {
 mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::model::selected::Selected;
+    use crate::model::Selected;
     use crate::table::columns::Interval;
 
     fn rows() -> Vec<SetRow> {

@@ -7,7 +7,7 @@
 //! Exports and the Python module read joined tables, part by part. They have columns that their files lack: those of the jobs
 //! of their rows, and whether a row belongs to a control.
 
-use crate::model::selected::Selected;
+use crate::model::Selected;
 use crate::results::destination::{NewFolder, refuse_stopped};
 use crate::results::directory::Results;
 use crate::results::parts::row_count;

@@ -18,6 +18,7 @@ use crate::table::columns::columns;
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
 use crate::table::storage::StorageError;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -135,7 +136,7 @@ impl<'a> Results<'a> {
         let mut commit = member.commit();
         self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             let mut slips = outcome.iter().flat_map(|measured| &measured.slips);
-            slips.try_for_each(|slip| writer.push(&(job, slip)))
+            slips.try_for_each(|slip| writer.push(&(Cow::Borrowed(job), Cow::Borrowed(slip))))
         })?;
         if sweep.recording().precursors {
             self.stage::<PrecursorRow<'_>>(
@@ -145,7 +146,9 @@ impl<'a> Results<'a> {
                 &jobs,
                 |writer, job, outcome| {
                     let mut precursors = outcome.iter().flat_map(|measured| &measured.precursors);
-                    precursors.try_for_each(|precursor| writer.push(&(job, precursor)))
+                    precursors.try_for_each(|precursor| {
+                        writer.push(&(Cow::Borrowed(job), Cow::Borrowed(precursor)))
+                    })
                 },
             )?;
         }

@@ -2,8 +2,8 @@
 //!
 //! Quantities are SI. Nothing in a table says when, where or how fast it was computed.
 
-use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
+use crate::model::{Selected, Selection};
 use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
 use crate::sweep::Sweep;
 use crate::table::arrow::RowBuffer;
@@ -11,6 +11,7 @@ use crate::table::columns::columns;
 use crate::table::value::words;
 use crate::table::{Table, tables};
 use arrow_schema::SchemaRef;
+use std::borrow::Cow;
 
 words! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,8 +116,8 @@ pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> JobLabel<S> {
     )
 }
 
-pub type SlipRow<'a> = (&'a JobLabel<DriveAndSeed>, &'a Slip);
-pub type PrecursorRow<'a> = (&'a JobLabel<DriveAndSeed>, &'a Precursor);
+pub type SlipRow<'a> = (Cow<'a, JobLabel<DriveAndSeed>>, Cow<'a, Slip>);
+pub type PrecursorRow<'a> = (Cow<'a, JobLabel<DriveAndSeed>>, Cow<'a, Precursor>);
 pub type JobRow = (JobLabel<All>, JobRecord);
 
 tables! {

@@ -8,7 +8,7 @@ pub use label::{
 };
 
 use crate::model::Symbol;
-use crate::model::selected::{Selected, Selection};
+use crate::model::{Selected, Selection};
 use crate::observe::Regime;
 use crate::table::columns::{Column, Interval, Kind, Row, columns};
 use crate::table::tables;

@@ -16,7 +16,7 @@ use crate::model::theory::typical_interval;
 use crate::model::{Symbol, Value};
 use crate::observe::Recording;
 use crate::sets::Statistic;
-use crate::solver::{Resolve, Solver};
+use crate::solver::Resolve;
 use crate::table::value::Shortest;
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -157,9 +157,7 @@ fn recording(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
         );
         return Err(file.source.refuse(file.place_of("record"), problem));
     }
-    let is_on_grid =
-        matches!(sweep.solver, Solver::EventDriven { resolve, .. } if resolve == Resolve::Grid);
-    if sweep.recording.energies && is_on_grid {
+    if sweep.recording.energies && sweep.solver.resolve == Resolve::Grid {
         let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
         return Err(file.source.refuse(file.place_of("record"), problem));
     }

@@ -12,7 +12,7 @@
 use crate::model::Parameters;
 use crate::model::theory::{total_strength, typical_interval};
 use crate::observe::Recording;
-use crate::solver::Solver;
+use crate::solver::{Method, Solver};
 use std::f64::consts::{PI, TAU};
 
 /// CPU time of one fixed step on one block, in s: a few multiplications and the test of the next contact.
@@ -55,23 +55,22 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
         1.0
     };
     let fourth_root = |ratio: f64| ratio.sqrt().sqrt();
-    let of_motion = match solver {
-        Solver::EventDriven { tolerance, resolve }
-            if resolve.takes_grid(tolerance) && !recording.energies =>
-        {
-            let step = step_length(parameters) * fourth_root(tolerance / 1e-3);
+    let setting = solver.setting();
+    let of_motion = match solver.method {
+        Method::EventDriven if solver.resolve.takes_grid(setting) && !recording.energies => {
+            let step = step_length(parameters) * fourth_root(setting / 1e-3);
             let steps = motion.resolved / step + motion.steps_of_periods;
             let steps = steps.min(motion.time / step);
             motion.breaks * GRID_EVENT
                 + steps * (GRID_STEP_OVERHEAD + GRID_STEP_OF_A_BLOCK * blocks)
         }
-        Solver::EventDriven { tolerance, .. } => {
-            let finer = fourth_root(fourth_root(1e-3 / tolerance));
+        Method::EventDriven => {
+            let finer = fourth_root(fourth_root(1e-3 / setting));
             let steps = motion.breaks * TAYLOR_STEPS_OF_A_BREAK * finer;
             ledger * steps * (TAYLOR_STEP_OVERHEAD + TAYLOR_STEP_OF_A_BLOCK * blocks)
         }
-        Solver::FixedStep { time_step } => {
-            ledger * motion.time / time_step * (STEP_OVERHEAD + STEP_OF_A_BLOCK * blocks)
+        Method::FixedStep => {
+            ledger * motion.time / setting * (STEP_OVERHEAD + STEP_OF_A_BLOCK * blocks)
         }
     };
     JOB_OVERHEAD + of_motion
@@ -218,11 +217,7 @@ mod tests {
                 max_time,
                 ..Recording::default()
             };
-            predicted_cost(
-                &parameters,
-                &recording,
-                Solver::FixedStep { time_step: 1e-6 },
-            )
+            predicted_cost(&parameters, &recording, Solver::fixed_step(1e-6))
         };
         let of_slips = |slips| cost(slips, None) - JOB_OVERHEAD;
         assert!((of_slips(20) / of_slips(10) - 2.0).abs() < 1e-9);
@@ -252,14 +247,14 @@ mod tests {
     #[test]
     fn what_was_measured_is_predicted_within_a_factor_of_two() {
         let grid = Solver::default();
-        let taylor = Solver::EventDriven {
-            tolerance: 1e-8,
+        let taylor = Solver {
             resolve: Resolve::Taylor,
+            ..Solver::event_driven(1e-8)
         };
         for (settings, solver, measured) in [
             ("", grid, 18.3),
             ("", taylor, 95.6),
-            ("", Solver::FixedStep { time_step: 4e-6 }, 62.7),
+            ("", Solver::fixed_step(4e-6), 62.7),
             ("N=2", grid, 0.54),
             ("N=20", grid, 6.2),
             ("N=560", grid, 253.0),

@@ -4,14 +4,14 @@
 //! and parameters that is not at its default, parameters with their exact bits: never over the place in a grid. So keys that
 //! are added later change no id. Contract: pinned by known-answer tests, and so are the defaults.
 
-use crate::model::selected::Selection;
+use crate::model::Selection;
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::sets::AllButSeed;
-use crate::solver::Solver;
+use crate::solver::{Solver, SolverKey};
 use crate::table::checksum::hexadecimal;
-use crate::table::value::Shortest;
 use sha2::{Digest, Sha256};
+use std::iter;
 
 /// One point of a sweep.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,19 +28,11 @@ const ID_BYTES: usize = 16;
 
 /// Keys and values of the solver, as a sweep file writes them: they read back to the same bits.
 pub(super) fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
-    match solver {
-        Solver::EventDriven { tolerance, resolve } => vec![
-            ("method", "event-driven".to_owned()),
-            ("tolerance", Shortest(tolerance).to_string()),
-            ("resolve", resolve.word().to_owned()),
-        ],
-        Solver::FixedStep { time_step } => {
-            vec![
-                ("method", "fixed-step".to_owned()),
-                ("dt", Shortest(time_step).to_string()),
-            ]
-        }
-    }
+    let keys = solver.method.settings().iter();
+    iter::once(&SolverKey::Method)
+        .chain(keys)
+        .map(|key| (key.key(), solver.get(*key).to_string()))
+        .collect()
 }
 
 /// Keys and values of the solver and the recording. The longest time, the budget of events and the controls count as the
@@ -129,7 +121,7 @@ mod tests {
     use std::collections::HashSet;
 
     fn identity() -> Identity {
-        Identity::new(Solver::FixedStep { time_step: 1e-6 }, &Recording::default())
+        Identity::new(Solver::fixed_step(1e-6), &Recording::default())
     }
 
     #[test]
@@ -215,7 +207,7 @@ mod tests {
             control: true,
             ..Recording::default()
         };
-        let solver = Solver::FixedStep { time_step: 1e-6 };
+        let solver = Solver::fixed_step(1e-6);
         let id = |recording| Identity::new(solver, recording).job(&Parameters::default());
         assert_eq!(id(&bounded), id(&Recording::default()));
         for key in RecordingKey::ALL.into_iter().filter(|key| {
@@ -238,7 +230,7 @@ mod tests {
         let mut ids = HashSet::new();
         for time_step in [1e-6, 1e-6_f64.next_up()] {
             for recording in &recordings {
-                let identity = Identity::new(Solver::FixedStep { time_step }, recording);
+                let identity = Identity::new(Solver::fixed_step(time_step), recording);
                 assert!(ids.insert(identity.job(&Parameters::default())));
             }
         }

@@ -96,7 +96,7 @@ impl Quantity {
 
     /// The canonical form of a value that this quantity can take by itself; rules between parameters are checked on the
     /// points.
-    pub fn checked(self, value: Value) -> Option<Value> {
+    pub fn checked(self, value: crate::table::value::Value<'_>) -> Option<Value> {
         match self {
             Self::Parameter(symbol) => symbol.checked(value),
             Self::Eta | Self::Frequency => {

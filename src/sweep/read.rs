@@ -15,10 +15,11 @@ use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{Goal, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
-use crate::model::Parameters;
+use crate::model::{Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
-use crate::solver::{Resolve, Solver, TOLERANCES};
+use crate::solver::{Solver, SolverKey};
 use crate::table::storage::{Disk, Storage};
+use std::iter;
 use std::path::Path;
 
 /// Longest name of a sweep, in characters: it becomes a folder.
@@ -259,39 +260,29 @@ fn read_recording(record: &Section<'_>) -> Result<Recording, Refused> {
     Ok(recording)
 }
 
-fn read_solver(solver: &Section<'_>) -> Result<Solver, Refused> {
-    let method = solver.entry("method");
-    match method.map_or(Some("event-driven"), |method| method.word()) {
-        Some("event-driven") => {
-            solver.only(&["method", "tolerance", "resolve"]).ok();
-            let Solver::EventDriven { tolerance, resolve } = Solver::default() else {
-                unreachable!("the default is event-driven")
-            };
-            let min = TOLERANCES.start();
-            let max = TOLERANCES.end();
-            let allowed = format!("a number from {min:e} to {max:e}, relative to fs/k");
-            let fits = |tolerance| TOLERANCES.contains(&tolerance);
-            let read_tolerance = |entry: Entry<'_>| entry.number(&allowed, fits);
-            let tolerance = solver
-                .entry("tolerance")
-                .map_or(Ok(tolerance), read_tolerance);
-            let resolve = solver.entry("resolve").map_or(Ok(resolve), |entry| {
-                let word = entry.word().and_then(Resolve::from_word);
-                word.ok_or_else(|| entry.must_be("\"auto\", \"grid\" or \"taylor\""))
-            });
-            Ok(Solver::EventDriven {
-                tolerance: tolerance?,
-                resolve: resolve?,
-            })
-        }
-        Some("fixed-step") => {
-            solver.only(&["method", "dt"]).ok();
-            let time_step = solver.required("dt", "the fixed step in s, such as dt = 1e-6")?;
-            let time_step = time_step.positive("s")?;
-            Ok(Solver::FixedStep { time_step })
-        }
-        _ => Err(solver
-            .required("method", "")?
-            .must_be("\"event-driven\" or \"fixed-step\"")),
+fn read_solver(section: &Section<'_>) -> Result<Solver, Refused> {
+    let mut solver = Solver::default();
+    read_setting(section, SolverKey::Method, &mut solver)?;
+    let settings = solver.method.settings();
+    let keys = settings.iter().map(|key| key.key());
+    let known: Vec<&str> = iter::once(SolverKey::Method.key()).chain(keys).collect();
+    section.only(&known).ok();
+    all(settings
+        .iter()
+        .map(|&key| read_setting(section, key, &mut solver)))?;
+    Ok(solver)
+}
+
+/// Reads a setting, which must be there if it has no default.
+fn read_setting(section: &Section<'_>, key: SolverKey, solver: &mut Solver) -> Result<(), Refused> {
+    let is_given = section.entry(key.key()).is_some();
+    if !is_given && solver.get(key) != Value::Null {
+        return Ok(());
     }
+    let description = key.description();
+    let entry = section.required(key.key(), description.meaning)?;
+    let value = entry.value().and_then(|value| key.checked(value));
+    value
+        .and_then(|value| solver.put(key, value))
+        .ok_or_else(|| entry.must_be(&description.allowed()))
 }

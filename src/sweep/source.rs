@@ -8,7 +8,6 @@
 //! value as written nor the way out.
 
 use super::quantity::{Quantity, hint, nearest};
-use crate::model::{self, BreakOn};
 use crate::table::shown::{shown, shown_text};
 use crate::table::value::{Field, Value};
 use std::cell::RefCell;
@@ -318,7 +317,7 @@ impl<'a> Entry<'a> {
     }
 
     /// The value as written: a count where it is one.
-    pub fn value(&self) -> Option<model::Value> {
+    pub fn value(&self) -> Option<Value<'a>> {
         match self.node.get_ref() {
             DeValue::Integer(integer) => {
                 let digits = integer.as_str();
@@ -328,7 +327,7 @@ impl<'a> Entry<'a> {
             }
             DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
             DeValue::Boolean(flag) => Some(Value::Flag(*flag)),
-            DeValue::String(word) => BreakOn::from_word(word).map(|rule| rule.value()),
+            DeValue::String(word) => Some(Value::Text(word)),
             _ => None,
         }
     }

@@ -2,6 +2,7 @@
 
 use super::quantity::{Quantity, nearest};
 use crate::observe::RecordingKey;
+use crate::solver::SolverKey;
 use toml_edit::{DocumentMut, Item, Value};
 
 /// A key of a sweep file with its new value as TOML, and the section that it belongs to.
@@ -14,7 +15,6 @@ pub struct Change {
 
 const AXES: &str = "axes";
 const SECTIONS: [&str; 6] = ["model", AXES, "record", "solver", "precision", "refine"];
-const SOLVER: [&str; 4] = ["method", "tolerance", "resolve", "dt"];
 /// Keys that take each other's place.
 const RIVALS: [&[&str]; 3] = [
     &["T", "eta", "frequency"],
@@ -31,13 +31,14 @@ impl Change {
     /// A key with one value. The sweep file's reader refuses what is unknown, in the section of what it is nearest to.
     pub fn setting(key: &str, value: &str) -> Self {
         let recording = RecordingKey::ALL.map(RecordingKey::key);
+        let solver = SolverKey::ALL.map(SolverKey::key);
         let known = Quantity::all().map(Quantity::key);
-        let known: Vec<&str> = known.chain(recording).chain(SOLVER).collect();
+        let known: Vec<&str> = known.chain(recording).chain(solver).collect();
         let section = match nearest(key, &known) {
             _ if matches!(key, "of" | "relative" | "absolute" | "seeds") => "precision",
             _ if matches!(key, "axis" | "by" | "value" | "threshold" | "to" | "jobs") => "refine",
             Some(known) if recording.contains(&known) => "record",
-            Some(known) if SOLVER.contains(&known) => "solver",
+            Some(known) if solver.contains(&known) => "solver",
             _ => "model",
         };
         Self {

@@ -4,7 +4,7 @@
 //! Arrow schema, where pandas finds them for `DataFrame.attrs`. Counts are signed: differences of unsigned columns wrap
 //! around in every reader.
 
-use super::columns::{Column, Field as _, FromRow, Kind, Row, Value};
+use super::columns::{Column, Field as _, Kind, Row, Value};
 use arrow_array::builder::{BooleanBuilder, Float64Builder, Int64Builder, StringBuilder};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};
@@ -228,7 +228,7 @@ fn cell(array: &ArrayRef, row: usize) -> Value<'_> {
 }
 
 /// The rows of a batch. Columns that the row does not have are passed over; those that may be null may be missing.
-pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
+pub fn rows<R: Row>(batch: &RecordBatch) -> Result<Vec<R>, String> {
     let columns = R::columns();
     let arrays = columns.iter().map(|described| {
         if described.nullable && batch.column_by_name(&described.name).is_none() {

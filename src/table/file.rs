@@ -7,7 +7,7 @@
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
 use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
-use crate::table::columns::{FromRow, Row};
+use crate::table::columns::Row;
 use crate::table::error::ResultsError;
 use crate::table::storage::{Storage, StoredFile};
 use arrow_array::RecordBatch;
@@ -203,7 +203,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, ResultsError> {
+    pub fn rows_of<R: Row>(&self) -> Result<Vec<R>, ResultsError> {
         arrow::rows(&self.rows).map_err(ResultsError::damage_at(&self.path))
     }
 }
@@ -299,9 +299,7 @@ impl<'a> Dataset<'a> {
     }
 
     /// The same, as rows of one type.
-    pub fn rows<R: FromRow>(
-        self,
-    ) -> impl Iterator<Item = Result<Vec<R>, ResultsError>> + use<'a, R> {
+    pub fn rows<R: Row>(self) -> impl Iterator<Item = Result<Vec<R>, ResultsError>> + use<'a, R> {
         self.read(R::columns().into_iter().map(|column| column.name).collect())
             .map(|batch| batch?.rows_of())
     }

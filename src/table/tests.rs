@@ -3,8 +3,8 @@
 use super::columns::*;
 use super::tables;
 use crate::documented::markdown;
-use crate::model::selected::{Selected, Selection};
 use crate::model::{BreakOn, Symbol};
+use crate::model::{Selected, Selection};
 
 columns! {
     /// One reading.

@@ -156,10 +156,7 @@ fn displacements_before_the_first_break_decay_as_eq_1_in_both_solvers() {
     .validated()
     .unwrap();
     let exact = 2.0 * libm::asinh(0.5 * (1e8_f64 / 6.9e9).sqrt());
-    for solver in [
-        Solver::event_driven(1e-8),
-        Solver::FixedStep { time_step: 1e-6 },
-    ] {
+    for solver in [Solver::event_driven(1e-8), Solver::fixed_step(1e-6)] {
         let mut profile = Profile::new(&parameters);
         let limits = Limits {
             end_time: 0.063,

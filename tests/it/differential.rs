@@ -243,10 +243,7 @@ impl Run {
             events: 200_000,
             interrupt: None,
         };
-        let mut both = Observers {
-            lead: &mut breaks,
-            others: vec![&mut slips],
-        };
+        let mut both = Observers(vec![&mut breaks, &mut slips]);
         let summary = simulate(parameters, solver, limits, &mut both)
             .map_err(|error| format!("{solver:?}: {error}"))?;
         if !breaks.in_order.is_sorted_by_key(|found| found.time) {
@@ -344,9 +341,9 @@ const REMEMBERED: f64 = 130.0;
 const HALVINGS: usize = 6;
 
 const fn reference_solver() -> Solver {
-    Solver::EventDriven {
-        tolerance: EXACT,
+    Solver {
         resolve: Resolve::Taylor,
+        ..Solver::event_driven(EXACT)
     }
 }
 
@@ -407,7 +404,10 @@ fn check(number: u64) -> Result<Shown, String> {
     for (tolerance, resolve) in SOLVERS {
         let found = Run::new(
             &parameters,
-            Solver::EventDriven { tolerance, resolve },
+            Solver {
+                resolve,
+                ..Solver::event_driven(tolerance)
+            },
             reference.end,
             usize::MAX,
         )?;
@@ -469,7 +469,7 @@ fn check_fixed_step(
     let run = |time_step: f64| {
         Run::new(
             parameters,
-            Solver::FixedStep { time_step },
+            Solver::fixed_step(time_step),
             reference.end,
             usize::MAX,
         )

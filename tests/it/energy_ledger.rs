@@ -61,7 +61,7 @@ fn the_fixed_step_ledger_balances_in_the_order_of_its_step() {
     for parameters in drives() {
         // Contacts break up to a step late, past their thresholds: seen 6e-3 at 4e-6 s and proportional to the step.
         for time_step in [4e-6, 2e-6, 1e-6] {
-            let residual = residual(&parameters, Solver::FixedStep { time_step });
+            let residual = residual(&parameters, Solver::fixed_step(time_step));
             assert!(
                 (500.0..2500.0).contains(&(residual / time_step)),
                 "{time_step:e}: {residual:e}"
@@ -73,11 +73,11 @@ fn the_fixed_step_ledger_balances_in_the_order_of_its_step() {
 #[test]
 fn an_audit_does_not_change_the_simulation() {
     for parameters in drives() {
-        let taylor = Solver::EventDriven {
-            tolerance: 1e-3,
+        let taylor = Solver {
             resolve: Resolve::Taylor,
+            ..Solver::event_driven(1e-3)
         };
-        for solver in [taylor, Solver::FixedStep { time_step: 2e-6 }] {
+        for solver in [taylor, Solver::fixed_step(2e-6)] {
             let (mut plain, mut audited) = (ContactLog::default(), ContactLog::default());
             let summary = simulate(&parameters, solver, LIMITS, &mut plain).unwrap();
             let (audited_summary, _) =
@@ -92,9 +92,9 @@ fn an_audit_does_not_change_the_simulation() {
 fn a_ledger_takes_taylor_steps_and_none_is_kept_along_the_grid() {
     for parameters in drives() {
         let ledger = |resolve| {
-            let solver = Solver::EventDriven {
-                tolerance: 1e-3,
+            let solver = Solver {
                 resolve,
+                ..Solver::event_driven(1e-3)
             };
             simulate_audited(&parameters, solver, LIMITS, &mut ContactLog::default())
         };

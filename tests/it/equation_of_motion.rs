@@ -142,10 +142,7 @@ fn both_solvers_follow_the_equation_of_motion_up_to_the_first_break() {
         let exact = followed(Solver::event_driven(1e-12));
         let reference = integrated(&parameters, &exact.sums, step, steps);
         // Runge-Kutta leaves some (ω_max h)^4 of the fastest modes; a fixed step some (ω h)² of the modulation.
-        for (solver, tolerance) in [
-            (exact, 1e-6),
-            (followed(Solver::FixedStep { time_step: 1e-7 }), 1e-4),
-        ] {
+        for (solver, tolerance) in [(exact, 1e-6), (followed(Solver::fixed_step(1e-7)), 1e-4)] {
             let scale = reference[0].abs();
             assert!(scale > 1e-9, "the slider hardly moved: {scale} m");
             for (block, (found, expected)) in solver.displacement.iter().zip(&reference).enumerate()

@@ -27,7 +27,10 @@ fn contact_log(
     let mut log = ContactLog::default();
     let summary = simulate(
         parameters,
-        Solver::EventDriven { tolerance, resolve },
+        Solver {
+            resolve,
+            ..Solver::event_driven(tolerance)
+        },
         limits,
         &mut log,
     )

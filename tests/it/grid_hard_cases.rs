@@ -9,7 +9,10 @@ use stickslip::observe::{AttachedMap, ContactLog, Observers, Recording, SlipObse
 use stickslip::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate};
 
 const fn solver(tolerance: f64, resolve: Resolve) -> Solver {
-    Solver::EventDriven { tolerance, resolve }
+    Solver {
+        resolve,
+        ..Solver::event_driven(tolerance)
+    }
 }
 
 const GRID: Solver = solver(1e-3, Resolve::Grid);
@@ -232,10 +235,7 @@ fn run(parameters: &Parameters, solver: Solver, end_time: f64) -> Outcome {
         events: 20_000_000,
         interrupt: None,
     };
-    let mut all = Observers {
-        lead: &mut log,
-        others: vec![&mut slips, &mut trace],
-    };
+    let mut all = Observers(vec![&mut log, &mut slips, &mut trace]);
     let summary = simulate(parameters, solver, limits, &mut all).unwrap();
     let mean_force = trace.rows.iter().map(|row| row.force).sum::<f64>() / trace.rows.len() as f64;
     Outcome {
@@ -358,10 +358,7 @@ fn before_chaos_the_grid_shows_the_same_trace_and_map() {
                 events: 1_000_000,
                 interrupt: None,
             };
-            let mut all = Observers {
-                lead: &mut log,
-                others: vec![&mut trace, &mut map],
-            };
+            let mut all = Observers(vec![&mut log, &mut trace, &mut map]);
             simulate(&parameters, solver, limits, &mut all).unwrap();
             (log.events, trace.rows, map.rows)
         };

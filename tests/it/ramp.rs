@@ -61,7 +61,7 @@ fn both_solvers_break_the_same_contacts_at_the_same_times() {
     let exact = first_breaks(&ramped(), EXACT, 60);
     assert_eq!(exact.len(), 60);
     // Breaks come up to a step late, and a late one meets another phase of the fast motion.
-    let stepped = first_breaks(&ramped(), Solver::FixedStep { time_step: 1e-7 }, 80);
+    let stepped = first_breaks(&ramped(), Solver::fixed_step(1e-7), 80);
     assert!(
         difference(&exact, &stepped) < 2e-6,
         "{:e}",
@@ -98,15 +98,12 @@ fn both_solvers_show_the_same_trace() {
             &parameters,
             solver,
             limits,
-            &mut Observers {
-                lead: &mut lead,
-                others: vec![&mut trace],
-            },
+            &mut Observers(vec![&mut lead, &mut trace]),
         )
         .unwrap();
         trace.rows
     };
-    let (exact, stepped) = (traced(EXACT), traced(Solver::FixedStep { time_step: 1e-7 }));
+    let (exact, stepped) = (traced(EXACT), traced(Solver::fixed_step(1e-7)));
     assert!(exact.len() >= 500 && stepped.len() >= 500);
     // A leap does not show the free motion that it carries over: 4e-4 N after the jolt of the start, the largest here. A
     // ramp that were not followed would be off by up to K_d (Δ - Δ_to) = 28 N.
@@ -152,7 +149,7 @@ fn steep_ramps_balance_their_energy() {
             // As without a ramp.
             (Solver::event_driven(1e-4), 1e-6),
             (Solver::event_driven(1e-8), 1e-11),
-            (Solver::FixedStep { time_step: 1e-6 }, 2.5e-3),
+            (Solver::fixed_step(1e-6), 2.5e-3),
         ] {
             let parameters = parameters.clone().validated().unwrap();
             let (summary, ledger) =

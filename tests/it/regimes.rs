@@ -149,10 +149,7 @@ fn logged(parameters: &Parameters, solver: Solver) -> (Vec<Slip>, ContactLog, f6
     };
     let mut slips = SlipObserver::new(parameters, &recording);
     let mut log = ContactLog::default();
-    let mut observers = Observers {
-        lead: &mut slips,
-        others: vec![&mut log],
-    };
+    let mut observers = Observers(vec![&mut slips, &mut log]);
     let limits = Limits {
         end_time: f64::INFINITY,
         events: u64::MAX,
@@ -165,14 +162,14 @@ fn logged(parameters: &Parameters, solver: Solver) -> (Vec<Slip>, ContactLog, f6
 }
 
 fn solvers() -> [Solver; 3] {
-    let event_driven = |resolve| Solver::EventDriven {
-        tolerance: 1e-3,
+    let event_driven = |resolve| Solver {
         resolve,
+        ..Solver::event_driven(1e-3)
     };
     [
         event_driven(Resolve::Grid),
         event_driven(Resolve::Taylor),
-        Solver::FixedStep { time_step: 1e-6 },
+        Solver::fixed_step(1e-6),
     ]
 }
 
@@ -229,10 +226,7 @@ fn one_block_is_its_own_mean() {
     for solver in solvers() {
         let mut slips = SlipObserver::new(&parameters, &recording);
         let mut log = ContactLog::default();
-        let mut observers = Observers {
-            lead: &mut slips,
-            others: vec![&mut log],
-        };
+        let mut observers = Observers(vec![&mut slips, &mut log]);
         let limits = Limits {
             end_time: 0.3,
             events: u64::MAX,

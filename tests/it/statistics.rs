@@ -240,11 +240,11 @@ fn a_job_with_a_time_ends_with_the_first_slip_that_begins_then_or_later() {
 fn a_job_that_is_cut_before_the_end_of_its_last_slip_is_not_done_and_whatever_is_done_is_whole() {
     let solvers = [
         Solver::default(),
-        Solver::EventDriven {
-            tolerance: 1e-6,
+        Solver {
             resolve: Resolve::Taylor,
+            ..Solver::event_driven(1e-6)
         },
-        Solver::FixedStep { time_step: 2e-6 },
+        Solver::fixed_step(2e-6),
     ];
     for (seed, solver) in (0..).zip(solvers) {
         let until = |max_time| {

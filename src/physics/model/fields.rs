@@ -51,6 +51,8 @@ pub struct Description {
     pub kind: Kind,
     /// Whether it may be missing.
     pub nullable: bool,
+    /// The words that it can be, if it is one.
+    pub choices: &'static [&'static str],
 }
 
 impl Description {
@@ -69,10 +71,11 @@ impl Description {
 
     /// The values that the field can take by itself, with their unit.
     pub fn allowed(&self) -> String {
-        if self.unit.is_empty() {
-            self.range.words.to_owned()
-        } else {
-            format!("{}, in {}", self.range.words, self.unit)
+        let words = self.range.words;
+        match self.choices {
+            [others @ .., last] => format!("\"{}\" or \"{last}\"", others.join("\", \"")),
+            [] if self.unit.is_empty() => words.to_owned(),
+            [] => format!("{words}, in {}", self.unit),
         }
     }
 
@@ -125,11 +128,13 @@ impl Range {
         Excluded(f64::INFINITY),
     );
     pub const FLAG: Self = Self::new("true or false", Unbounded, Unbounded);
-    pub const BREAK_ON: Self = Self::new(
-        "\"magnitude\" (either sign) or \"tension\"",
-        Unbounded,
-        Unbounded,
+    pub const TOLERANCE: Self = Self::new(
+        "a number from 1e-12 to 1e-2, relative to fs/k",
+        Included(1e-12),
+        Included(1e-2),
     );
+    /// Of a field that is one of several words, which its type lists.
+    pub const WORD: Self = Self::new("", Unbounded, Unbounded);
 
     const fn new(words: &'static str, low: Bound<f64>, high: Bound<f64>) -> Self {
         Self {
@@ -186,6 +191,7 @@ macro_rules! fields {
                         rule: concat!($($rule)?),
                         kind: <$type as $crate::value::Field>::KIND,
                         nullable: <$type as $crate::value::Field>::NULLABLE,
+                        choices: <$type as $crate::value::Field>::WORDS,
                     },
                 )+}
             }

@@ -5,9 +5,8 @@
 //! is due. Contract: decisions are by contact identity; simultaneous events go in the order of blocks, then contacts.
 
 use super::disorder::Contact;
-use super::lanes::{LANES, Row};
 use super::reattachments::{Due, Reattachments};
-use super::simd::{Simd, Vector};
+use super::simd::{LANES, Row, Simd, Vector};
 use super::{BreakOn, Disorder, Parameters};
 use crate::value::words;
 use pulp::Scalar512b;
@@ -56,6 +55,23 @@ pub struct ContactEvent {
     pub attached_time: f64,
     /// Mean displacement of the blocks at a break, in m, which the solver knows; 0 for an attachment.
     pub mean_displacement: f64,
+}
+
+impl ContactEvent {
+    /// A change with what [`Interface::count`] gives for it.
+    #[inline(always)]
+    pub(crate) const fn new(
+        what: ContactChange,
+        (attached, attached_time): (u64, f64),
+        mean_displacement: f64,
+    ) -> Self {
+        Self {
+            what,
+            attached,
+            attached_time,
+            mean_displacement,
+        }
+    }
 }
 
 impl Deref for ContactEvent {
@@ -210,11 +226,9 @@ impl Interface {
             .flat_map(move |block| {
                 (0..self.contacts_per_block).map(move |contact| (block, contact))
             })
-            .map(|(block, contact)| ContactEvent {
-                what: self.change(block, contact, 0.0, 0.0, Change::Attach),
-                attached: self.attached.count,
-                attached_time: 0.0,
-                mean_displacement: 0.0,
+            .map(|(block, contact)| {
+                let what = self.change(block, contact, 0.0, 0.0, Change::Attach);
+                ContactEvent::new(what, (self.attached.count, 0.0), 0.0)
             })
     }
 

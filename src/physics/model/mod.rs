@@ -5,10 +5,8 @@ mod drive;
 pub mod equation;
 pub mod fields;
 mod interface;
-mod lanes;
 mod parameters;
 mod reattachments;
-pub mod selected;
 pub(crate) mod simd;
 pub mod theory;
 
@@ -16,8 +14,8 @@ pub use disorder::{Contact, Disorder, RNG_SCHEME, standard_normal_quantile};
 pub use drive::Drive;
 pub use fields::Description;
 pub use interface::{Change, ContactChange, ContactEvent, Interface};
-pub(crate) use lanes::{LANES, Row};
-pub use parameters::{BreakOn, ParameterError, Parameters, Symbol};
+pub use parameters::{BreakOn, ParameterError, Parameters, Selected, Selection, Symbol};
+pub(crate) use simd::{LANES, Row};
 
 /// The value of a parameter, in a file, on an axis or in a table.
 pub type Value = crate::value::Value<'static>;

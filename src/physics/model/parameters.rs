@@ -1,12 +1,15 @@
-//! The parameters of the model: one validated struct, each field described once.
+//! The parameters of the model: one validated struct, each field described once; and some of them as columns of a row.
 //!
 //! Source: Capozza et al., PRL 107, 024301 (2011), Fig. 1 for the defaults. Every place that names a parameter (sweep
 //! files, flags, table columns, the documentation) goes through [`Symbol`].
 
 use super::fields::fields;
 use super::theory::{eta, to_twelve_digits, typical_interval};
+use crate::columns::{Column, Part, Row};
 use crate::value::{Value, words};
 use std::f64::consts::TAU;
+use std::marker::PhantomData;
+use std::ops::Deref;
 
 words! {
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -56,7 +59,7 @@ fields! {
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
         L("L", "L") slider_length: f64 = 0.15, "m", POSITIVE,
             "slider length, enters positions and front speeds only";
-        BreakOn("break_on") break_on: BreakOn = BreakOn::Magnitude, "", BREAK_ON, "when a contact breaks";
+        BreakOn("break_on") break_on: BreakOn = BreakOn::Magnitude, "", WORD and "magnitude of either sign", "when a contact breaks";
         Seed("seed") seed: u64 = 0, "", COUNT_OR_ZERO, "realisation of the disorder";
     }
 }
@@ -222,6 +225,68 @@ impl Parameters {
         }
     }
 }
+
+/// Which parameters stand in a row.
+pub trait Selection {
+    /// Their symbols, in order.
+    const SYMBOLS: &'static [Symbol];
+}
+
+/// Some of the parameters as columns, under their keys and with their units and meanings. Read back, the others have their
+/// defaults.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Selected<S> {
+    pub parameters: Parameters,
+    selection: PhantomData<S>,
+}
+
+impl<S> Selected<S> {
+    /// The columns of these parameters.
+    pub const fn new(parameters: Parameters) -> Self {
+        Self {
+            parameters,
+            selection: PhantomData,
+        }
+    }
+}
+
+impl<S> Deref for Selected<S> {
+    type Target = Parameters;
+
+    fn deref(&self) -> &Parameters {
+        &self.parameters
+    }
+}
+
+impl<S: Selection> Part for Selected<S> {
+    fn columns_as(_: Column) -> Vec<Column> {
+        let columns = S::SYMBOLS.iter();
+        columns
+            .map(|symbol| symbol.description().column())
+            .collect()
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        for &symbol in S::SYMBOLS {
+            give(self.parameters.get(symbol));
+        }
+    }
+
+    fn take<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        let mut parameters = Parameters::default();
+        for &symbol in S::SYMBOLS {
+            parameters
+                .set(symbol, next())
+                .map_err(|error| error.to_string())?;
+        }
+        parameters
+            .validated()
+            .map(Self::new)
+            .map_err(|error| error.to_string())
+    }
+}
+
+impl<S: Selection> Row for Selected<S> {}
 
 #[cfg(test)]
 mod tests {

@@ -1,4 +1,7 @@
-//! A row in registers: the arithmetic of the hot loops, for each set of processor features.
+//! Rows of eight doubles, and their arithmetic in registers for each set of processor features.
+//!
+//! Loops over contacts and over blocks run in this width, whatever the registers hold, so that the rounding of sums does
+//! not depend on the processor.
 //!
 //! A set of features is a token type of `pulp`, of which a value exists only where the processor has them: safe code
 //! cannot run a loop that the processor lacks. Contract: every operation is rounded in each lane as IEEE 754 says,
@@ -7,9 +10,46 @@
 //! `pulp` takes 1.4 % fewer instructions than intrinsics in `unsafe` blocks of our own, and the same time within 1 %.
 //! `fearless_simd` needs no code here, but has AVX-512 from Ice Lake on only, and AVX2 takes 10 to 17 % more time.
 
-use super::lanes::{LANES, Row};
 use pulp::{Scalar512b as Baseline, WithSimd, bytemuck};
 use std::array;
+use std::ops::{Deref, DerefMut};
+
+pub(crate) const LANES: usize = 8;
+
+/// Eight doubles in one cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Row(pub [f64; LANES]);
+
+impl Row {
+    /// The same value in every lane.
+    pub const fn filled(value: f64) -> Self {
+        Self([value; LANES])
+    }
+
+    /// Combines all lanes into one value, in pairs.
+    #[inline(always)]
+    pub fn reduce(self, combine: impl Fn(f64, f64) -> f64) -> f64 {
+        let halves: [f64; LANES / 2] = array::from_fn(|i| combine(self[i], self[i + LANES / 2]));
+        combine(combine(halves[0], halves[2]), combine(halves[1], halves[3]))
+    }
+}
+
+impl Deref for Row {
+    type Target = [f64; LANES];
+
+    #[inline(always)]
+    fn deref(&self) -> &[f64; LANES] {
+        &self.0
+    }
+}
+
+impl DerefMut for Row {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [f64; LANES] {
+        &mut self.0
+    }
+}
 
 /// A set of processor features that this processor has.
 pub(crate) trait Simd: pulp::Simd {
@@ -242,7 +282,8 @@ mod x86 {
 
         #[inline(always)]
         fn to_next_lane(self, registers: [Self::f64s; 2]) -> [Self::f64s; 2] {
-            let (avx, [low, high]) = (self.avx, registers.map(|register| cast!(register)));
+            let avx = self.avx;
+            let [low, high] = registers.map(|register| cast!(register));
             // 0 0 l0 l1 and l2 l3 h0 h1, each then shifted by one against the register itself.
             let before_low = avx._mm256_permute2f128_pd::<0x08>(low, low);
             let before_high = avx._mm256_permute2f128_pd::<0x21>(low, high);
@@ -252,7 +293,8 @@ mod x86 {
 
         #[inline(always)]
         fn to_lane_before(self, registers: [Self::f64s; 2]) -> [Self::f64s; 2] {
-            let (avx, [low, high]) = (self.avx, registers.map(|register| cast!(register)));
+            let avx = self.avx;
+            let [low, high] = registers.map(|register| cast!(register));
             // l2 l3 h0 h1 and h2 h3 0 0.
             let after_low = avx._mm256_permute2f128_pd::<0x21>(low, high);
             let after_high = avx._mm256_permute2f128_pd::<0x81>(high, high);

@@ -1,9 +1,54 @@
-//! From parameters to measurements: one job, simulated and observed.
+//! From parameters to measurements: one job, simulated and observed; its averages over time, and the regime that they show.
 
-use super::{Averages, Precursor, Recording, Regime, Slip, SlipObserver};
+use super::{Precursor, Recording, Slip, SlipObserver};
 use crate::model::Parameters;
-use crate::solver::{Limits, SimulationError, Solver, Summary, simulate, simulate_audited};
+use crate::solver::{
+    Limits, Observer, SimulationError, Solver, Summary, simulate, simulate_audited,
+};
+use crate::value::words;
 use std::sync::atomic::AtomicBool;
+
+/// What a job measures as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Averages {
+    /// The time that they are over, in s.
+    pub time: f64,
+    /// Time average of the shear force, in N.
+    pub friction: f64,
+    /// Time average of the fraction of contacts that are attached.
+    pub attached_fraction: f64,
+    /// Share of the time within slips.
+    pub slip_share: f64,
+}
+
+words! {
+    /// How a slider moves, by the share of time within slips.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Regime {
+        /// It sticks for most of the time.
+        StickSlip = "stick-slip",
+        /// It slips for most of the time.
+        Mixed = "mixed",
+        Sliding = "sliding",
+    }
+}
+
+impl Regime {
+    /// Least share of time within slips of the mixed regime, and of sliding.
+    pub const MIN_SHARES: [f64; 2] = [0.5, 0.95];
+
+    /// The regime at a share of time within slips.
+    pub fn at(slip_share: f64) -> Self {
+        let [mixed, sliding] = Self::MIN_SHARES;
+        if slip_share < mixed {
+            Self::StickSlip
+        } else if slip_share < sliding {
+            Self::Mixed
+        } else {
+            Self::Sliding
+        }
+    }
+}
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
@@ -26,20 +71,16 @@ pub struct Measurements {
 impl Measurements {
     /// What an observer has measured in a simulation that ended with this summary.
     pub fn new(observer: SlipObserver, summary: Summary) -> Self {
-        let averages = observer.averages();
-        let running_interval = observer.running_interval();
-        let ruptures = observer.ruptures;
-        let has_given_up = observer.has_given_up;
-        let (slips, precursors) = observer.into_rows();
-        Self {
-            slips,
-            precursors,
-            ruptures,
-            averages,
-            running_interval,
-            has_given_up,
+        let mut measured = Self {
+            averages: observer.averages(),
+            running_interval: observer.running_interval(),
+            ruptures: observer.ruptures,
+            has_given_up: observer.has_given_up,
             summary,
-        }
+            ..Self::default()
+        };
+        (measured.slips, measured.precursors) = observer.into_rows();
+        measured
     }
 
     /// How the slider moved; `None` without averages.
@@ -57,22 +98,28 @@ pub fn measure(
     interrupt: &AtomicBool,
 ) -> Result<Measurements, SimulationError> {
     let mut observer = SlipObserver::new(parameters, recording);
-    let limits = recording.limits(interrupt);
-    let summary = if recording.energies {
-        simulate_audited(parameters, solver, limits, &mut observer)?.0
-    } else {
-        simulate(parameters, solver, limits, &mut observer)?
-    };
+    let summary = recording.simulate(parameters, solver, interrupt, &mut observer)?;
     Ok(Measurements::new(observer, summary))
 }
 
 impl Recording {
-    /// The bounds that a recording sets on a simulation.
-    pub fn limits<'a>(&self, interrupt: &'a AtomicBool) -> Limits<'a> {
-        Limits {
+    /// Simulates one realisation within the bounds of the recording, with a ledger if it asks for energies.
+    pub fn simulate(
+        &self,
+        parameters: &Parameters,
+        solver: Solver,
+        interrupt: &AtomicBool,
+        observer: &mut dyn Observer,
+    ) -> Result<Summary, SimulationError> {
+        let limits = Limits {
             end_time: self.max_time.unwrap_or(f64::INFINITY),
             events: self.max_events,
             interrupt: Some(interrupt),
+        };
+        if self.energies {
+            Ok(simulate_audited(parameters, solver, limits, observer)?.0)
+        } else {
+            simulate(parameters, solver, limits, observer)
         }
     }
 }

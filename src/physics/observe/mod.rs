@@ -4,22 +4,18 @@
 
 mod drops;
 mod measure;
-mod phase;
 mod recording;
 mod records;
-mod regime;
 mod rupture;
 mod slip;
 mod slip_observer;
 
 pub use drops::Drops;
-pub use measure::{Measurements, measure};
-pub use phase::{OVERSHOOT, phase};
+pub use measure::{Averages, Measurements, Regime, measure};
 pub use recording::{Recording, RecordingKey};
 pub use records::{
     AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow,
 };
-pub use regime::{Averages, Regime};
 pub use rupture::{Rupture, advance_speed};
-pub use slip::{Energies, Modulation, Precursor, Slip};
+pub use slip::{Energies, Modulation, OVERSHOOT, Precursor, Slip, phase};
 pub use slip_observer::SlipObserver;

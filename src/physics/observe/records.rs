@@ -5,49 +5,37 @@ use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
 
 /// Several observers of one run; the first decides when it has seen enough.
-pub struct Observers<'a> {
-    pub lead: &'a mut dyn Observer,
-    pub others: Vec<&'a mut dyn Observer>,
-}
+pub struct Observers<'a>(pub Vec<&'a mut dyn Observer>);
 
 impl Observer for Observers<'_> {
     fn advance(&mut self, segment: &Segment<'_>) {
-        self.lead.advance(segment);
-        self.others
-            .iter_mut()
-            .for_each(|other| other.advance(segment));
+        self.0.iter_mut().for_each(|each| each.advance(segment));
     }
 
     fn contact(&mut self, event: &ContactEvent) {
-        self.lead.contact(event);
-        self.others
-            .iter_mut()
-            .for_each(|other| other.contact(event));
+        self.0.iter_mut().for_each(|each| each.contact(event));
     }
 
     fn spent(&mut self, spent: Spent) {
-        self.lead.spent(spent);
-        self.others.iter_mut().for_each(|other| other.spent(spent));
+        self.0.iter_mut().for_each(|each| each.spent(spent));
     }
 
     fn follows_attachments(&self) -> bool {
-        self.lead.follows_attachments()
-            || self.others.iter().any(|other| other.follows_attachments())
+        self.0.iter().any(|each| each.follows_attachments())
     }
 
     fn follows_force(&self) -> bool {
-        self.lead.follows_force() || self.others.iter().any(|other| other.follows_force())
+        self.0.iter().any(|each| each.follows_force())
     }
 
     fn is_satisfied(&self) -> bool {
-        self.lead.is_satisfied()
+        self.0[0].is_satisfied()
     }
 
     fn end(&mut self, time: f64, displacement: &[f64]) {
-        self.lead.end(time, displacement);
-        self.others
+        self.0
             .iter_mut()
-            .for_each(|other| other.end(time, displacement));
+            .for_each(|each| each.end(time, displacement));
     }
 }
 

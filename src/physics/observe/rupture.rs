@@ -1,6 +1,8 @@
-//! Ruptures: maximal runs of contact breaks in which no gap exceeds the wave crossing time, and their fronts.
+//! Ruptures: maximal runs of contact breaks in which no gap exceeds the wave crossing time; their fronts, what is measured
+//! on the force meanwhile, and what makes them slips or precursors.
 
 use crate::model::{ContactEvent, Parameters};
+use crate::solver::Spent;
 
 /// A rupture in progress or just ended.
 #[derive(Clone, Debug)]
@@ -68,6 +70,72 @@ impl Rupture {
         (self.extent() >= 3)
             .then(|| advance_speed(points))
             .flatten()
+    }
+}
+
+/// A largest shear force, in N, and its time, in s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Peak {
+    pub time: f64,
+    pub force: f64,
+}
+
+impl Peak {
+    pub fn raise(&mut self, other: Peak) {
+        if other.force > self.force {
+            *self = other;
+        }
+    }
+}
+
+/// An instant, and what has been counted up to it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Instant {
+    pub time: f64,
+    /// Shear force, in N.
+    pub force: f64,
+    /// Its integral over time, in N s.
+    pub impulse: f64,
+    /// Integral of the number of attached contacts, in s.
+    pub attached_time: f64,
+    /// Time within slips, in s.
+    pub slipping: f64,
+    /// Mean displacement of the blocks, in m.
+    pub mean_displacement: f64,
+    /// Zero unless energies are recorded.
+    pub spent: Spent,
+}
+
+/// A rupture in progress, with what is measured on its force.
+#[derive(Clone, Debug)]
+pub(super) struct Active {
+    pub rupture: Rupture,
+    /// Peak since the last slip, when the rupture reached the leading edge.
+    pub onset: Option<Peak>,
+    /// Peak since the last precursor, when the rupture began.
+    pub precursor_onset: Peak,
+    /// Least force so far, and up to the last break, in N.
+    pub least: f64,
+    pub least_at_last_break: f64,
+    pub first: Instant,
+    pub last: Instant,
+    /// Whether the shear force was rising at the onset.
+    pub onset_cut: bool,
+}
+
+/// What makes a rupture a slip or a precursor, and when it and the job end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Criteria {
+    pub precursor_size: u64,
+    /// All contacts, attached or not.
+    pub contacts: u64,
+    pub crossing_time: f64,
+    pub give_up_time: f64,
+}
+
+impl Criteria {
+    pub fn is_recorded(&self, rupture: &Rupture) -> bool {
+        rupture.size >= self.precursor_size || rupture.is_slip(self.contacts)
     }
 }
 

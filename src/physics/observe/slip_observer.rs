@@ -5,47 +5,12 @@
 //! the largest shear force between the previous slip's end (its last break) and the instant at which its rupture reaches
 //! the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
-use super::Recording;
 use super::drops::{DropDetector, Drops};
-use super::phase::phase;
-use super::regime::Averages;
-use super::rupture::{Rupture, advance_speed};
-use super::slip::{Energies, Modulation, Precursor, Slip};
+use super::rupture::{Active, Criteria, Instant, Peak, Rupture, advance_speed};
+use super::slip::{Energies, Modulation, Precursor, Slip, phase};
+use super::{Averages, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
-
-/// A largest shear force, in N, and its time, in s.
-#[derive(Clone, Copy, Debug)]
-struct Peak {
-    time: f64,
-    force: f64,
-}
-
-impl Peak {
-    fn raise(&mut self, other: Peak) {
-        if other.force > self.force {
-            *self = other;
-        }
-    }
-}
-
-/// An instant, and what has been counted up to it.
-#[derive(Clone, Copy, Debug, Default)]
-struct Instant {
-    time: f64,
-    /// Shear force, in N.
-    force: f64,
-    /// Its integral over time, in N s.
-    impulse: f64,
-    /// Integral of the number of attached contacts, in s.
-    attached_time: f64,
-    /// Time within slips, in s.
-    slipping: f64,
-    /// Mean displacement of the blocks, in m.
-    mean_displacement: f64,
-    /// Zero unless energies are recorded.
-    spent: Spent,
-}
 
 /// Largest shear forces since the last slip's end, the last rupture of precursor size, and the last break.
 #[derive(Clone, Debug)]
@@ -88,22 +53,6 @@ struct DriveAt {
     slip_break: Drive,
 }
 
-/// What makes a rupture a slip or a precursor, and when it and the job end.
-#[derive(Clone, Copy, Debug)]
-struct Criteria {
-    precursor_size: u64,
-    /// All contacts, attached or not.
-    contacts: u64,
-    crossing_time: f64,
-    give_up_time: f64,
-}
-
-impl Criteria {
-    fn is_recorded(&self, rupture: &Rupture) -> bool {
-        rupture.size >= self.precursor_size || rupture.is_slip(self.contacts)
-    }
-}
-
 /// An observer that finds slips and precursors.
 #[derive(Clone, Debug)]
 pub struct SlipObserver {
@@ -130,23 +79,6 @@ pub struct SlipObserver {
     /// Drops, if they are recorded, and first and last break of every slip.
     drops: Option<DropDetector>,
     breaks_of_slips: Vec<(f64, f64)>,
-}
-
-/// A rupture in progress, with what is measured on its force.
-#[derive(Clone, Debug)]
-struct Active {
-    rupture: Rupture,
-    /// Peak since the last slip, when the rupture reached the leading edge.
-    onset: Option<Peak>,
-    /// Peak since the last precursor, when the rupture began.
-    precursor_onset: Peak,
-    /// Least force so far, and up to the last break, in N.
-    least: f64,
-    least_at_last_break: f64,
-    first: Instant,
-    last: Instant,
-    /// Whether the shear force was rising at the onset.
-    onset_cut: bool,
 }
 
 impl SlipObserver {
@@ -265,13 +197,7 @@ impl SlipObserver {
     }
 
     fn begin_or_extend(&mut self, event: &ContactEvent) {
-        if self
-            .rupture
-            .as_ref()
-            .is_some_and(|active| event.time - active.last.time > self.criteria.crossing_time)
-        {
-            self.finish_rupture();
-        }
+        self.finish_rupture_before(event.time);
         let blocks = self.parameters.blocks;
         let here = Instant {
             time: event.time,
@@ -308,6 +234,16 @@ impl SlipObserver {
         };
     }
 
+    /// Ends the rupture if no break has come in the wave crossing time before a time in s.
+    #[inline(always)]
+    fn finish_rupture_before(&mut self, time: f64) {
+        let crossing_time = self.criteria.crossing_time;
+        let is_over = |active: &Active| time - active.last.time > crossing_time;
+        if self.rupture.as_ref().is_some_and(is_over) {
+            self.finish_rupture();
+        }
+    }
+
     fn finish_rupture(&mut self) {
         let Some(active) = self.rupture.take() else {
             return;
@@ -324,7 +260,6 @@ impl SlipObserver {
     }
 
     fn record_slip(&mut self, active: &Active) {
-        let rupture = &active.rupture;
         // A slip has reached the leading edge.
         let onset = active.onset.unwrap_or(self.peaks_since.slip);
         let first = active.first;
@@ -332,45 +267,8 @@ impl SlipObserver {
         let discard = self.recording.discard;
         self.drive_at.slip_onset.advance_to(onset.time);
         if self.slips_seen >= discard {
-            let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
-            let drive = &self.drive_at.slip_onset;
-            let modulation = Modulation::of(drive);
-            let interval = self.last_onset.map(|last| onset.time - last);
-            let spent = self
-                .span
-                .last_slip_end
-                .map_or(Spent::default(), |end| end.spent);
-            let energies = self
-                .recording
-                .energies
-                .then(|| Energies::between(spent, last.spent));
-            self.slips.push(Slip {
-                number: self.slips_seen - discard,
-                onset: onset.time,
-                interval,
-                modulation,
-                periods: interval.and_then(|interval| modulation.periods(interval)),
-                phase: modulation
-                    .period
-                    .map(|period| phase(onset.time - drive.cycle_start, period, drive.eta)),
-                peak_force: onset.force,
-                drop: onset.force - active.least_at_last_break,
-                nucleation: first.time,
-                nucleation_block: rupture.first_block as u64 + 1,
-                duration: last.time - first.time,
-                size: rupture.size,
-                attached_before: rupture.attached_before as f64 / self.criteria.contacts as f64,
-                least_attached: rupture.least_attached as f64 / self.criteria.contacts as f64,
-                distance: last.mean_displacement - first.mean_displacement,
-                edge_distance,
-                onset_cut: active.onset_cut,
-                front_speed: rupture.front_speed(&self.parameters),
-                precursors: self.pending.count,
-                largest_precursor: self.pending.largest,
-                slow_front_speed: advance_speed(self.pending.advances.iter().copied()),
-                energies: energies.unwrap_or_default(),
-                drops: Drops::default(),
-            });
+            let slip = self.slip(active, onset);
+            self.slips.push(slip);
         }
         if self.drops.is_some() {
             self.breaks_of_slips.push((first.time, last.time));
@@ -390,6 +288,52 @@ impl SlipObserver {
         self.peaks_since.slip = self.peaks_since.last_break;
         self.peaks_since.precursor = self.peaks_since.last_break;
         self.pending = Pending::default();
+    }
+
+    /// The row of a slip; drops are found at the end.
+    fn slip(&mut self, active: &Active, onset: Peak) -> Slip {
+        let rupture = &active.rupture;
+        let first = active.first;
+        let last = active.last;
+        let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
+        let drive = &self.drive_at.slip_onset;
+        let modulation = Modulation::of(drive);
+        let interval = self.last_onset.map(|last| onset.time - last);
+        let spent = self
+            .span
+            .last_slip_end
+            .map_or(Spent::default(), |end| end.spent);
+        let has_energies = self.recording.energies;
+        let energies = has_energies.then(|| Energies::between(spent, last.spent));
+        let contacts = self.criteria.contacts as f64;
+        let since_cycle = onset.time - drive.cycle_start;
+        Slip {
+            number: self.slips_seen - self.recording.discard,
+            onset: onset.time,
+            interval,
+            modulation,
+            periods: interval.and_then(|interval| modulation.periods(interval)),
+            phase: modulation
+                .period
+                .map(|period| phase(since_cycle, period, drive.eta)),
+            peak_force: onset.force,
+            drop: onset.force - active.least_at_last_break,
+            nucleation: first.time,
+            nucleation_block: rupture.first_block as u64 + 1,
+            duration: last.time - first.time,
+            size: rupture.size,
+            attached_before: rupture.attached_before as f64 / contacts,
+            least_attached: rupture.least_attached as f64 / contacts,
+            distance: last.mean_displacement - first.mean_displacement,
+            edge_distance,
+            onset_cut: active.onset_cut,
+            front_speed: rupture.front_speed(&self.parameters),
+            precursors: self.pending.count,
+            largest_precursor: self.pending.largest,
+            slow_front_speed: advance_speed(self.pending.advances.iter().copied()),
+            energies: energies.unwrap_or_default(),
+            drops: Drops::default(),
+        }
     }
 
     /// Displacement of the driven edge at a break of the last slip, from the force and the drive, in m.
@@ -473,13 +417,7 @@ impl Observer for SlipObserver {
             impulse,
             ..self.now
         };
-        if self
-            .rupture
-            .as_ref()
-            .is_some_and(|active| self.now.time - active.last.time > self.criteria.crossing_time)
-        {
-            self.finish_rupture();
-        }
+        self.finish_rupture_before(self.now.time);
         let since_slip = self.now.time - self.span.last_slip_end.map_or(0.0, |end| end.time);
         if self.span.settled.is_none() && since_slip >= 0.5 * self.criteria.give_up_time {
             self.span.settled = Some(self.sliding());

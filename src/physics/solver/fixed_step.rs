@@ -7,13 +7,16 @@
 //! for the features of the processor, chosen at run time, as those of the other solver are; nothing is fused
 //! or reassociated, so all give the same bits.
 
-use super::ledger::{Audit, FinalState};
+use super::ledger::Audit;
 use super::polynomial;
-use super::segment::{ForceAt, ForcePath, Segment};
-use super::{Limits, Observer, SimulationError, Summary};
+use super::segment::{ForceAt, ForcePath, PolynomialPath, Segment};
+use super::{Limits, Observer, SimulationError, SolverKey, Summary};
+use crate::model::equation::stability_limit;
 use crate::model::{ContactChange, ContactEvent, Drive, Interface, Parameters};
 use pulp::Arch;
 use std::sync::atomic::Ordering;
+
+pub(super) const SETTINGS: &[SolverKey] = &[SolverKey::TimeStep];
 
 /// Steps between two checks of the interrupt flag and of whether the state is finite.
 const STEPS_PER_CHECK: u64 = 4096;
@@ -49,11 +52,23 @@ impl Motion {
         a[0] *= inverse_mass;
     }
 
-    fn final_state(&self, driven: f64) -> FinalState<'_> {
-        FinalState {
-            displacement: &self.displacement,
-            velocity: &self.velocity,
-            driven,
+    /// Takes velocities to the middle of a step and displacements to its end.
+    #[inline(always)]
+    fn advance(&mut self, time_step: f64, damping: f64) {
+        let half = 0.5 * time_step;
+        let motion = self.displacement.iter_mut().zip(&mut self.velocity);
+        for ((x, v), a) in motion.zip(&self.acceleration) {
+            *v = *v * damping + half * a;
+            *x += time_step * *v;
+        }
+    }
+
+    /// Checks at a time in s that the state is finite.
+    fn check(&self, time: f64) -> Result<(), SimulationError> {
+        if self.displacement.iter().sum::<f64>().is_finite() {
+            Ok(())
+        } else {
+            Err(SimulationError::NotFinite { time })
         }
     }
 
@@ -70,6 +85,21 @@ impl Motion {
         let lower = &interface.block_lower[..blocks];
         (0..blocks).fold(false, |any, j| {
             any | (x[j] >= upper[j]) | (x[j] <= lower[j])
+        })
+    }
+}
+
+/// Checks that a time step, in s, is stable.
+pub(super) fn check(time_step: f64, parameters: &Parameters) -> Result<(), SimulationError> {
+    let limit = stability_limit(parameters);
+    if time_step > 0.0 && time_step < limit {
+        Ok(())
+    } else {
+        Err(SimulationError::BadSetting {
+            setting: format!("dt = {time_step:e} s"),
+            allowed: format!(
+                "below the stability limit 2/omega_max = {limit:.4e} s of these parameters"
+            ),
         })
     }
 }
@@ -127,15 +157,7 @@ fn integrate(
         }
         summary.steps += 1;
         let time = summary.steps as f64 * time_step;
-        for ((x, v), a) in motion
-            .displacement
-            .iter_mut()
-            .zip(&mut motion.velocity)
-            .zip(&motion.acceleration)
-        {
-            *v = *v * damp_before + half * a;
-            *x += time_step * *v;
-        }
+        motion.advance(time_step, damp_before);
         if let Some(audit) = audit {
             // These velocities are those of the middle of the step.
             let squares = motion.velocity.iter().map(|v| v * v).sum::<f64>();
@@ -152,37 +174,8 @@ fn integrate(
             *v = (*v + half * a) * damp_after;
         }
         let next_rate = drive.stiffness * (drive_velocity - motion.velocity[0]);
-        let coefficients = hermite(
-            force,
-            next_force,
-            time_step * force_rate,
-            time_step * next_rate,
-        );
-        let [constant, linear, square, cube] = coefficients;
-        let integral = constant + 0.5 * linear + square / 3.0 + 0.25 * cube;
-        let ends = [
-            ForceAt {
-                force,
-                integral: 0.0,
-            },
-            ForceAt {
-                force: next_force,
-                integral,
-            },
-        ];
-        let curvature_bound = polynomial::second_derivative_bound(&coefficients);
-        let path = ForcePath::Polynomial {
-            coefficients: &coefficients,
-            curvature_bound,
-            first: 0.0,
-            scale: time_step,
-            ends,
-        };
-        observer.advance(&Segment {
-            start,
-            duration: time_step,
-            path,
-        });
+        let forces = [force, next_force];
+        report_force(observer, start, time_step, forces, [force_rate, next_rate]);
         force = next_force;
         force_rate = next_rate;
         summary.end_time = time;
@@ -205,9 +198,7 @@ fn integrate(
             motion.accelerate(&interface, force, coupling, mass);
         }
         if summary.steps.is_multiple_of(STEPS_PER_CHECK) {
-            if !motion.displacement.iter().sum::<f64>().is_finite() {
-                return Err(SimulationError::NotFinite { time });
-            }
+            motion.check(time)?;
             if limits
                 .interrupt
                 .is_some_and(|flag| flag.load(Ordering::Relaxed))
@@ -216,14 +207,10 @@ fn integrate(
             }
         }
     }
-    if !motion.displacement.iter().sum::<f64>().is_finite() {
-        return Err(SimulationError::NotFinite {
-            time: summary.end_time,
-        });
-    }
+    motion.check(summary.end_time)?;
     if let Some(audit) = audit {
-        let end = motion.final_state(drive.motion(summary.end_time).0);
-        audit.record_final_energy(end, &interface, mass, coupling, drive.stiffness);
+        let driven = drive.motion(summary.end_time).0;
+        audit.record_final_energy(&interface, &motion.displacement, &motion.velocity, driven);
     }
     observer.end(summary.end_time, &motion.displacement);
     Ok(summary)
@@ -241,28 +228,47 @@ fn change_contacts(
     let mean_displacement = displacement.iter().sum::<f64>() / displacement.len() as f64;
     while let Some((_, block)) = interface.next_reattachment_by(time) {
         let change = interface.reattach_next(displacement[block]);
-        let (attached, attached_time) = interface.count(&change);
+        let count = interface.count(&change);
         summary.reattachments += 1;
-        observer.contact(&ContactEvent {
-            what: ContactChange { time, ..change },
-            attached,
-            attached_time,
-            mean_displacement: 0.0,
-        });
+        let change = ContactChange { time, ..change };
+        observer.contact(&ContactEvent::new(change, count, 0.0));
     }
     for (block, &x) in displacement.iter().enumerate() {
         if x >= interface.block_upper[block] || x <= interface.block_lower[block] {
-            interface.break_reached(block, time, x, |what, (attached, attached_time)| {
+            interface.break_reached(block, time, x, |change, count| {
                 summary.breaks += 1;
-                observer.contact(&ContactEvent {
-                    what,
-                    attached,
-                    attached_time,
-                    mean_displacement,
-                });
+                observer.contact(&ContactEvent::new(change, count, mean_displacement));
             });
         }
     }
+}
+
+/// Reports the shear force over a step that begins at `start` s, from its values in N and rates in N/s at both ends.
+#[inline(always)]
+fn report_force(
+    observer: &mut dyn Observer,
+    start: f64,
+    time_step: f64,
+    [force, next_force]: [f64; 2],
+    rates: [f64; 2],
+) {
+    let [slope, next_slope] = rates.map(|rate| time_step * rate);
+    let coefficients = hermite(force, next_force, slope, next_slope);
+    let [constant, linear, square, cube] = coefficients;
+    let whole = constant + 0.5 * linear + square / 3.0 + 0.25 * cube;
+    let ends = [(force, 0.0), (next_force, whole)];
+    let path = PolynomialPath {
+        coefficients: &coefficients,
+        curvature_bound: polynomial::second_derivative_bound(&coefficients),
+        first: 0.0,
+        scale: time_step,
+        ends: ends.map(|(force, integral)| ForceAt { force, integral }),
+    };
+    observer.advance(&Segment {
+        start,
+        duration: time_step,
+        path: ForcePath::Polynomial(path),
+    });
 }
 
 /// Coefficients in [0, 1] of the cubic with these values and slopes at its ends.

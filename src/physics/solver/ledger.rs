@@ -10,11 +10,11 @@
 //! again for its damping and for the work on it, which the segment of the leap does not show.
 
 use super::harmonic::Harmonic;
-use super::quadrature::Quadrature;
-use super::segment::{ForcePath, Segment};
+use super::segment::{ForcePath, PolynomialPath, Segment};
 use super::{Observer, SimulationError, Summary};
 use crate::model::{Change, ContactEvent, Drive, Interface, Parameters};
 use std::cell::Cell;
+use std::f64::consts::PI;
 
 /// Nodes beyond those that a polynomial needs: exact to 1e-13 for a modulation that turns by four radians in a segment.
 const NODES_FOR_DRIVE: usize = 8;
@@ -53,17 +53,13 @@ pub struct Spent {
     pub broken: f64,
 }
 
-/// The motion at the end: displacements and velocities of the blocks, in m and m/s, and the displacement of the driven end.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct FinalState<'a> {
-    pub displacement: &'a [f64],
-    pub velocity: &'a [f64],
-    pub driven: f64,
-}
-
 /// The entries that a solver makes; cells, since the meter reads them while it makes them.
 #[derive(Clone, Debug)]
 pub(super) struct Audit {
+    /// Mass of a block in kg, and stiffness of the springs between blocks and of the driving spring in N/m.
+    mass: f64,
+    coupling: f64,
+    stiffness: f64,
     pub quadrature: Quadrature,
     pub damping: Cell<f64>,
     pub left_out: Cell<f64>,
@@ -72,8 +68,11 @@ pub(super) struct Audit {
 }
 
 impl Audit {
-    fn new() -> Self {
+    fn new(parameters: &Parameters) -> Self {
         Self {
+            mass: parameters.block_mass(),
+            coupling: parameters.coupling_stiffness(),
+            stiffness: parameters.drive_stiffness,
             quadrature: Quadrature::new(),
             damping: Cell::new(0.0),
             left_out: Cell::new(0.0),
@@ -82,27 +81,25 @@ impl Audit {
         }
     }
 
-    /// Enters the energies at the end, of blocks with this `mass` in kg, springs of `coupling` N/m between them, and a driving
-    /// spring of `stiffness` N/m.
+    /// Enters the energies at the end: of blocks at these displacements in m with these velocities in m/s, their contacts,
+    /// and the driving spring, with its far end at `driven` m.
     pub fn record_final_energy(
         &self,
-        end: FinalState<'_>,
         interface: &Interface,
-        mass: f64,
-        coupling: f64,
-        stiffness: f64,
+        x: &[f64],
+        velocity: &[f64],
+        driven: f64,
     ) {
-        let x = end.displacement;
         let stretched: f64 = x
             .windows(2)
             .map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]))
             .sum();
-        let pulled = end.driven - x[0];
-        let springs = coupling * stretched + stiffness * pulled * pulled;
+        let pulled = driven - x[0];
+        let springs = self.coupling * stretched + self.stiffness * pulled * pulled;
         self.elastic
             .set(0.5 * springs + interface.elastic_energy(x));
-        let squares: f64 = end.velocity.iter().map(|v| v * v).sum();
-        self.kinetic.set(0.5 * mass * squares);
+        let squares: f64 = velocity.iter().map(|v| v * v).sum();
+        self.kinetic.set(0.5 * self.mass * squares);
     }
 
     /// Adds to an entry, in J.
@@ -162,7 +159,7 @@ pub(super) fn audited(
     observer: &mut dyn Observer,
     run: impl FnOnce(&mut dyn Observer, &Audit) -> Result<Summary, SimulationError>,
 ) -> Result<(Summary, Ledger), SimulationError> {
-    let audit = Audit::new();
+    let audit = Audit::new(parameters);
     let mut meter = Meter {
         observer,
         audit: &audit,
@@ -189,7 +186,7 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
         return drive.velocity * segment.impulse();
     }
     match segment.path {
-        ForcePath::Polynomial { coefficients, .. } => {
+        ForcePath::Polynomial(PolynomialPath { coefficients, .. }) => {
             let nodes = quadrature.nodes(coefficients.len().div_ceil(2) + NODES_FOR_DRIVE);
             let power = |s: f64| {
                 let elapsed = s * segment.duration;
@@ -223,8 +220,56 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
             drive.velocity * segment.impulse()
                 + drive.amplitude * (ramp + amplitude * (beat - drift))
         }
-        ForcePath::Grid { .. } => unreachable!("a ledger is kept along Taylor steps"),
+        ForcePath::Grid(_) => unreachable!("a ledger is kept along Taylor steps"),
     }
+}
+
+/// Largest number of nodes of a rule.
+const MAX_NODES: usize = 33;
+/// Newton's method doubles the correct digits of a node each time, and starts with two.
+const NEWTON_STEPS: usize = 6;
+
+/// Gauss-Legendre rules on [0, 1] of 1 to [`MAX_NODES`] nodes; n nodes integrate polynomials of degree 2n - 1 exactly.
+#[derive(Clone, Debug)]
+pub(super) struct Quadrature {
+    rules: Vec<Vec<(f64, f64)>>,
+}
+
+impl Quadrature {
+    pub fn new() -> Self {
+        Self {
+            rules: (1..=MAX_NODES).map(rule).collect(),
+        }
+    }
+
+    /// Nodes in (0, 1) and weights, which sum to 1, of the rule with `count` nodes, limited to 1 to [`MAX_NODES`].
+    pub fn nodes(&self, count: usize) -> &[(f64, f64)] {
+        &self.rules[count.clamp(1, MAX_NODES) - 1]
+    }
+}
+
+/// Roots of the Legendre polynomial by Newton's method, with the weights 2/((1 - z²) P'(z)²), moved to [0, 1].
+fn rule(count: usize) -> Vec<(f64, f64)> {
+    let order = count as f64;
+    let node = |i: usize| {
+        let mut z = libm::cos(PI * (i as f64 + 0.75) / (order + 0.5));
+        let mut slope = 1.0;
+        for _ in 0..NEWTON_STEPS {
+            let mut before = 1.0;
+            let mut value = z;
+            for k in 2..=count {
+                let k = k as f64;
+                (before, value) = (
+                    value,
+                    ((2.0 * k - 1.0) * z * value - (k - 1.0) * before) / k,
+                );
+            }
+            slope = order * (before - z * value) / (1.0 - z * z);
+            z -= value / slope;
+        }
+        (0.5 * (1.0 - z), 1.0 / ((1.0 - z * z) * slope * slope))
+    };
+    (0..count).map(node).collect()
 }
 
 #[cfg(test)]
@@ -305,5 +350,24 @@ mod tests {
             (whole - parts).abs() < 1e-13 * whole.abs(),
             "{whole} against {parts}"
         );
+    }
+
+    #[test]
+    fn a_rule_is_exact_up_to_twice_its_nodes_less_one() {
+        let quadrature = Quadrature::new();
+        for count in 1..=MAX_NODES {
+            for degree in 0..2 * count {
+                let terms = quadrature
+                    .nodes(count)
+                    .iter()
+                    .map(|(s, weight)| weight * s.powi(i32::try_from(degree).unwrap()));
+                let error = terms.sum::<f64>() * (degree + 1) as f64 - 1.0;
+                // Rounding, times the degree by which the integral is scaled.
+                assert!(
+                    error.abs() < 1e-15 * (degree + 4) as f64,
+                    "{count} nodes, degree {degree}: {error:e}"
+                );
+            }
+        }
     }
 }

@@ -8,104 +8,91 @@ mod fixed_step;
 mod harmonic;
 mod ledger;
 mod polynomial;
-mod quadrature;
 mod segment;
 
+pub use event_driven::{GRID_TOLERANCE, Resolve};
 pub use harmonic::Harmonic;
 pub use ledger::{Ledger, Spent};
-pub use segment::{CubicStep, Extremes, ForcePath, Segment};
+pub use segment::{CubicStep, Extremes, ForcePath, GridPath, PolynomialPath, Segment};
 
 use self::ledger::Audit;
-use crate::model::equation::stability_limit;
+use crate::model::fields::fields;
 use crate::model::{ContactEvent, Parameters};
 use crate::value::words;
 use pulp::Arch;
-use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicBool;
 
-/// The method and its one setting.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Solver {
-    /// From contact event to contact event, exact within the tolerance.
-    EventDriven {
-        /// Target for the error of displacement, relative to the contact reach f_s/k. 1e-12 to 1e-2.
-        tolerance: f64,
-        /// How the motion between leaps is resolved.
-        resolve: Resolve,
-    },
-    /// Explicit velocity-Verlet with damping, contacts tested after each step.
-    FixedStep {
-        /// Time step dt, in s. Below the stability limit 2/ω_max.
-        time_step: f64,
-    },
-}
-
 words! {
-    /// How the event-driven solver resolves motion.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-    pub enum Resolve {
-        /// On the grid from a tolerance of [`GRID_TOLERANCE`] on, if the clock resolves its step and no ledger is kept;
-        /// else in Taylor steps.
-        #[default]
-        Auto = "auto",
-        /// On a constant grid of time, corrected for events to fourth order.
-        Grid = "grid",
-        /// In Taylor series, each up to the next event.
-        Taylor = "taylor",
+    /// A method of solving.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Method {
+        /// From contact event to contact event, exact within the tolerance.
+        EventDriven = "event-driven",
+        /// Explicit velocity-Verlet with damping, contacts tested after each step.
+        FixedStep = "fixed-step",
     }
 }
 
-impl Resolve {
-    /// Whether motion is resolved on the grid at a tolerance, but for the exceptions of [`Self::Auto`].
-    pub fn takes_grid(self, tolerance: f64) -> bool {
+impl Method {
+    /// The settings that it has, the main one first. Those of other methods stay at their defaults.
+    pub const fn settings(self) -> &'static [SolverKey] {
         match self {
-            Self::Auto => tolerance >= GRID_TOLERANCE,
-            Self::Grid => true,
-            Self::Taylor => false,
+            Self::EventDriven => event_driven::SETTINGS,
+            Self::FixedStep => fixed_step::SETTINGS,
         }
     }
 }
 
-/// Least tolerance at which [`Resolve::Auto`] takes the grid: it is cheaper down to some 1e-8.
-pub const GRID_TOLERANCE: f64 = 1e-7;
-
-impl Default for Solver {
-    fn default() -> Self {
-        Self::event_driven(1e-3)
+fields! {
+    /// A method of solving with its settings.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Solver by SolverKey {
+        Method("method") method: Method = Method::EventDriven, "", WORD, "method of solving";
+        Tolerance("tolerance") tolerance: f64 = 1e-3, "", TOLERANCE,
+            "target error of displacement; of `event-driven`, as is `resolve`";
+        Resolve("resolve") resolve: Resolve = Resolve::Auto, "", WORD,
+            "how motion between leaps is resolved; `auto` takes the grid for tolerances of 1e-7 and above";
+        TimeStep("dt") time_step: Option<f64> = None, "s",
+            POSITIVE and "less than 2/omega_max, the limit of stability",
+            "step of `fixed-step`, which needs one, such as dt = 1e-6";
     }
 }
 
 impl Solver {
     /// From contact event to contact event with this tolerance, resolved in the way that is cheapest.
     pub const fn event_driven(tolerance: f64) -> Self {
-        Self::EventDriven {
+        Self {
+            method: Method::EventDriven,
             tolerance,
             resolve: Resolve::Auto,
+            time_step: None,
         }
     }
 
-    /// Checks that the setting fits the parameters.
+    /// In steps of this length, in s.
+    pub const fn fixed_step(time_step: f64) -> Self {
+        Self {
+            method: Method::FixedStep,
+            time_step: Some(time_step),
+            ..Self::event_driven(1e-3)
+        }
+    }
+
+    /// The main setting of its method; not a number if it is missing.
+    pub fn setting(self) -> f64 {
+        self.get(self.method.settings()[0])
+            .number()
+            .unwrap_or(f64::NAN)
+    }
+
+    /// Checks that the main setting fits the parameters.
     pub fn check(self, parameters: &Parameters) -> Result<(), SimulationError> {
-        match self {
-            Self::EventDriven { tolerance, .. } if !TOLERANCES.contains(&tolerance) => {
-                Err(SimulationError::BadTolerance { tolerance })
-            }
-            Self::EventDriven { .. } => Ok(()),
-            Self::FixedStep { time_step } => {
-                let limit = stability_limit(parameters);
-                let is_stable = time_step > 0.0 && time_step < limit;
-                if is_stable {
-                    Ok(())
-                } else {
-                    Err(SimulationError::UnstableStep { time_step, limit })
-                }
-            }
+        match self.method {
+            Method::EventDriven => event_driven::check(self.tolerance),
+            Method::FixedStep => fixed_step::check(self.setting(), parameters),
         }
     }
 }
-
-/// Tolerances of the event-driven solver that make sense: rounding lies below, other physics above.
-pub const TOLERANCES: RangeInclusive<f64> = 1e-12..=1e-2;
 
 /// Follows a simulation and says when it has seen enough.
 pub trait Observer {
@@ -168,23 +155,9 @@ pub struct Summary {
 /// Why a simulation could not continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulationError {
-    /// The time step is not stable.
-    #[error(
-        "dt = {time_step:e} s: must be below the stability limit 2/omega_max = {limit:.4e} s of these parameters"
-    )]
-    UnstableStep {
-        /// The refused step, in s.
-        time_step: f64,
-        /// The limit, in s.
-        limit: f64,
-    },
-    /// The tolerance is out of range.
-    #[error(
-        "tolerance = {tolerance:e}: must lie from {:e} to {:e}, relative to fs/k",
-        TOLERANCES.start(),
-        TOLERANCES.end()
-    )]
-    BadTolerance { tolerance: f64 },
+    /// The main setting is out of range, or does not fit the parameters.
+    #[error("{setting}: must be {allowed}")]
+    BadSetting { setting: String, allowed: String },
     /// A ledger is asked for along the grid.
     #[error(
         "resolve = \"grid\": an energy ledger is kept along Taylor steps only; leave resolve out or set it to \"taylor\""
@@ -255,11 +228,10 @@ fn run(
     audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
     solver.check(parameters)?;
-    match solver {
-        Solver::EventDriven { tolerance, resolve } => {
-            event_driven::run(parameters, tolerance, resolve, limits, observer, audit)
-        }
-        Solver::FixedStep { time_step } => {
+    match solver.method {
+        Method::EventDriven => event_driven::run(solver, parameters, limits, observer, audit),
+        Method::FixedStep => {
+            let time_step = solver.setting();
             fixed_step::run(Arch::new(), parameters, time_step, limits, observer, audit)
         }
     }

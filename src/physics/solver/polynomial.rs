@@ -1,4 +1,8 @@
-//! Polynomials on [0, 1], given by their coefficients: values, and extremes, none of which is missed.
+//! Polynomials on [0, 1], given by their coefficients: values, extremes, and first crossings of a level.
+//!
+//! Contract: no extreme is missed; and no crossing but one that touches the level within rounding. The first crossing
+//! found is the first: an interval is dismissed only if a bound on the excursion excludes the level, or the polynomial
+//! falls throughout.
 //!
 //! Method: `Σ_{p>=1} |c_p| w^p` bounds the excursion from the middle of an interval of half-width w. An interval where
 //! the derivative keeps its sign by that bound holds no extreme; one where the second derivative does holds at most
@@ -158,7 +162,7 @@ pub(crate) fn for_each_turn(
 }
 
 /// The same polynomial in the variable r, which runs from -1 to 1 as s does from `low` to `high`.
-pub(crate) fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MAX_COEFFICIENTS] {
+fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MAX_COEFFICIENTS] {
     let half = 0.5 * (high - low);
     let mut about = shifted(coefficients, 0.5 * (low + high));
     let mut power = 1.0;
@@ -275,6 +279,95 @@ pub(crate) fn rising_root(
     }
 }
 
+/// First s in [`from`, `end`], within [0, 1], at which the polynomial leaves the open interval between two levels. The
+/// coefficients are changed.
+pub(crate) fn first_exit(
+    coefficients: &mut [f64],
+    [lower, upper]: [f64; 2],
+    from: f64,
+    end: f64,
+) -> Option<f64> {
+    let start = coefficients[0];
+    let slope = coefficients[1];
+    let (value_spread, slope_spread) = beyond_linear(coefficients);
+    let mut first = None;
+    if start + slope.max(0.0) + value_spread >= upper {
+        coefficients[0] = start - upper;
+        first = first_reach(coefficients, slope_spread, from, end);
+    }
+    if start + slope.min(0.0) - value_spread <= lower {
+        coefficients[0] = start - lower;
+        for coefficient in &mut *coefficients {
+            *coefficient = -*coefficient;
+        }
+        first = first_reach(coefficients, slope_spread, from, first.unwrap_or(end)).or(first);
+    }
+    first
+}
+
+/// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the
+/// slope by at most `slope_spread`.
+fn first_reach(coefficients: &[f64], slope_spread: f64, from: f64, end: f64) -> Option<f64> {
+    let [here, slope, half_curvature] = if from > 0.0 {
+        expanded(coefficients, from)
+    } else {
+        [coefficients[0], coefficients[1], coefficients[2]]
+    };
+    if here >= 0.0 {
+        return Some(from);
+    }
+    if coefficients[1].abs() > slope_spread {
+        // Start where the parabola crosses.
+        let guess = from
+            - 2.0 * here
+                / (slope
+                    + (slope * slope - 4.0 * here * half_curvature)
+                        .max(0.0)
+                        .sqrt());
+        return if slope > 0.0 {
+            rise(coefficients, from, end, guess)
+        } else {
+            None
+        };
+    }
+    first_in(coefficients, from, end, MAX_HALVINGS)
+}
+
+fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64> {
+    let middle = 0.5 * (low + high);
+    let half = 0.5 * (high - low);
+    let about = &rescaled(coefficients, low, high)[..coefficients.len()];
+    let (value_spread, slope_spread) = beyond_linear(about);
+    let slope = about[1];
+    if about[0] + slope.abs() + value_spread < 0.0 {
+        return None;
+    }
+    if slope.abs() > slope_spread {
+        // It may start at or above the level only if the interval before ended there.
+        if value(about, -1.0) >= 0.0 {
+            return Some(low);
+        }
+        let root = if slope > 0.0 {
+            rise(about, -1.0, 1.0, -about[0] / slope)
+        } else {
+            None
+        };
+        return root.map(|r| (middle + half * r).clamp(low, high));
+    }
+    if depth == 0 {
+        return (about[0] >= 0.0).then_some(middle);
+    }
+    first_in(coefficients, low, middle, depth - 1)
+        .or_else(|| first_in(coefficients, middle, high, depth - 1))
+}
+
+/// The root of a polynomial that rises from below zero throughout [low, high], sought from `first`; `None` if it stays
+/// below.
+fn rise(coefficients: &[f64], low: f64, high: f64, first: f64) -> Option<f64> {
+    (value(coefficients, high) >= 0.0)
+        .then(|| rising_root(low, high, first, CUBIC, |s| halley_step(coefficients, s)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,6 +407,38 @@ mod tests {
         assert!(root.abs() < 1e-9, "{root}");
     }
 
+    #[test]
+    fn a_bump_that_just_reaches_the_level_is_not_missed() {
+        // -(s - 0.3)² + 1e-10: above zero for 2e-5 of the step only.
+        let coefficients = [-0.09 + 1e-10, 0.6, -1.0];
+        let reached = first_exit(
+            &mut coefficients.clone(),
+            [f64::NEG_INFINITY, 0.0],
+            0.0,
+            1.0,
+        )
+        .unwrap();
+        assert!((reached - (0.3 - 1e-5)).abs() < 1e-9, "{reached}");
+        assert_eq!(
+            first_exit(
+                &mut [-0.09 - 1e-10, 0.6, -1.0],
+                [f64::NEG_INFINITY, 0.0],
+                0.0,
+                1.0
+            ),
+            None
+        );
+        // The same from above, past its foot.
+        let reached = first_exit(
+            &mut coefficients.map(|c| -c),
+            [0.0, f64::INFINITY],
+            0.2,
+            1.0,
+        )
+        .unwrap();
+        assert!((reached - (0.3 - 1e-5)).abs() < 1e-9, "{reached}");
+    }
+
     proptest! {
         #[test]
         fn no_sample_lies_above_the_maximum(
@@ -324,6 +449,29 @@ mod tests {
             prop_assert!((first..=last).contains(&at));
             for i in 0..=500 {
                 prop_assert!(value(&coefficients, first + length * f64::from(i) / 500.0) <= largest + 1e-13);
+            }
+        }
+
+        #[test]
+        fn the_first_crossing_of_a_polynomial_is_the_first(
+            coefficients in prop::collection::vec(-1.0_f64..1.0, 2..14),
+            from in 0.0_f64..0.5,
+            length in 0.05_f64..0.5,
+            levels in (0.001_f64..1.0, 0.001_f64..1.0),
+        ) {
+            let start = value(&coefficients, from);
+            let lower = start - levels.0;
+            let upper = start + levels.1;
+            let found = first_exit(&mut coefficients.clone(), [lower, upper], from, from + length);
+            let until = found.unwrap_or(from + length);
+            for i in 0..400 {
+                let s = from + (until - from) * (1.0 - 1e-9) * f64::from(i) / 400.0;
+                let here = value(&coefficients, s);
+                prop_assert!(here < upper + 1e-12 && here > lower - 1e-12, "missed at {}", s);
+            }
+            if let Some(s) = found {
+                let here = value(&coefficients, s);
+                prop_assert!((here - upper).abs().min((here - lower).abs()) < 1e-12);
             }
         }
     }

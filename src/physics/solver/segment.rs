@@ -7,39 +7,45 @@ use crate::value::floored;
 /// How F_S runs along a segment.
 #[derive(Clone, Copy, Debug)]
 pub enum ForcePath<'a> {
-    /// `Σ c_p s^p` newtons, with s = `first` + (time since the start)/`scale`. s lies in [0, 1].
-    Polynomial {
-        /// Coefficients c_p, in N.
-        coefficients: &'a [f64],
-        /// Bound on the second derivative by s over [0, 1], in N.
-        curvature_bound: f64,
-        first: f64,
-        /// Time per unit of s, in s.
-        scale: f64,
-        /// The shear force at both ends of the segment.
-        ends: [ForceAt; 2],
-    },
+    Polynomial(PolynomialPath<'a>),
     /// A ramp with a cosine, in N, with the time since the start.
     Harmonic(Harmonic),
-    /// Cubics on a grid of time, from `first` in the first of them on.
-    Grid {
-        /// The cubics, one a step, or only the first and the last; see [`super::Observer::follows_force`].
-        steps: &'a [CubicStep],
-        /// Number of steps.
-        count: usize,
-        /// Where in the first step the segment starts, from 0 to 1.
-        first: f64,
-        /// Length of a step, in s.
-        spacing: f64,
-        /// Extremes of F_S over all steps but the first and the last.
-        inner: Extremes,
-        /// Lower and upper bound on F_S over all steps, in N.
-        bounds: [f64; 2],
-        /// F_S at the end, in N.
-        end: f64,
-        /// Integral of F_S over the segment by steps, in N.
-        integral: f64,
-    },
+    Grid(GridPath<'a>),
+}
+
+/// `Σ c_p s^p` newtons, with s = `first` + (time since the start)/`scale`. s lies in [0, 1].
+#[derive(Clone, Copy, Debug)]
+pub struct PolynomialPath<'a> {
+    /// Coefficients c_p, in N.
+    pub coefficients: &'a [f64],
+    /// Bound on the second derivative by s over [0, 1], in N.
+    pub curvature_bound: f64,
+    pub first: f64,
+    /// Time per unit of s, in s.
+    pub scale: f64,
+    /// The shear force at both ends of the segment.
+    pub ends: [ForceAt; 2],
+}
+
+/// Cubics on a grid of time, from `first` in the first of them on.
+#[derive(Clone, Copy, Debug)]
+pub struct GridPath<'a> {
+    /// The cubics, one a step, or only the first and the last; see [`super::Observer::follows_force`].
+    pub steps: &'a [CubicStep],
+    /// Number of steps.
+    pub count: usize,
+    /// Where in the first step the segment starts, from 0 to 1.
+    pub first: f64,
+    /// Length of a step, in s.
+    pub spacing: f64,
+    /// Extremes of F_S over all steps but the first and the last.
+    pub inner: Extremes,
+    /// Lower and upper bound on F_S over all steps, in N.
+    pub bounds: [f64; 2],
+    /// F_S at the end, in N.
+    pub end: f64,
+    /// Integral of F_S over the segment by steps, in N.
+    pub integral: f64,
 }
 
 /// The largest and the least of something over a number of steps: how many steps from the beginning, and in N.
@@ -88,7 +94,8 @@ impl CubicStep {
     /// Coefficients by s, from 0 to 1, in N.
     #[inline(always)]
     fn coefficients(&self) -> [f64; 4] {
-        let ([start, end], [from, to]) = (self.force, self.bend);
+        let [start, end] = self.force;
+        let [from, to] = self.bend;
         [
             start,
             (end - start) - (2.0 * from + to) / 6.0,
@@ -165,7 +172,8 @@ impl CubicStep {
     /// Lower and upper bound on F_S, in N.
     #[inline(always)]
     pub(super) fn bounds(&self) -> [f64; 2] {
-        let ([start, end], [from, to]) = (self.force, self.bend);
+        let [start, end] = self.force;
+        let [from, to] = self.bend;
         let largest = |a: f64, b: f64| if a > b { a } else { b };
         let spread = 0.125 * largest(from.abs(), to.abs());
         [
@@ -203,21 +211,21 @@ pub struct Segment<'a> {
     pub path: ForcePath<'a>,
 }
 
+#[cfg(test)]
 impl<'a> Segment<'a> {
     /// A segment along a polynomial from s = 0, with s = 1 after `duration` s.
-    pub fn polynomial(start: f64, duration: f64, coefficients: &'a [f64]) -> Self {
-        let ends = [0.0, 1.0].map(|s| ForceAt::new(coefficients, s));
-        let curvature_bound = polynomial::second_derivative_bound(coefficients);
+    pub(crate) fn polynomial(start: f64, duration: f64, coefficients: &'a [f64]) -> Self {
+        let path = PolynomialPath {
+            coefficients,
+            curvature_bound: polynomial::second_derivative_bound(coefficients),
+            first: 0.0,
+            scale: duration,
+            ends: [0.0, 1.0].map(|s| ForceAt::new(coefficients, s)),
+        };
         Self {
             start,
             duration,
-            path: ForcePath::Polynomial {
-                coefficients,
-                curvature_bound,
-                first: 0.0,
-                scale: duration,
-                ends,
-            },
+            path: ForcePath::Polynomial(path),
         }
     }
 }
@@ -226,9 +234,9 @@ impl Segment<'_> {
     /// F_S at its end, in N.
     pub fn end_force(&self) -> f64 {
         match self.path {
-            ForcePath::Polynomial { ends: [_, end], .. } => end.force,
+            ForcePath::Polynomial(path) => path.ends[1].force,
             ForcePath::Harmonic(harmonic) => harmonic.value(self.duration),
-            ForcePath::Grid { end, .. } => end,
+            ForcePath::Grid(path) => path.end,
         }
     }
 
@@ -240,23 +248,9 @@ impl Segment<'_> {
     /// F_S in N, at a time in s after the start.
     pub fn force_after(&self, elapsed: f64) -> f64 {
         match self.path {
-            ForcePath::Polynomial {
-                coefficients,
-                first,
-                scale,
-                ..
-            } => polynomial::value(coefficients, first + elapsed / scale),
+            ForcePath::Polynomial(path) => path.value(elapsed),
             ForcePath::Harmonic(harmonic) => harmonic.value(elapsed),
-            ForcePath::Grid {
-                steps,
-                first,
-                spacing,
-                ..
-            } => {
-                let at = first + elapsed / spacing;
-                let step = floored(at).min(steps.len() - 1);
-                steps[step].value(at - step as f64)
-            }
+            ForcePath::Grid(path) => path.value(elapsed),
         }
     }
 
@@ -271,36 +265,22 @@ impl Segment<'_> {
         Some((time, -mirrored))
     }
 
+    /// The largest `sign` · F_S and its time, if it lies above `floor`.
+    fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
+        let (elapsed, extreme) = match self.path {
+            ForcePath::Polynomial(path) => path.extreme(self.duration, floor, sign)?,
+            ForcePath::Harmonic(harmonic) => harmonic.extreme(self.duration, sign),
+            ForcePath::Grid(path) => path.extreme(self.duration, floor, sign)?,
+        };
+        (extreme > floor).then_some((self.start + elapsed, extreme))
+    }
+
     /// Lower and upper bound on F_S, in N; not the tightest.
     pub fn bounds(&self) -> (f64, f64) {
         match self.path {
-            ForcePath::Polynomial {
-                curvature_bound,
-                scale,
-                ends,
-                ..
-            } => {
-                let width = self.duration / scale;
-                let spread = 0.125 * curvature_bound * width * width;
-                let [start, end] = ends.map(|end| end.force);
-                (start.min(end) - spread, start.max(end) + spread)
-            }
-            ForcePath::Harmonic(Harmonic {
-                start,
-                rate,
-                amplitude,
-                ..
-            }) => {
-                let end = start + rate * self.duration;
-                (
-                    start.min(end) - amplitude.abs(),
-                    start.max(end) + amplitude.abs(),
-                )
-            }
-            ForcePath::Grid {
-                bounds: [low, high],
-                ..
-            } => (low, high),
+            ForcePath::Polynomial(path) => path.bounds(self.duration),
+            ForcePath::Harmonic(harmonic) => harmonic.bounds(self.duration),
+            ForcePath::Grid(path) => path.bounds.into(),
         }
     }
 
@@ -308,201 +288,143 @@ impl Segment<'_> {
     /// first and the last maximum and minimum; those in between lie on lines between them. On a grid its points are visited
     /// as well.
     pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
+        let visit = |elapsed: f64, force: f64| visit(self.start + elapsed, force);
         match self.path {
-            ForcePath::Polynomial {
-                coefficients,
-                first,
-                scale,
-                ..
-            } => {
-                let last = first + self.duration / scale;
-                let (_, slope_spread) = polynomial::beyond_linear(coefficients);
-                if coefficients
-                    .get(1)
-                    .is_none_or(|slope| slope.abs() >= slope_spread)
-                {
-                    return;
-                }
-                polynomial::for_each_turn(coefficients, first, last, &mut |s| {
-                    visit(
-                        self.start + (s - first) * scale,
-                        polynomial::value(coefficients, s),
-                    );
-                });
-            }
-            ForcePath::Harmonic(harmonic) => {
-                let crests = |sign: f64| harmonic.times(sign).crests(self.duration);
-                let mut turns: Vec<f64> = [crests(1.0), crests(-1.0)]
-                    .concat()
-                    .into_iter()
-                    .flatten()
-                    .collect();
-                turns.sort_by(f64::total_cmp);
-                for elapsed in turns {
-                    visit(self.start + elapsed, self.force_after(elapsed));
-                }
-            }
-            ForcePath::Grid {
-                steps,
-                spacing,
-                first,
-                ..
-            } => {
-                for (begin, cubic, [from, to]) in self.cubics() {
-                    let mut turns = [1.0, -1.0].map(|sign| cubic.crest(sign));
-                    turns.sort_by(f64::total_cmp);
-                    // Where cubics join, their slopes need not have the same sign.
-                    let joint = (begin + 1.0 < steps.len() as f64).then_some(to);
-                    for s in turns
-                        .into_iter()
-                        .filter(|s| *s > from && *s < to)
-                        .chain(joint)
-                    {
-                        visit(self.start + (begin + s - first) * spacing, cubic.value(s));
-                    }
-                }
-            }
+            ForcePath::Polynomial(path) => path.for_each_turn(self.duration, visit),
+            ForcePath::Harmonic(harmonic) => harmonic.for_each_turn(self.duration, visit),
+            ForcePath::Grid(path) => path.for_each_turn(self.duration, visit),
         }
     }
 
     /// Integral of F_S over the segment, in N s.
     pub fn impulse(&self) -> f64 {
         match self.path {
-            ForcePath::Polynomial {
-                scale,
-                ends: [start, end],
-                ..
-            } => scale * (end.integral - start.integral),
+            ForcePath::Polynomial(PolynomialPath { scale, ends, .. }) => {
+                scale * (ends[1].integral - ends[0].integral)
+            }
             ForcePath::Harmonic(harmonic) => harmonic.integral(self.duration),
-            ForcePath::Grid {
-                spacing, integral, ..
-            } => spacing * integral,
+            ForcePath::Grid(path) => path.spacing * path.integral,
+        }
+    }
+}
+
+/// Times are those since the start of the segment, in s, which lasts for `duration` s; forces are in N.
+impl PolynomialPath<'_> {
+    fn value(&self, elapsed: f64) -> f64 {
+        polynomial::value(self.coefficients, self.first + elapsed / self.scale)
+    }
+
+    fn bounds(&self, duration: f64) -> (f64, f64) {
+        let width = duration / self.scale;
+        let spread = 0.125 * self.curvature_bound * width * width;
+        let [start, end] = self.ends.map(|end| end.force);
+        (start.min(end) - spread, start.max(end) + spread)
+    }
+
+    /// Whether the slope keeps its sign over [0, 1], by a bound on how far it changes.
+    fn is_monotone(&self) -> bool {
+        let (_, slope_spread) = polynomial::beyond_linear(self.coefficients);
+        let slope = self.coefficients.get(1).map_or(0.0, |slope| slope.abs());
+        slope >= slope_spread
+    }
+
+    fn for_each_turn(&self, duration: f64, mut visit: impl FnMut(f64, f64)) {
+        if self.is_monotone() {
+            return;
+        }
+        let last = self.first + duration / self.scale;
+        polynomial::for_each_turn(self.coefficients, self.first, last, &mut |s| {
+            visit(
+                (s - self.first) * self.scale,
+                polynomial::value(self.coefficients, s),
+            );
+        });
+    }
+
+    /// Time and value of the largest `sign` · F_S; `None` if a bound shows that it does not exceed `floor`.
+    fn extreme(&self, duration: f64, floor: f64, sign: f64) -> Option<(f64, f64)> {
+        let [at_first, at_last] = self.ends.map(|at| sign * at.force);
+        let width = duration / self.scale;
+        let last = self.first + width;
+        let (mut s, mut extreme) = if at_last > at_first {
+            (last, at_last)
+        } else {
+            (self.first, at_first)
+        };
+        // The second derivative bounds both how far the ends are exceeded and how much the slope turns.
+        if extreme + 0.125 * self.curvature_bound * width * width <= floor {
+            return None;
+        }
+        let rises_or_falls = (at_last - at_first).abs() >= self.curvature_bound * width * width
+            || self.is_monotone();
+        if !rises_or_falls {
+            let mut signed = [0.0; polynomial::MAX_COEFFICIENTS];
+            for (signed, coefficient) in signed.iter_mut().zip(self.coefficients) {
+                *signed = sign * coefficient;
+            }
+            let signed = &signed[..self.coefficients.len()];
+            (s, extreme) = polynomial::maximum(signed, self.first, last);
+        }
+        Some(((s - self.first) * self.scale, extreme))
+    }
+}
+
+/// Times are those since the start of the segment, in s, which lasts for `duration` s; forces are in N.
+impl GridPath<'_> {
+    fn value(&self, elapsed: f64) -> f64 {
+        let at = self.first + elapsed / self.spacing;
+        let step = floored(at).min(self.steps.len() - 1);
+        self.steps[step].value(at - step as f64)
+    }
+
+    fn for_each_turn(&self, duration: f64, mut visit: impl FnMut(f64, f64)) {
+        let count = self.steps.len();
+        let last = (self.first + duration / self.spacing - count as f64 + 1.0).min(1.0);
+        for (index, cubic) in self.steps.iter().enumerate() {
+            let begin = index as f64;
+            let from = if index == 0 { self.first } else { 0.0 };
+            let to = if index + 1 == count { last } else { 1.0 };
+            let mut turns = [1.0, -1.0].map(|sign| cubic.crest(sign));
+            turns.sort_by(f64::total_cmp);
+            // Where cubics join, their slopes need not have the same sign.
+            let joint = (index + 1 < count).then_some(to);
+            let inside = turns.into_iter().filter(|s| *s > from && *s < to);
+            for s in inside.chain(joint) {
+                visit((begin + s - self.first) * self.spacing, cubic.value(s));
+            }
         }
     }
 
-    /// The cubics of a grid in order: how many steps in each begins, and from where to where it counts.
-    fn cubics(&self) -> impl DoubleEndedIterator<Item = (f64, &CubicStep, [f64; 2])> {
-        let (steps, first, spacing) = match self.path {
-            ForcePath::Grid {
-                steps,
-                first,
-                spacing,
-                ..
-            } => (steps, first, spacing),
-            _ => (&[][..], 0.0, 1.0),
+    /// Time and value of the largest `sign` · F_S; `None` if a bound shows that it does not exceed `floor`.
+    fn extreme(&self, duration: f64, floor: f64, sign: f64) -> Option<(f64, f64)> {
+        let above = |[low, high]: [f64; 2]| if sign > 0.0 { high } else { -low };
+        if above(self.bounds) <= floor {
+            return None;
+        }
+        let (mut at, value) = if sign > 0.0 {
+            self.inner.largest
+        } else {
+            self.inner.least
         };
-        let count = steps.len();
-        let last = (first + self.duration / spacing - count as f64 + 1.0).min(1.0);
-        steps.iter().enumerate().map(move |(index, step)| {
-            let from = if index == 0 { first } else { 0.0 };
-            let to = if index + 1 == count { last } else { 1.0 };
-            (index as f64, step, [from, to])
-        })
-    }
-
-    /// The largest `sign` · F_S and its time, if it lies above `floor`.
-    fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
-        let (elapsed, extreme) = match self.path {
-            ForcePath::Polynomial {
-                coefficients,
-                curvature_bound,
-                first,
-                scale,
-                ends,
-            } => {
-                let [at_first, at_last] = ends.map(|at| sign * at.force);
-                let width = self.duration / scale;
-                let last = first + width;
-                let (s, extreme) = if at_last > at_first {
-                    (last, at_last)
-                } else {
-                    (first, at_first)
-                };
-                // The second derivative bounds both how far the ends are exceeded and how much the slope turns.
-                if extreme + 0.125 * curvature_bound * width * width <= floor {
-                    return None;
+        let mut extreme = sign * value;
+        let mut offer = |begin: f64, cubic: &CubicStep, from: f64, to: f64| {
+            let least = if extreme > floor { extreme } else { floor };
+            if above(cubic.bounds()) > least {
+                let (s, value) = cubic.maximum(sign, from, to);
+                if value > extreme {
+                    (at, extreme) = (begin + s, value);
                 }
-                let is_monotone = (at_last - at_first).abs() >= curvature_bound * width * width
-                    || {
-                        let (_, slope_spread) = polynomial::beyond_linear(coefficients);
-                        coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_spread
-                    };
-                let (s, extreme) = if is_monotone {
-                    (s, extreme)
-                } else {
-                    let mut signed = [0.0; polynomial::MAX_COEFFICIENTS];
-                    for (s, c) in signed.iter_mut().zip(coefficients) {
-                        *s = sign * c;
-                    }
-                    polynomial::maximum(&signed[..coefficients.len()], first, last)
-                };
-                ((s - first) * scale, extreme)
-            }
-            ForcePath::Harmonic(harmonic) => {
-                let turns = harmonic.times(sign).crests(self.duration);
-                [Some(0.0), Some(self.duration)]
-                    .into_iter()
-                    .chain(turns)
-                    .flatten()
-                    .fold((0.0, f64::NEG_INFINITY), |best: (f64, f64), elapsed| {
-                        let value = sign * self.force_after(elapsed);
-                        if value > best.1 {
-                            (elapsed, value)
-                        } else {
-                            best
-                        }
-                    })
-            }
-            ForcePath::Grid {
-                bounds: [low, high],
-                ..
-            } if (if sign > 0.0 { high } else { -low }) <= floor => {
-                return None;
-            }
-            ForcePath::Grid {
-                steps,
-                count,
-                first,
-                spacing,
-                inner,
-                ..
-            } => {
-                let (at, value) = if sign > 0.0 {
-                    inner.largest
-                } else {
-                    inner.least
-                };
-                let mut at = at;
-                let mut extreme = sign * value;
-                let mut offer = |begin: f64, cubic: &CubicStep, from: f64, to: f64| {
-                    let [low, high] = cubic.bounds();
-                    if (if sign > 0.0 { high } else { -low })
-                        > if extreme > floor { extreme } else { floor }
-                    {
-                        let (s, value) = cubic.maximum(sign, from, to);
-                        (at, extreme) = if value > extreme {
-                            (begin + s, value)
-                        } else {
-                            (at, extreme)
-                        };
-                    }
-                };
-                // The last first, since the force mostly rises.
-                let begin = (count - 1) as f64;
-                let to = (first + self.duration / spacing - begin).min(1.0);
-                offer(
-                    begin,
-                    &steps[steps.len() - 1],
-                    if begin > 0.0 { 0.0 } else { first },
-                    to,
-                );
-                if begin > 0.0 {
-                    offer(0.0, &steps[0], first, 1.0);
-                }
-                ((at - first) * spacing, extreme)
             }
         };
-        (extreme > floor).then_some((self.start + elapsed, extreme))
+        // The last first, since the force mostly rises.
+        let begin = (self.count - 1) as f64;
+        let from = if begin > 0.0 { 0.0 } else { self.first };
+        let to = (self.first + duration / self.spacing - begin).min(1.0);
+        offer(begin, &self.steps[self.steps.len() - 1], from, to);
+        if begin > 0.0 {
+            offer(0.0, &self.steps[0], self.first, 1.0);
+        }
+        Some(((at - self.first) * self.spacing, extreme))
     }
 }
 
@@ -565,9 +487,8 @@ mod tests {
             let bounds = steps.iter().map(CubicStep::bounds).fold([f64::MAX, f64::MIN], |[low, high], step| {
                 [low.min(step[0]), high.max(step[1])]
             });
-            let path =
-                ForcePath::Grid { steps: &steps, count: steps.len(), first, spacing, inner, bounds, end, integral };
-            let segment = Segment { start: 3.0, duration: (last - first) * spacing, path };
+            let path = GridPath { steps: &steps, count: steps.len(), first, spacing, inner, bounds, end, integral };
+            let segment = Segment { start: 3.0, duration: (last - first) * spacing, path: ForcePath::Grid(path) };
             assert_turns(&segment);
             let samples = || (0..=2000).map(|i| segment.force_after(segment.duration * f64::from(i) / 2000.0));
             let highest = samples().fold(f64::MIN, f64::max);

@@ -95,7 +95,7 @@ fn all_sections_are_read() {
         (1000, Some(3), true)
     );
     assert_eq!(recording.drop_size, Some(5.0));
-    assert_eq!(sweep.solver(), Solver::FixedStep { time_step: 2e-6 });
+    assert_eq!(sweep.solver(), Solver::fixed_step(2e-6));
 }
 
 #[test]

@@ -4,10 +4,10 @@
 use super::super::quantity::{DERIVABLE, Quantity};
 use super::super::rounds::MAX_JOBS;
 use super::super::{SCHEMA, Sweep};
-use crate::model::{BreakOn, Description, Parameters, Value};
+use crate::model::{Description, Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::sets::{STATISTICS, Statistic};
-use crate::solver::{Resolve, TOLERANCES};
+use crate::solver::{Solver, SolverKey};
 use crate::table::value::Kind;
 use serde_json::{Value as Json, json};
 use std::collections::BTreeSet;
@@ -106,10 +106,10 @@ fn every_table_of_the_schema_has_the_keys_that_the_parser_allows() {
 }
 
 /// A number or word that the parser allows, as the schema puts it.
-fn value(kind: Kind, (low, high): (Bound<f64>, Bound<f64>)) -> Json {
+fn value(kind: Kind, (low, high): (Bound<f64>, Bound<f64>), words: &[&str]) -> Json {
     let mut number = match kind {
         Kind::Flag => return json!({ "type": "boolean" }),
-        Kind::Text => return json!({ "enum": BreakOn::ALL.map(BreakOn::word) }),
+        Kind::Text => return json!({ "enum": words }),
         Kind::Count => json!({ "type": "integer" }),
         Kind::Real => json!({ "type": "number" }),
     };
@@ -161,7 +161,7 @@ fn name(value: &Json) -> String {
 
 /// What a parameter can be, in words and by itself.
 fn described(field: &Description, default: Value) -> Json {
-    let mut described = value(field.kind, field.range.ends);
+    let mut described = value(field.kind, field.range.ends, field.choices);
     described["description"] = json!(format!("{}: {}", field.meaning, field.requirement()));
     match default {
         Value::Null => {}
@@ -213,7 +213,7 @@ fn generated() -> Json {
                 let field = symbol.description();
                 let default = Parameters::default().get(symbol);
                 (
-                    value(field.kind, field.range.ends),
+                    value(field.kind, field.range.ends, field.choices),
                     described(&field, default),
                 )
             }
@@ -223,7 +223,7 @@ fn generated() -> Json {
                     Bound::Included(*DERIVABLE.start()),
                     Bound::Included(*DERIVABLE.end()),
                 );
-                let values = value(Kind::Real, ends);
+                let values = value(Kind::Real, ends, &[]);
                 let mut model = values.clone();
                 model["description"] =
                     schema["properties"]["model"]["properties"][key]["description"].clone();
@@ -254,6 +254,10 @@ fn generated() -> Json {
     for key in RecordingKey::ALL {
         schema["properties"]["record"]["properties"][key.key()] =
             described(&key.description(), Recording::default().get(key));
+    }
+    for key in SolverKey::ALL {
+        schema["properties"]["solver"]["properties"][key.key()] =
+            described(&key.description(), Solver::default().get(key));
     }
     let keys_of = |is_named: fn(&Statistic) -> bool| -> Json {
         let named = STATISTICS.iter().filter(|statistic| is_named(statistic));
@@ -301,16 +305,6 @@ fn the_schema_follows_from_the_descriptions() {
             "docs/sweep.schema.json is out of date: run the tests with UPDATE_DOCS=1"
         );
     }
-    let solver = &schema()["properties"]["solver"]["properties"];
-    let tolerances = [TOLERANCES.start(), TOLERANCES.end()].map(|&end| whole(end));
-    assert_eq!(
-        ["minimum", "maximum"].map(|end| solver["tolerance"][end].clone()),
-        tolerances
-    );
-    assert_eq!(
-        solver["resolve"]["enum"],
-        json!(Resolve::ALL.map(Resolve::word))
-    );
 }
 
 #[test]

@@ -11,7 +11,7 @@ use std::time::Duration;
 use stickslip::model::{ParameterError, Parameters, Symbol, Value};
 use stickslip::observe::{Recording, SlipObserver};
 use stickslip::solver::{
-    Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited,
+    Limits, Method, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited,
 };
 
 /// Contact events after which a case is given up.
@@ -81,11 +81,7 @@ impl HardCase {
                 "slips" if value == "all" => case.slips = u64::MAX,
                 "slips" => case.slips = value.parse().ok()?,
                 "chaotic" => case.is_chaotic = true,
-                "dt" => {
-                    case.solver = Solver::FixedStep {
-                        time_step: value.parse().ok()?,
-                    }
-                }
+                "dt" => case.solver = Solver::fixed_step(value.parse().ok()?),
                 "tolerance" => case.solver = Solver::event_driven(value.parse().ok()?),
                 REFUSED | "stopped" => case.failure = Some((key, value)),
                 _ => {
@@ -117,13 +113,14 @@ impl HardCase {
 
     /// Runs it within its budgets: with an audit, and, if it is event-driven and not refused, as a job.
     pub fn run(&self) -> Vec<Outcome> {
-        let Solver::EventDriven { tolerance, .. } = self.solver else {
+        if self.solver.method != Method::EventDriven {
             return vec![self.row(self.solver, None)];
-        };
+        }
+        let tolerance = self.solver.tolerance;
         let audited = self.row(
-            Solver::EventDriven {
-                tolerance,
+            Solver {
                 resolve: Resolve::Taylor,
+                ..Solver::event_driven(tolerance)
             },
             None,
         );
@@ -178,11 +175,15 @@ impl HardCase {
 
     /// Whether the breaks on the grid and in Taylor steps have the same mean over seeds.
     fn means_are_alike(&self) -> bool {
-        let Solver::EventDriven { tolerance, .. } = self.solver else {
+        if self.solver.method != Method::EventDriven {
             return true;
-        };
+        }
+        let tolerance = self.solver.tolerance;
         let breaks = [Resolve::Grid, Resolve::Taylor].map(|resolve| {
-            let solver = Solver::EventDriven { tolerance, resolve };
+            let solver = Solver {
+                resolve,
+                ..Solver::event_driven(tolerance)
+            };
             let runs = (1..=SEEDS).map(|seed| {
                 let parameters = self
                     .parameters()
@@ -209,9 +210,10 @@ impl HardCase {
 
     /// Largest residual of the ledger that passes.
     fn max_residual(&self) -> f64 {
-        match self.solver {
-            Solver::EventDriven { tolerance, .. } => BALANCED_TOLERANCES * tolerance,
-            Solver::FixedStep { .. } => BALANCED_FIXED_STEP,
+        if self.solver.method == Method::EventDriven {
+            BALANCED_TOLERANCES * self.solver.tolerance
+        } else {
+            BALANCED_FIXED_STEP
         }
     }
 
@@ -251,7 +253,7 @@ impl HardCase {
             }
         })
         .map_err(|error| match error {
-            SimulationError::UnstableStep { .. } | SimulationError::BadTolerance { .. } => {
+            SimulationError::BadSetting { .. } => {
                 format!("{REFUSED}: {error}")
             }
             _ => format!("stopped {error}"),

@@ -111,10 +111,7 @@ fn displacement_at(parameters: &Parameters, solver: Solver, end_time: f64) -> Op
         events: 1_000_000,
         interrupt: None,
     };
-    let mut both = Observers {
-        lead: &mut log,
-        others: vec![&mut profile],
-    };
+    let mut both = Observers(vec![&mut log, &mut profile]);
     let summary = simulate(parameters, solver, limits, &mut both).unwrap();
     (summary.breaks == 0).then(|| profile.rows.last().unwrap().displacement)
 }
@@ -142,7 +139,10 @@ fn from_rest_a_fast_modulation_is_followed_within_the_tolerance() {
             let at = |tolerance, resolve| {
                 displacement_at(
                     &parameters,
-                    Solver::EventDriven { tolerance, resolve },
+                    Solver {
+                        resolve,
+                        ..Solver::event_driven(tolerance)
+                    },
                     end_time,
                 )
             };
@@ -209,7 +209,10 @@ fn where_a_cycle_gains_less_than_the_tolerance_onsets_are_right_to_a_few_cycles(
     );
     for resolve in [Resolve::Taylor, Resolve::Grid] {
         for tolerance in [1e-3, 1e-4] {
-            let found = onsets(Solver::EventDriven { tolerance, resolve });
+            let found = onsets(Solver {
+                resolve,
+                ..Solver::event_driven(tolerance)
+            });
             assert_eq!(found.len(), exact.len());
             for (found, exact) in found.iter().zip(&exact) {
                 let cycles = (found - exact) / period;
@@ -254,7 +257,10 @@ fn no_leap_hides_an_onset_that_is_larger_than_what_comes_before_later_contacts_b
         };
         simulate(
             &parameters,
-            Solver::EventDriven { tolerance, resolve },
+            Solver {
+                resolve,
+                ..Solver::event_driven(tolerance)
+            },
             limits,
             &mut observer,
         )
@@ -273,7 +279,7 @@ fn no_leap_hides_an_onset_that_is_larger_than_what_comes_before_later_contacts_b
 
 #[test]
 fn a_run_over_its_event_budget_says_when_and_why() {
-    for solver in [Solver::default(), Solver::FixedStep { time_step: 1e-6 }] {
+    for solver in [Solver::default(), Solver::fixed_step(1e-6)] {
         let limits = Limits {
             end_time: 1.0,
             events: 500,

@@ -1,10 +1,9 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
-use super::chain::{Chain, State};
 use super::grid::{Grid, GridStep, advance, velocity};
 use super::leap::{Bounds, Plan, Split, leap};
 use super::moving_frame::GridDrive;
-use super::slider::Slider;
+use super::slider::{Chain, Slider, State};
 use super::taylor::{Series, StepInput, evaluate, expand, reachable};
 use crate::model::simd::Simd;
 use crate::solver::harmonic::Harmonic;
@@ -13,81 +12,39 @@ use pulp::Scalar512b;
 #[cfg(target_arch = "x86_64")]
 use pulp::x86::{V3, V4};
 
-/// The hot loops for one set of processor features.
-pub(super) trait Kernels {
-    /// Expands the state into a series; false if it does not converge within the largest order; see [`expand`].
-    fn expand(&self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool;
-    /// State at s in [0, 1] of a step of `length` s.
-    fn evaluate(&self, series: &Series, s: f64, length: f64, state: &mut State);
-    /// Row and lane of every block that may reach a break position within the step.
-    fn reachable(&self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>);
-    /// Takes up to `steps` steps of the grid; see [`advance`].
-    fn advance(&self, slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize;
-    /// Writes the velocities of a motion on the grid; see [`velocity`].
-    fn velocity(&self, chain: &Chain, step: &mut GridStep, drive: &GridDrive, state: &mut State);
-    /// Tries to leap; see [`leap`].
-    fn leap(
-        &self,
-        split: &mut Split,
-        slider: &mut Slider,
-        drive: &Harmonic,
-        bounds: Bounds,
-        audit: Option<&Audit>,
-    ) -> Result<Plan, f64>;
-}
-
 /// The loops compiled for the features of `S` and for `R` rows, or for any number if that is 0.
 struct Compiled<S, const R: usize>(S);
 
-impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
-    fn expand(&self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
-        self.0.run(
-            #[inline(always)]
-            |simd| expand::<S, R>(simd, chain, state, input, series),
-        )
-    }
+/// Describes each hot loop once: what it does, its arguments, its result and the function that is compiled.
+macro_rules! kernels {
+    ($($(#[$about:meta])* fn $name:ident($($argument:ident: $type:ty),*) -> $result:ty = $function:expr;)*) => {
+        /// The hot loops for one set of processor features.
+        pub(super) trait Kernels {
+            $($(#[$about])* fn $name(&self, $($argument: $type),*) -> $result;)*
+        }
 
-    fn evaluate(&self, series: &Series, s: f64, length: f64, state: &mut State) {
-        self.0.run(
-            #[inline(always)]
-            |simd| evaluate::<S, R>(simd, series, s, length, state),
-        );
-    }
+        impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
+            $(fn $name(&self, $($argument: $type),*) -> $result {
+                self.0.run(#[inline(always)] |simd| $function(simd, $($argument),*))
+            })*
+        }
+    };
+}
 
-    fn reachable(&self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
-        self.0.run(
-            #[inline(always)]
-            |simd| reachable::<S, R>(simd, chain, series, blocks),
-        );
-    }
-
-    fn advance(&self, slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize {
-        self.0.run(
-            #[inline(always)]
-            |simd| advance::<S, R>(simd, slider, grid, time, steps),
-        )
-    }
-
-    fn velocity(&self, chain: &Chain, step: &mut GridStep, drive: &GridDrive, state: &mut State) {
-        self.0.run(
-            #[inline(always)]
-            |simd| velocity::<S, R>(simd, chain, step, drive, state),
-        );
-    }
-
-    fn leap(
-        &self,
-        split: &mut Split,
-        slider: &mut Slider,
-        drive: &Harmonic,
-        bounds: Bounds,
-        audit: Option<&Audit>,
-    ) -> Result<Plan, f64> {
-        self.0.run(
-            #[inline(always)]
-            |simd| leap(simd, split, slider, drive, bounds, audit),
-        )
-    }
+kernels! {
+    /// Expands the state into a series; false if it does not converge within the largest order; see [`expand`].
+    fn expand(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool = expand::<S, R>;
+    /// State at s in [0, 1] of a step of `length` s.
+    fn evaluate(series: &Series, s: f64, length: f64, state: &mut State) -> () = evaluate::<S, R>;
+    /// Row and lane of every block that may reach a break position within the step.
+    fn reachable(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) -> () = reachable::<S, R>;
+    /// Takes up to `steps` steps of the grid; see [`advance`].
+    fn advance(slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize = advance::<S, R>;
+    /// Writes the velocities of a motion on the grid; see [`velocity`].
+    fn velocity(chain: &Chain, step: &mut GridStep, drive: &GridDrive, state: &mut State) -> () = velocity::<S, R>;
+    /// Tries to leap; see [`leap`].
+    fn leap(split: &mut Split, slider: &mut Slider, drive: &Harmonic, bounds: Bounds, audit: Option<&Audit>)
+        -> Result<Plan, f64> = leap::<S>;
 }
 
 /// The fastest loops that this processor can run for this many rows.

@@ -3,17 +3,13 @@
 //! Between events the model is linear with constant coefficients. While it is quiet, a leap follows the driven solution
 //! to the next event ([`leap`]). While it moves, it is resolved in one of two ways: on a constant grid of time, which
 //! events correct to fourth order ([`grid`]); or in Taylor series, of which each locates the first crossing of a break
-//! position rigorously ([`taylor`], [`crossing`]). Contract: errors of displacement of the order of `tolerance` · f_s/k,
+//! position rigorously ([`taylor`]). Contract: errors of displacement of the order of `tolerance` · f_s/k,
 //! and events in the right order within that.
 //!
 //! Displacements and times are kept in a [`moving_frame`], so that neither loses digits in long runs.
 
-mod audit;
-mod chain;
-mod crossing;
 mod grid;
 mod kernels;
-mod lane_layout;
 mod leap;
 mod moving_frame;
 mod slider;
@@ -22,18 +18,48 @@ mod tolerances;
 
 use self::grid::Grid;
 use self::kernels::Kernels;
-use self::lane_layout::Layout;
-use self::leap::{Bounds, Split};
+use self::leap::{Bounds, Plan, Split};
 use self::moving_frame::Frame;
-use self::slider::Slider;
+use self::slider::{Layout, Slider};
 use self::taylor::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
-use super::ledger::{Audit, FinalState};
+use super::ledger::Audit;
 use super::segment::{ForcePath, Segment};
-use super::{Limits, Observer, Resolve, SimulationError, Summary};
+use super::{Limits, Observer, SimulationError, Solver, SolverKey, Summary};
 use crate::model::{ContactChange, ContactEvent, Drive, Parameters};
+use crate::value::{Field, words};
 use std::sync::atomic::Ordering;
+
+pub(super) const SETTINGS: &[SolverKey] = &[SolverKey::Tolerance, SolverKey::Resolve];
+
+words! {
+    /// How motion between leaps is resolved.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Resolve {
+        /// On the grid from a tolerance of [`GRID_TOLERANCE`] on, if the clock resolves its step and no ledger is kept;
+        /// else in Taylor steps.
+        Auto = "auto",
+        /// On a constant grid of time, corrected for events to fourth order.
+        Grid = "grid",
+        /// In Taylor series, each up to the next event.
+        Taylor = "taylor",
+    }
+}
+
+impl Resolve {
+    /// Whether motion is resolved on the grid at a tolerance, but for the exceptions of [`Self::Auto`].
+    pub fn takes_grid(self, tolerance: f64) -> bool {
+        match self {
+            Self::Auto => tolerance >= GRID_TOLERANCE,
+            Self::Grid => true,
+            Self::Taylor => false,
+        }
+    }
+}
+
+/// Least tolerance at which [`Resolve::Auto`] takes the grid: it is cheaper down to some 1e-8.
+pub const GRID_TOLERANCE: f64 = 1e-7;
 
 /// A leap is tried only if no reattachment is due within this many longest Taylor steps, or steps of the grid.
 const WORTHWHILE_LEAP: f64 = 6.0;
@@ -41,15 +67,28 @@ const WORTHWHILE_GRID_LEAP: f64 = 80.0;
 /// Steps between two checks of the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
 
-/// Runs the method with this tolerance, relative to the contact reach; see [`super::simulate`].
+/// Checks a tolerance.
+pub(super) fn check(tolerance: f64) -> Result<(), SimulationError> {
+    match SolverKey::Tolerance.checked(tolerance.value()) {
+        Some(_) => Ok(()),
+        None => Err(SimulationError::BadSetting {
+            setting: format!("tolerance = {tolerance:e}"),
+            allowed: SolverKey::Tolerance.description().allowed(),
+        }),
+    }
+}
+
+/// Runs the method with a tolerance in its range; see [`super::simulate`].
 pub(super) fn run(
+    solver: Solver,
     parameters: &Parameters,
-    tolerance: f64,
-    resolve: Resolve,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
     audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
+    let Solver {
+        tolerance, resolve, ..
+    } = solver;
     let rows = Layout::new(parameters.blocks).rows;
     if resolve == Resolve::Grid && audit.is_some() {
         return Err(SimulationError::LedgerOnGrid);
@@ -220,20 +259,13 @@ impl<'a> Integration<'a> {
 
     fn record_final_energy(&self, audit: &Audit) {
         let slider = &self.slider;
-        let chain = &slider.chain;
-        let displacement: Vec<f64> = slider.displacements().collect();
-        let velocity =
-            (0..chain.layout.blocks).map(|block| chain.at(&slider.state.velocity, block));
+        let blocks = 0..slider.chain.layout.blocks;
+        let velocity = blocks.map(|block| slider.chain.at(&slider.state.velocity, block));
         audit.record_final_energy(
-            FinalState {
-                displacement: &displacement,
-                velocity: &velocity.collect::<Vec<_>>(),
-                driven: self.frame.drive_motion().value(0.0),
-            },
             &slider.interface,
-            chain.mass,
-            chain.mass * chain.coupling[0][0],
-            chain.drive_stiffness,
+            &slider.displacements().collect::<Vec<_>>(),
+            &velocity.collect::<Vec<_>>(),
+            self.frame.drive_motion().value(0.0),
         );
     }
 
@@ -273,16 +305,12 @@ impl<'a> Integration<'a> {
                 return false;
             }
         };
-        let segment = Segment {
-            start,
-            ..plan.segment
-        };
-        self.report_leap(&segment, &drive, began, observer);
+        self.report_leap(&plan, &drive, [start, began], observer);
         self.grid.is_on = false;
         self.summary.steps += 1;
         self.summary.leaps += 1;
         self.next_leap = 0.0;
-        self.arrive(segment.duration, plan.is_whole);
+        self.arrive(plan.duration, plan.is_whole);
         match plan.reached {
             Some(block) => {
                 let x = self.slider.displacement(block);
@@ -295,28 +323,24 @@ impl<'a> Integration<'a> {
         true
     }
 
-    /// Reports the shear force along a leap that began at a time in s in the frame, and attaches on the driven solution what
-    /// it passed from the grid.
+    /// Reports the shear force along a leap that began at `start` s, at `began` s in the frame, and attaches on the driven
+    /// solution what it passed from the grid.
     fn report_leap(
         &mut self,
-        leap: &Segment<'static>,
+        leap: &Plan,
         drive: &Harmonic,
-        began: f64,
+        [start, began]: [f64; 2],
         observer: &mut dyn Observer,
     ) {
-        let ForcePath::Harmonic(path) = leap.path else {
-            unreachable!("a leap follows the driven solution")
-        };
         let mut reported = 0.0;
         let mut report = |until: f64, observer: &mut dyn Observer| {
             let path = Harmonic {
-                start: path.start + path.rate * reported,
-                phase: path.phase + path.turn(reported),
-                ..path
+                start: leap.force.start + leap.force.rate * reported,
+                phase: leap.force.phase + leap.force.turn(reported),
+                ..leap.force
             };
-            let start = leap.start + reported;
             observer.advance(&Segment {
-                start,
+                start: start + reported,
                 duration: until - reported,
                 path: ForcePath::Harmonic(path),
             });
@@ -362,14 +386,13 @@ impl<'a> Integration<'a> {
         let frame = &self.frame;
         let summary = &mut self.summary;
         let mean_displacement = frame.absolute_displacement(mean);
-        let mut log = |change: ContactChange, (attached, attached_time): (u64, f64)| {
+        let mut log = |change: ContactChange, count: (u64, f64)| {
             summary.breaks += 1;
-            observer.contact(&ContactEvent {
-                what: frame.absolute(change),
-                attached,
-                attached_time,
+            observer.contact(&ContactEvent::new(
+                frame.absolute(change),
+                count,
                 mean_displacement,
-            });
+            ));
         };
         self.slider.break_reached(block, frame.time, x, &mut log);
     }
@@ -388,25 +411,8 @@ impl<'a> Integration<'a> {
         self.summary.reattachments += 1;
         let count = self.slider.interface.count(&change);
         if self.grid.wants_attachments() {
-            self.report_change(change, count, 0.0, observer);
+            observer.contact(&ContactEvent::new(self.frame.absolute(change), count, 0.0));
         }
-    }
-
-    /// Reports a change to the observer, with the contacts attached after it and the integral of their number, and the mean
-    /// displacement of the blocks, in m.
-    fn report_change(
-        &self,
-        change: ContactChange,
-        (attached, attached_time): (u64, f64),
-        mean_displacement: f64,
-        observer: &mut dyn Observer,
-    ) {
-        observer.contact(&ContactEvent {
-            what: self.frame.absolute(change),
-            attached,
-            attached_time,
-            mean_displacement,
-        });
     }
 
     /// Moves the frame to where the slider and the clock are.
@@ -427,6 +433,13 @@ mod tests {
     use super::*;
     use crate::model::{Change, ContactEvent};
     use crate::observe::{ContactLog, Recording, SlipObserver};
+
+    fn in_taylor_steps(tolerance: f64) -> Solver {
+        Solver {
+            resolve: Resolve::Taylor,
+            ..Solver::event_driven(tolerance)
+        }
+    }
 
     #[test]
     fn every_set_of_processor_features_gives_the_same_bits() {
@@ -487,9 +500,8 @@ mod tests {
                 };
                 let mut log = ContactLog::default();
                 let summary = run(
+                    in_taylor_steps(tolerance),
                     &parameters,
-                    tolerance,
-                    Resolve::Taylor,
                     limits,
                     &mut log,
                     None,
@@ -608,9 +620,8 @@ mod tests {
             };
             let mut log = ContactLog::default();
             run(
+                in_taylor_steps(tolerance),
                 &parameters,
-                tolerance,
-                Resolve::Taylor,
                 limits,
                 &mut log,
                 None,

@@ -210,69 +210,60 @@ pub(super) struct StepEvents {
 /// at `start` s in the frame.
 #[inline(always)]
 pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64) {
+    break_reached(simd, slider, grid, start);
+    attach_due(simd, slider, grid, start);
+    let changes = &mut grid.events.changes;
+    if !changes.is_sorted_by(|a, b| a.time <= b.time) {
+        changes.sort_by(|a, b| a.time.total_cmp(&b.time));
+    }
+}
+
+/// Breaks what the last step reaches: stage after stage over all blocks, as one alone would wait for its own results.
+#[inline(always)]
+fn break_reached<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64) {
     let Grid {
         step,
         drive,
         events,
         ..
     } = grid;
-    // Stage after stage over all blocks: one alone would wait for its own results.
     let mut paths = std::mem::take(&mut events.paths);
     paths.clear();
     for &(row, lane) in &step.reached {
-        paths.push((
-            Path::new(slider, step, drive, slider.chain.layout.block(row, lane)),
-            0.0,
-        ));
+        let block = slider.chain.layout.block(row, lane);
+        paths.push((Path::new(slider, step, drive, block), 0.0));
     }
     for (path, first) in &mut paths {
-        let [upper, lower] = [
-            slider.interface.block_upper[path.block],
-            slider.interface.block_lower[path.block],
-        ];
-        *first = path.crossing(if path.eventless.displacement >= upper {
-            upper
-        } else {
-            lower
-        });
+        let upper = slider.interface.block_upper[path.block];
+        let lower = slider.interface.block_lower[path.block];
+        let is_above = path.eventless.displacement >= upper;
+        *first = path.crossing(if is_above { upper } else { lower });
     }
     for (path, first) in &mut paths {
-        break_along(
-            simd,
-            &mut slider.interface,
-            step,
-            events,
-            path,
-            Some(*first),
-            start,
-        );
+        let interface = &mut slider.interface;
+        break_along(simd, interface, step, events, path, Some(*first), start);
         settle(simd, slider, step, path);
     }
     events.paths = paths;
-    // Breaks may have made something due within the step, and what attaches lets a block reach other contacts or not.
+}
+
+/// Attaches what is due within the last step: breaks may have made it so, and what attaches lets a block reach other
+/// contacts or not.
+#[inline(always)]
+fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64) {
+    let Grid {
+        step,
+        drive,
+        events,
+        ..
+    } = grid;
     while let Some((due, block)) = slider.interface.next_reattachment_by(start + step.length) {
         let mut path = Path::new(slider, step, drive, block);
-        attach(
-            simd,
-            &mut slider.interface,
-            step,
-            events,
-            &mut path,
-            (due - start) * step.inverse_length,
-        );
-        break_along(
-            simd,
-            &mut slider.interface,
-            step,
-            events,
-            &mut path,
-            None,
-            start,
-        );
+        let s = (due - start) * step.inverse_length;
+        let interface = &mut slider.interface;
+        attach(simd, interface, step, events, &mut path, s);
+        break_along(simd, interface, step, events, &mut path, None, start);
         settle(simd, slider, step, &path);
-    }
-    if !events.changes.is_sorted_by(|a, b| a.time <= b.time) {
-        events.changes.sort_by(|a, b| a.time.total_cmp(&b.time));
     }
 }
 

@@ -1,6 +1,6 @@
 //! The shear force along the grid since the last segment that observers have seen.
 
-use crate::solver::segment::{CubicStep, Extremes, ForcePath, Segment};
+use crate::solver::segment::{CubicStep, Extremes, ForcePath, GridPath, Segment};
 
 /// Steps of shear force, from somewhere in the first of them on.
 #[derive(Clone, Debug)]
@@ -86,26 +86,25 @@ impl ForceHistory {
         } else {
             0.0
         };
-        let path = ForcePath::Grid {
+        let [low, high] = first.bounds();
+        let [lowest, highest] = last.bounds();
+        let path = GridPath {
             steps: &self.steps,
             count: self.count,
             first: self.first,
             spacing,
             inner: self.inner,
-            bounds: {
-                let ([low, high], [lowest, highest]) = (first.bounds(), last.bounds());
-                [
-                    self.inner.least.1.min(low).min(lowest),
-                    self.inner.largest.1.max(high).max(highest),
-                ]
-            },
+            bounds: [
+                self.inner.least.1.min(low).min(lowest),
+                self.inner.largest.1.max(high).max(highest),
+            ],
             end: last.value(s),
             integral: self.integral - before - beyond,
         };
         Some(Segment {
             start: origin + self.start,
             duration: steps * spacing,
-            path,
+            path: ForcePath::Grid(path),
         })
     }
 

@@ -13,14 +13,13 @@ pub(super) use self::step::{GridStep, velocity};
 use self::contacts::{StepEvents, change_contacts};
 use self::history::ForceHistory;
 use self::step::{MAX_RUN, march};
-use super::chain::{Chain, State};
 use super::moving_frame::{Frame, GridDrive, MIN_RESOLUTION};
-use super::slider::Slider;
+use super::slider::{Chain, Slider, State};
 use super::taylor::StepInput;
 use super::{Integration, WORTHWHILE_GRID_LEAP};
 use crate::model::equation::largest_frequency;
 use crate::model::simd::Simd;
-use crate::model::{Change, Parameters};
+use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::segment::CubicStep;
 use crate::solver::{Observer, SimulationError};
 use crate::value::floored;
@@ -370,7 +369,11 @@ impl Integration<'_> {
                 let count = self.slider.interface.count(change);
                 let left = 1.0 - (change.time - start) * self.grid.step.inverse_length;
                 let mean = self.frame.absolute_displacement(mean - left * rise);
-                self.report_change(*change, count, mean, observer);
+                observer.contact(&ContactEvent::new(
+                    self.frame.absolute(*change),
+                    count,
+                    mean,
+                ));
             }
             rest = later;
         }

@@ -13,9 +13,8 @@
 
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
-use crate::solver::event_driven::chain::{Chain, State};
-use crate::solver::event_driven::lane_layout::{FIRST_BLOCK, Layout};
 use crate::solver::event_driven::moving_frame::GridDrive;
+use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, Layout, State};
 
 /// Longest run of steps without a look at the clock.
 pub(super) const MAX_RUN: usize = 64;

@@ -21,8 +21,7 @@
 
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
-use crate::solver::event_driven::chain::Chain;
-use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
+use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK};
 
 /// Part of its diagonal entry that a pivot must exceed: less is rounding, and the matrix not surely positive definite.
 const MIN_PIVOT: f64 = 1e-12;
@@ -93,7 +92,9 @@ impl<S: Simd, const C: usize> Number<S, C> {
 
     #[inline(always)]
     fn inverse(mut self) -> Self {
-        let (one, [real, imaginary]) = (self.0.splat(1.0), [self.1[0], self.1[C - 1]]);
+        let one = self.0.splat(1.0);
+        let real = self.1[0];
+        let imaginary = self.1[C - 1];
         if C == 1 {
             self.1[0] = one.over(real);
             return self;

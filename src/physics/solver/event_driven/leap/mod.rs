@@ -13,13 +13,12 @@ mod split;
 pub(super) use self::split::Split;
 
 use self::split::SplitRow;
-use super::chain::{Chain, State};
-use super::slider::Slider;
+use super::slider::{Chain, Slider, State};
 use crate::model::Interface;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;
-use crate::solver::segment::Segment;
+use crate::solver::segment::{ForcePath, Segment};
 use std::f64::consts::TAU;
 
 /// How far beyond a leap under modulation a larger shear force is looked for, in units of 1/γ.
@@ -36,8 +35,9 @@ const ASTRAY: f64 = 2.0 * LOOSE + PASSED_SHARE;
 /// A leap that may be taken.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plan {
-    /// The shear force on the way, from time 0 on.
-    pub segment: Segment<'static>,
+    /// The shear force on the way, in N, and how long that is, in s.
+    pub force: Harmonic,
+    pub duration: f64,
     /// The block that reaches a break position at its end, if any.
     pub reached: Option<usize>,
     /// Whether it ends at the horizon.
@@ -141,13 +141,11 @@ fn plan<S: Simd>(
     if !elapsed.is_finite() {
         return Err(f64::INFINITY);
     }
-    let path = split
-        .driven(chain, 0)
-        .force_path(drive, chain.drive_stiffness);
+    let force = split.driven(chain, 0).force(drive, chain.drive_stiffness);
     let segment = Segment {
         start: 0.0,
         duration: elapsed,
-        path,
+        path: ForcePath::Harmonic(force),
     };
     if largest > error
         && !hides_no_peak(
@@ -163,7 +161,8 @@ fn plan<S: Simd>(
         return Err(wait);
     }
     Ok(Plan {
-        segment,
+        force,
+        duration: elapsed,
         reached,
         is_whole: elapsed == horizon,
     })
@@ -252,10 +251,78 @@ pub(super) fn leap<S: Simd>(
     }
     let plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
     if let Some(audit) = audit {
-        audit.follow_leap(chain, drive, split, state, plan.segment.duration);
+        let left_out = chain.mass * free_energy(chain, drive, split, state);
+        Audit::add(&audit.left_out, left_out);
+        let damping = damping_loss(chain, drive, split, plan.duration);
+        Audit::add(&audit.damping, damping);
     }
-    follow(simd, split, drive, plan.segment.duration, state);
+    follow(simd, split, drive, plan.duration, state);
     Ok(plan)
+}
+
+/// Energy of the free motion, by mass: E(x_p + y) - E(x_p) = yᵀ (S (x_p + y/2) - b - drive) + m w (v_p + w/2).
+fn free_energy(chain: &Chain, drive: &Harmonic, split: &Split, state: &State) -> f64 {
+    let coupling = chain.coupling[0][0];
+    let mut energy = 0.0;
+    let mut before = [0.0; 2];
+    for j in 0..chain.layout.blocks {
+        let driven = split.driven(chain, j);
+        let [real, imaginary] = driven.wave;
+        let x = driven.start + real;
+        let v = driven.rate - drive.angular_frequency * imaginary;
+        let y = chain.at(&state.displacement, j) - x;
+        let w = chain.at(&state.velocity, j) - v;
+        let middle = x + 0.5 * y;
+        let mut force = chain.at(&chain.diagonal, j) * middle - chain.at(&chain.pull, j);
+        if j == 0 {
+            force -= chain.drive_stiffness / chain.mass * drive.value(0.0);
+        }
+        energy += y * force + w * (v + 0.5 * w);
+        if j > 0 {
+            // The two off-diagonal terms of the pair, y_j m_{j-1} + y_{j-1} m_j.
+            energy -= coupling * (y * before[1] + before[0] * middle);
+        }
+        before = [y, middle];
+    }
+    energy
+}
+
+/// Damping loss along the driven solution in `elapsed` s, in J, in closed form: the velocity is p1 - ω Im(q e^{iωt}).
+fn damping_loss(chain: &Chain, drive: &Harmonic, split: &Split, elapsed: f64) -> f64 {
+    let frequency = drive.angular_frequency;
+    // Σ p1², Σ p1 q, Σ |q|² and Σ q².
+    let mut ramp = 0.0;
+    let mut mixed = [0.0; 2];
+    let mut size = 0.0;
+    let mut square = [0.0; 2];
+    for j in 0..chain.layout.blocks {
+        let driven = split.driven(chain, j);
+        let rate = driven.rate;
+        let [real, imaginary] = driven.wave;
+        ramp += rate * rate;
+        mixed = [mixed[0] + rate * real, mixed[1] + rate * imaginary];
+        size += real * real + imaginary * imaginary;
+        square = [
+            square[0] + real * real - imaginary * imaginary,
+            square[1] + 2.0 * real * imaginary,
+        ];
+    }
+    let mut integral = ramp * elapsed;
+    if drive.amplitude > 0.0 {
+        let (sine, versine) = sine_and_versine(frequency, elapsed);
+        let (sine_twice, versine_twice) = sine_and_versine(2.0 * frequency, elapsed);
+        integral -= 2.0 * (mixed[0] * versine + mixed[1] * sine);
+        let swing = 0.5 * (square[0] * sine_twice - square[1] * versine_twice);
+        integral += 0.5 * frequency * (size * frequency * elapsed - swing);
+    }
+    chain.mass * chain.damping_rate * integral
+}
+
+/// sin ωt and 1 - cos ωt; whole turns are taken off first.
+fn sine_and_versine(frequency: f64, elapsed: f64) -> (f64, f64) {
+    let angle = TAU * (frequency * elapsed / TAU).fract();
+    let half = libm::sin(0.5 * angle);
+    (libm::sin(angle), 2.0 * half * half)
 }
 
 /// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free motion's

@@ -15,10 +15,8 @@
 use super::elimination::{Elimination, Number, outer};
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Row};
-use crate::solver::event_driven::chain::{Chain, State};
-use crate::solver::event_driven::lane_layout::FIRST_BLOCK;
+use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, State};
 use crate::solver::harmonic::Harmonic;
-use crate::solver::segment::ForcePath;
 
 /// Halvings of the decay rate after which free motion counts as undamped.
 const MAX_HALVINGS: i32 = 40;
@@ -334,17 +332,17 @@ impl BlockMotion {
     }
 
     /// F_S if this is the motion of block 1, in N.
-    pub fn force_path(&self, drive: &Harmonic, stiffness: f64) -> ForcePath<'static> {
+    pub fn force(&self, drive: &Harmonic, stiffness: f64) -> Harmonic {
         let (sine, cosine) = libm::sincos(drive.phase);
         let real = drive.amplitude * cosine - self.wave[0];
         let imaginary = drive.amplitude * sine - self.wave[1];
-        ForcePath::Harmonic(Harmonic {
+        Harmonic {
             start: stiffness * (drive.start - self.start),
             rate: stiffness * (drive.rate - self.rate),
             amplitude: stiffness * libm::hypot(real, imaginary),
             phase: libm::atan2(imaginary, real),
             angular_frequency: drive.angular_frequency,
-        })
+        }
     }
 }
 

@@ -1,8 +1,8 @@
-//! Taylor steps: motion as a series in time ([`series`], [`recurrence`]), each step up to its next contact events.
+//! Taylor steps: motion as a series in time ([`series`]), each step up to its next contact events.
 //!
 //! Setting: `tolerance`, of which each step may take a share ([`super::tolerances`]). Method: Taylor series to the order at
 //! which they converge, as described by À. Jorba and M. Zou, Exp. Math. 14, 99 (2005); a bound on each block's motion
-//! isolates the first crossing of a break position ([`super::crossing`]).
+//! isolates the first crossing of a break position ([`first_exit`](polynomial::first_exit)).
 //!
 //! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of
 //! k_i a_i over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and
@@ -18,20 +18,16 @@
 //! ends where the series would no longer be accurate. Contract: events in the right order, also of blocks whose series has
 //! changed.
 
-mod recurrence;
 mod series;
 
-pub(super) use self::recurrence::{StepInput, expand};
-pub(super) use self::series::{DriveDerivatives, Series, evaluate, reachable};
+pub(super) use self::series::{DriveDerivatives, Series, StepInput, evaluate, expand, reachable};
 
 use super::Integration;
-use super::chain::Chain;
-use super::crossing::first_exit;
-use super::lane_layout::Layout;
-use super::slider::Slider;
+use super::slider::{Chain, Layout, Slider};
 use crate::model::Change;
+use crate::solver::ledger::Audit;
 use crate::solver::polynomial;
-use crate::solver::segment::{ForceAt, ForcePath, Segment};
+use crate::solver::segment::{ForceAt, ForcePath, PolynomialPath, Segment};
 use crate::solver::{Observer, SimulationError};
 
 /// Steps are halved at most this often where events crowd; further only if a series does not converge.
@@ -118,13 +114,13 @@ impl Step {
 
     /// The shear force along a part of the step that starts at s = `first`; `ends` are its values there and at the end.
     fn force_path(&self, first: f64, ends: [ForceAt; 2]) -> ForcePath<'_> {
-        ForcePath::Polynomial {
+        ForcePath::Polynomial(PolynomialPath {
             coefficients: &self.force,
             curvature_bound: self.curvature_bound,
             first,
             scale: self.length,
             ends,
-        }
+        })
     }
 
     /// Notes and returns where in a part of the step a block first breaks; infinite if it does not.
@@ -136,7 +132,7 @@ impl Step {
             return f64::INFINITY;
         }
         self.series.block(row, lane, &mut self.coefficients);
-        let Some(s) = first_exit(&mut self.coefficients, levels, from, end) else {
+        let Some(s) = polynomial::first_exit(&mut self.coefficients, levels, from, end) else {
             return f64::INFINITY;
         };
         self.breaks.push((s, block));
@@ -198,31 +194,9 @@ impl Integration<'_> {
             force: self.step.force[0],
             integral: 0.0,
         };
-        self.kernels.reachable(
-            &self.slider.chain,
-            &mut self.step.series,
-            &mut self.step.candidates,
-        );
-        self.step.breaks.clear();
-        while let Some((row, lane)) = self.step.candidates.pop() {
-            let chain = &self.slider.chain;
-            let found = self
-                .step
-                .look_for_break(chain, chain.layout.block(row, lane), 0.0, end);
-            // Events this long after the first are left to the next step.
-            end = end.min(found + self.control.break_window / length);
-        }
+        end = self.look_for_breaks(end);
         loop {
-            let due = ((self.slider.interface.next_reattachment() - start) / length).max(done);
-            let event = match self.step.first_break() {
-                Some((s, block)) if s <= due && s <= end => Some((Change::Break, block, s)),
-                _ if due <= end => self
-                    .slider
-                    .interface
-                    .next_reattachment_by(f64::INFINITY)
-                    .map(|(_, block)| (Change::Attach, block, due)),
-                _ => None,
-            };
+            let event = self.next_event(done, end);
             let s = event.map_or(end, |(_, _, s)| s);
             force = self.report([done, s], force, observer);
             done = s;
@@ -265,6 +239,37 @@ impl Integration<'_> {
         Ok(())
     }
 
+    /// Notes where blocks first break up to `end`, and returns where the step should end for them.
+    fn look_for_breaks(&mut self, mut end: f64) -> f64 {
+        let Slider { chain, .. } = &self.slider;
+        let Step {
+            series, candidates, ..
+        } = &mut self.step;
+        self.kernels.reachable(chain, series, candidates);
+        self.step.breaks.clear();
+        while let Some((row, lane)) = self.step.candidates.pop() {
+            let block = chain.layout.block(row, lane);
+            let found = self.step.look_for_break(chain, block, 0.0, end);
+            // Events this long after the first are left to the next step.
+            end = end.min(found + self.control.break_window / self.step.length);
+        }
+        end
+    }
+
+    /// The first event from `done` to `end`: what happens, at which block, and where in the step.
+    fn next_event(&self, done: f64, end: f64) -> Option<(Change, usize, f64)> {
+        let interface = &self.slider.interface;
+        let Step { start, length, .. } = self.step;
+        let due = ((interface.next_reattachment() - start) / length).max(done);
+        match self.step.first_break() {
+            Some((s, block)) if s <= due && s <= end => Some((Change::Break, block, s)),
+            _ if due <= end => interface
+                .next_reattachment_by(f64::INFINITY)
+                .map(|(_, block)| (Change::Attach, block, due)),
+            _ => None,
+        }
+    }
+
     /// Reports a part of the step to the observer, and to the ledger if there is one; `force` is the shear force at its
     /// start. Returns that at its end.
     fn report(
@@ -282,15 +287,27 @@ impl Integration<'_> {
             path: self.step.force_path(first, [force, end_force]),
         });
         if let Some(audit) = self.audit {
-            audit.follow_series(
-                &*self.kernels,
-                &self.slider.chain,
-                &self.step.series,
-                [first, last],
-                length,
-            );
+            self.enter_damping(audit, [first, last]);
         }
         end_force
+    }
+
+    /// Enters the damping loss over a part of the step: ∫ mγ Σ v² dt, exact for the polynomial.
+    fn enter_damping(&self, audit: &Audit, [first, last]: [f64; 2]) {
+        let Slider { chain, state, .. } = &self.slider;
+        let Step { series, length, .. } = &self.step;
+        let mut probe = state.clone();
+        let nodes = audit.quadrature.nodes(series.order).iter();
+        let mean_square: f64 = nodes
+            .map(|&(s, weight)| {
+                let s = first + s * (last - first);
+                self.kernels.evaluate(series, s, *length, &mut probe);
+                let velocities = probe.velocity.iter().flat_map(|row| row.iter());
+                weight * velocities.map(|v| v * v).sum::<f64>()
+            })
+            .sum();
+        let loss = chain.mass * chain.damping_rate * (last - first) * length * mean_square;
+        Audit::add(&audit.damping, loss);
     }
 
     /// Breaks the contacts that a block has reached, or attaches the one that is due there, at s in the step. Returns

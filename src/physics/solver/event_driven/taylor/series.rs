@@ -1,15 +1,25 @@
 //! The Taylor series of a step: x(t + s h) = Σ Y_p s^p/p! for s in [0, 1], with Y_p = h^p x^(p); its values, and
-//! which blocks may break. [`super::recurrence`] computes it.
+//! which blocks may break.
+//!
+//! The equation of motion gives each order from the two before, Y_{p+2} = h² (A Y_p + forces) - γ h Y_{p+1}, one sweep
+//! of a tridiagonal stencil. Orders are added until two successive terms, times their order, and what the drive adds to
+//! the next, fall below the error allowed. The sum of the terms' magnitudes bounds how far each block moves within the
+//! step.
 
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
-use crate::solver::event_driven::chain::{Chain, State};
-use crate::solver::event_driven::lane_layout::Layout;
+use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, Layout, State};
 use crate::solver::polynomial::{INVERSE, MAX_COEFFICIENTS};
 use pulp::Scalar512b;
 
+/// Largest order of a step.
+const MAX_ORDER: usize = MAX_COEFFICIENTS - 1;
+
+/// Order at which convergence is first looked at.
+const MIN_ORDER: usize = 3;
+
 /// 1/p!.
-pub const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
+const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
     let mut inverse = [1.0; MAX_COEFFICIENTS];
     let mut p = 1;
     while p < MAX_COEFFICIENTS {
@@ -70,7 +80,7 @@ impl Series {
 
     /// Number of rows, which is `R` unless that is 0.
     #[inline(always)]
-    pub fn rows_in<const R: usize>(&self) -> usize {
+    fn rows_in<const R: usize>(&self) -> usize {
         if R == 0 { self.rows } else { R }
     }
 
@@ -219,4 +229,212 @@ pub fn reachable<S: Simd, const R: usize>(
             reached &= reached - 1;
         }
     }
+}
+
+/// What a step needs to know about its length and the drive.
+#[derive(Clone, Copy, Debug)]
+pub struct StepInput {
+    /// Length h, in s.
+    pub length: f64,
+    /// Bound that the last terms must meet, in m.
+    pub error: f64,
+    /// Order from which on the terms are compared with it.
+    pub min_order: usize,
+    pub drive: DriveDerivatives,
+}
+
+/// Expands the state into a series; false if it does not converge within [`MAX_ORDER`]. Compiled for `R` rows, or for
+/// any number if that is 0; so are the loops below.
+#[inline(always)]
+pub fn expand<S: Simd, const R: usize>(
+    simd: S,
+    chain: &Chain,
+    state: &State,
+    input: &StepInput,
+    series: &mut Series,
+) -> bool {
+    let rows = series.rows_in::<R>();
+    let Series {
+        terms,
+        coupling,
+        diagonal,
+        ..
+    } = series;
+    let coupling = &mut coupling[..rows];
+    let diagonal = &mut diagonal[..rows];
+    let square = simd.splat(input.length * input.length);
+    let minus_square = simd.splat(-(input.length * input.length));
+    for (scaled, coupling) in coupling.iter_mut().zip(&chain.coupling[..rows]) {
+        simd.load(coupling).times(square).store(scaled);
+    }
+    for (scaled, diagonal) in diagonal.iter_mut().zip(&chain.diagonal[..rows]) {
+        simd.load(diagonal).times(minus_square).store(scaled);
+    }
+    let (first, second) = terms[..2 * rows].split_at_mut(rows);
+    for (start, displacement) in first.iter_mut().zip(&state.displacement[..rows]) {
+        simd.load(displacement).store(start);
+    }
+    let length = simd.splat(input.length);
+    for (rate, velocity) in second.iter_mut().zip(&state.velocity[..rows]) {
+        simd.load(velocity).times(length).store(rate);
+    }
+    let recurrence = Recurrence {
+        simd,
+        coupling,
+        diagonal,
+        pull: &chain.pull[..rows],
+        square,
+        damping: simd.splat(-chain.damping_rate * input.length),
+        pulling: input.length * input.length * (chain.drive_stiffness / chain.mass),
+        drive: input.drive,
+    };
+    let min_order =
+        input
+            .min_order
+            .max(order_of_drive(input.drive, recurrence.pulling, input.error));
+    let input = StepInput {
+        min_order,
+        ..*input
+    };
+    let order = converge(recurrence, &input, terms, rows);
+    series.order = order.unwrap_or(series.order);
+    order.is_some()
+}
+
+/// Least order from which on what a modulated drive adds to the orders left out, times their order, is within `error` m.
+/// Terms may vanish that the drive is still to make: at rest, those of the first four orders do.
+#[inline(always)]
+fn order_of_drive(drive: DriveDerivatives, pulling: f64, error: f64) -> usize {
+    let mut order = MIN_ORDER;
+    // Of order + 1, times that; from here on they fall, since a step is at most four radians of the modulation.
+    let mut term =
+        pulling * (drive.swing[0].abs() + drive.swing[1].abs()) * drive.angle * drive.angle / 6.0;
+    while term > error && order < MAX_ORDER {
+        order += 1;
+        term *= drive.angle / order as f64;
+    }
+    order
+}
+
+/// The recurrence from the last two orders to the next.
+struct Recurrence<'a, S: Simd> {
+    simd: S,
+    /// h² times the coupling and minus the diagonal.
+    coupling: &'a [Row],
+    diagonal: &'a [Row],
+    /// The contact force at displacement zero, by mass, and h².
+    pull: &'a [Row],
+    square: S::Vector,
+    damping: S::Vector,
+    /// h² `K_d/m`, and the derivatives of the drive's displacement that are still to come.
+    pulling: f64,
+    drive: DriveDerivatives,
+}
+
+impl<S: Simd> Recurrence<'_, S> {
+    /// Adds pull and drive to Y_{p+2}; order after order.
+    #[inline(always)]
+    fn add_forces(&mut self, p: usize, next: &mut [Row]) {
+        if p == 0 {
+            for (row, pull) in next.iter_mut().zip(self.pull) {
+                self.simd
+                    .load(pull)
+                    .mul_add(self.square, self.simd.load(row))
+                    .store(row);
+            }
+        }
+        let push = self.pulling * self.drive.next_order();
+        if push != 0.0 {
+            self.simd
+                .load(&FIRST_BLOCK)
+                .mul_add(self.simd.splat(push), self.simd.load(&next[0]))
+                .store(&mut next[0]);
+        }
+    }
+}
+
+/// Adds orders to Y_0 and Y_1 until the series converges. Returns the last one, if it does.
+#[inline(always)]
+fn converge<S: Simd>(
+    mut recurrence: Recurrence<'_, S>,
+    input: &StepInput,
+    terms: &mut [Row],
+    rows: usize,
+) -> Option<usize> {
+    for p in 0..MAX_ORDER - 1 {
+        let terms = &mut terms[p * rows..(p + 3) * rows];
+        sweep(
+            recurrence.simd,
+            recurrence.coupling,
+            recurrence.diagonal,
+            recurrence.damping,
+            terms,
+            rows,
+        );
+        recurrence.add_forces(p, &mut terms[2 * rows..]);
+        // Two orders at a time: every second one may vanish by symmetry.
+        let order = p + 2;
+        if p % 2 == 1
+            && order >= input.min_order
+            && are_small(recurrence.simd, &terms[rows..], rows, order, input.error)
+        {
+            return Some(order);
+        }
+    }
+    None
+}
+
+/// Y_{p+2} without pull and drive: `terms` holds Y_p, Y_{p+1} and room for it.
+#[inline(always)]
+fn sweep<S: Simd>(
+    simd: S,
+    coupling: &[Row],
+    diagonal: &[Row],
+    damping: S::Vector,
+    terms: &mut [Row],
+    rows: usize,
+) {
+    let (y, rest) = terms.split_at_mut(rows);
+    let (rate, next) = rest.split_at_mut(rows);
+    let next = &mut next[..rows];
+    let mut before = simd.load(&y[rows - 1]).to_next_lane();
+    let mut here = simd.load(&y[0]);
+    let last_after = here.to_lane_before();
+    let last = rows - 1;
+    for ((((next, rate), coupling), diagonal), after) in next[..last]
+        .iter_mut()
+        .zip(&rate[..last])
+        .zip(&coupling[..last])
+        .zip(&diagonal[..last])
+        .zip(&y[1..])
+    {
+        let after = simd.load(after);
+        let coupled = before.plus(after).times(simd.load(coupling));
+        let forced = here.mul_add(simd.load(diagonal), coupled);
+        simd.load(rate).mul_add(damping, forced).store(next);
+        (before, here) = (here, after);
+    }
+    let coupled = before.plus(last_after).times(simd.load(&coupling[last]));
+    let forced = here.mul_add(simd.load(&diagonal[last]), coupled);
+    simd.load(&rate[last])
+        .mul_add(damping, forced)
+        .store(&mut next[last]);
+}
+
+/// Whether the rows of the last two orders, weighted as terms and taken times the last order, are within the error
+/// allowed.
+#[inline(always)]
+fn are_small<S: Simd>(simd: S, terms: &[Row], rows: usize, order: usize, error: f64) -> bool {
+    let mut in_lower = simd.splat(0.0);
+    let mut in_higher = simd.splat(0.0);
+    for (lower, higher) in terms[..rows].iter().zip(&terms[rows..]) {
+        in_lower = simd.load(lower).abs().larger(in_lower);
+        in_higher = simd.load(higher).abs().larger(in_higher);
+    }
+    let [for_lower, for_higher] =
+        [order - 1, order].map(|p| simd.splat(order as f64 * INVERSE_FACTORIAL[p]));
+    in_lower
+        .times(for_lower)
+        .larger(in_higher.times(for_higher))
+        .within(simd.splat(error))
 }
