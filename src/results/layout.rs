@@ -89,7 +89,7 @@ impl<'a> Layout<'a> {
             format!("is a sweep file; did you mean {}?", shown(&name))
         } else if is_there {
             format!(
-                "is no results directory (it has no run/extension-000.json); name one that a run made, such as {RESULTS}/fig3"
+                "is not a results directory (it has no run/extension-000.json); name one that a run made, such as {RESULTS}/fig3"
             )
         } else {
             format!("there is no such directory; name one that a run made, such as {RESULTS}/fig3")

@@ -254,7 +254,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ),
         (
             "plan empty",
-            &["empty: is no results directory", "such as results/"],
+            &["empty: is not a results directory", "such as results/"],
         ),
         (
             "plan binary.toml",
@@ -377,25 +377,25 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ),
         (
             "status theirs",
-            &["theirs: is no results directory", "such as results/"],
+            &["theirs: is not a results directory", "such as results/"],
         ),
         (
             "verify plain.txt",
-            &["plain.txt: is no results directory", "such as results/"],
+            &["plain.txt: is not a results directory", "such as results/"],
         ),
         (
             "status plain.txt",
-            &["plain.txt: is no results directory", "such as results/"],
+            &["plain.txt: is not a results directory", "such as results/"],
         ),
         ("status good --yaml", &["--yaml"]),
         (
             "reduce empty",
-            &["empty: is no results directory", "such as results/"],
+            &["empty: is not a results directory", "such as results/"],
         ),
         ("reduce good extra", &["extra"]),
         (
             "plot theirs",
-            &["theirs: is no results directory", "such as results/"],
+            &["theirs: is not a results directory", "such as results/"],
         ),
         ("plot good --from 3", &["--from"]),
         ("generate completions", &["<SHELL>"]),

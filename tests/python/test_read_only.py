@@ -1,4 +1,4 @@
-"""Whoever may only read a directory sees its results, also if they were never reduced."""
+"""A user who may only read a directory sees its results, also if they were never reduced."""
 
 import os
 import shutil

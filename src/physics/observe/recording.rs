@@ -17,7 +17,7 @@ fields! {
             "Model time, counted as onsets are; the first recorded slip with its onset then or later is the last";
         Discard("discard") discard: u64 = 5, "", COUNT_OR_ZERO, "Slips of start-up, not recorded";
         MaxTime("max_time") max_time: Option<f64> = None, "s", POSITIVE,
-            "Model time at which a job ends even without its slips; its outcome is then `time limit`, and a longer one in the same directory runs it again";
+            "Longest model time of a job; one that it ends has the outcome `time limit`, and a longer one in the same directory runs it again";
         MaxEvents("max_events") max_events: u64 = 1_000_000_000, "", COUNT,
             "Contact events after which a job counts as failed; may be raised for `--retry-failed` in the same directory";
         PrecursorSize("precursor_size") precursor_size: Option<u64> = None, "", COUNT,

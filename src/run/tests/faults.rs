@@ -49,7 +49,7 @@ struct Scenario {
     retry_failed: bool,
     /// Whether the tables are reduced.
     reduces: bool,
-    /// Whether it decides for itself how many seeds there are.
+    /// Whether its sweep is adaptive.
     in_rounds: bool,
 }
 

@@ -131,7 +131,7 @@ impl HardCase {
         vec![audited, as_a_job]
     }
 
-    /// Runs it with this solver: with an audit, or held against the run that had one.
+    /// Runs it with this solver: with an audit, or compared with the run that had one.
     fn row(&self, solver: Solver, audited: Option<&Outcome>) -> Outcome {
         let outcome = |passed, how: &str, breaks, residual| Outcome {
             case: self.name(),
