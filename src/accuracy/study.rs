@@ -193,8 +193,8 @@ impl Ensemble {
         self.slips.extend(slips);
     }
 
-    /// The cost by the CPU time per step of the fastest realisation. Without slips that of one follows from the mean interval
-    /// in s.
+    /// The cost, by the CPU time per step of the fastest realisation. If none of its slips was timed, the cost of a slip
+    /// follows from the steps in a mean interval (in s).
     fn cost(&self, mean_interval: f64) -> Cost {
         let per_step = self.per_step.iter().copied().fold(f64::INFINITY, f64::min);
         let steps = self.steps as f64;

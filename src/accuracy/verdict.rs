@@ -1,8 +1,8 @@
 //! What a study says of one solver, in a few lines: whether its slips are biased, by how much its breaks are off, and whether
 //! the statistical error of a sweep is larger.
 //!
-//! A bias counts if it survives the number of comparisons (Bonferroni): among all of a solver that has none, one counts by
-//! chance in one study of twenty. With few slips, or one realisation, no bias counts.
+//! A bias counts if it is significant at 5 % after Bonferroni's correction for the number of comparisons: of a solver
+//! without bias, one study in twenty reports one by chance. With few slips, or one realisation, no bias counts.
 
 use super::{BiasRow, Findings, MethodRow, SolverColumns, Study, set_in_words};
 

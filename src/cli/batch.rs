@@ -69,8 +69,8 @@ const MIN_TIME: Duration = Duration::from_mins(1);
 /// for reduction and figures, which come on top.
 const MARGIN_SHARE: u32 = 10;
 const MAX_MARGIN: Duration = Duration::from_mins(2);
-/// Seconds before the end at which Slurm sends its warning, or up to a minute earlier: after the worker's own stop, if
-/// the margin is whole.
+/// Seconds before the end at which Slurm is asked to send its signal; it may send it a minute earlier. With the largest
+/// margin, the worker has stopped by then.
 const WARNING: u32 = 15;
 
 fn time_in_queue(text: &str) -> Result<Duration, String> {

@@ -27,7 +27,7 @@ const CURVE_POINTS: usize = 400;
 /// Most values of η that have a column each; more are put into columns, this many a decade.
 const MAX_COLUMNS: usize = 60;
 const COLUMNS_PER_DECADE: f64 = 10.0;
-/// How far the column of a value reaches at most, as a factor: curves are compared with what it is of.
+/// Largest ratio of a column's edge to its η. A wider column would show phases of one η far from the curves at that η.
 const WIDEST: f64 = 1.5;
 /// Rows of the density in half a turn.
 const ROWS: f64 = 36.0;

@@ -35,7 +35,7 @@ pub struct Operator {
     combine: fn(f64, f64) -> f64,
 }
 
-/// Precedence of conditions between conditions, and of comparisons: below and above are conditions and numbers.
+/// Precedences. Operators below [`COMPARISON`] join conditions; those above it join numbers.
 const OR: u8 = 1;
 const AND: u8 = 2;
 const COMPARISON: u8 = 3;

@@ -1,4 +1,4 @@
-//! Disks of tests: that of the operating system, but for what a test says otherwise.
+//! For tests: the disk of the operating system, with operations that a test can watch, change or let fail.
 
 use super::{Disk, Lock, Sink, Storage, StorageError, StoredFile};
 use std::ffi::OsString;
