@@ -10,11 +10,11 @@
 //! ```
 //!
 //! Imports run one way: `physics` <- `table` <- `sets` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
-//! `reduce` <- `figure`; `run`, `figure` <- `report`.
-//! `physics/` is a separate crate, on which other programs can depend: model, solvers and measurements, with the columns of
-//! their rows; it knows no file. `sets` describes the columns of a parameter set. `single_job` runs one job with all its
-//! records. `accuracy` compares the solvers, from the model to figures. `cli` is the command line, the only code that prints;
-//! `python/` makes a Python module of the library.
+//! `reduce` <- `figure`; `run`, `figure` <- `report`. `physics/` is a separate crate, on which other programs can
+//! depend: model, solvers and measurements, with the columns of their rows; it knows no file. `sets` describes the
+//! columns of a parameter set. `single_job` runs one job with all its records. `accuracy` compares the solvers, from
+//! the model to figures. `cli` is the command line, the only code that prints; `python/` makes a Python module of the
+//! library.
 //!
 //! | word | meaning |
 //! |---|---|

@@ -10,7 +10,8 @@
 //! errors.rs     errors as exceptions
 //! ```
 //!
-//! Words, defaults and plots are Python's, in `python/stickslip`. Contract: nothing here panics, or crashes the interpreter.
+//! Words, defaults and plots are Python's, in `python/stickslip`. Contract: nothing here panics, or crashes the
+//! interpreter.
 
 #![expect(
     clippy::needless_pass_by_value,

@@ -1,5 +1,5 @@
-//! Work on a separate thread, without the interpreter's lock, while this one waits and obeys Ctrl-C: signals reach only the
-//! main thread, where Python handles them only on request.
+//! Work on a separate thread, without the interpreter's lock, while this one waits and obeys Ctrl-C: signals reach only
+//! the main thread, where Python handles them only on request.
 
 use crate::errors::Error;
 use pyo3::prelude::*;
@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 /// Time between two looks for signals, and two calls of `show`.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Runs `work` until it ends. `note` collects its messages, and `show` shows them now and then. An exception, by `show` or by
-/// Ctrl-C, sets the flag of `work`, and is raised once that has ended.
+/// Runs `work` until it ends. `note` collects its messages, and `show` shows them now and then. An exception, by `show`
+/// or by Ctrl-C, sets the flag of `work`, and is raised once that has ended.
 pub fn watched<T: Send, M: Send>(
     py: Python<'_>,
     work: impl FnOnce(&AtomicBool, &Sender<M>) -> Result<T, Error> + Send,

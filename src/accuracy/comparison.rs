@@ -1,11 +1,12 @@
 //! What a solver is compared by. Before chaos: break times against a reference, contact by contact. After chaos: by how
 //! much the slips of an ensemble differ from those of a reference, in mean and standard deviation.
 //!
-//! A break is identified by block, contact and generation, which mean the same contact in every solver. It is missing if
-//! it has not come a tenth of the wave crossing time after the last of the reference.
+//! A break is identified by block, contact and generation, which mean the same contact in every solver. It is missing
+//! if it has not come a tenth of the wave crossing time after the last of the reference.
 //!
-//! Realisations are independent, slips of one are not. So errors are those of the sums of realisations, and a difference has
-//! the degrees of freedom of the smaller ensemble: those of Welch are too many far out, where many comparisons look.
+//! Realisations are independent, slips of one are not. So errors are those of the sums of realisations, and a
+//! difference has the degrees of freedom of the smaller ensemble: those of Welch are too many far out, where many
+//! comparisons look.
 
 use crate::model::{Change, ContactEvent, Parameters};
 use crate::reduce::student_at;

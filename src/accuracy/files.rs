@@ -59,8 +59,8 @@ pub fn check(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes what a study found into a folder, over what an earlier one left there, with a figure for the sets that differ in the
-/// modulation alone; returns the files.
+/// Writes what a study found into a folder, over what an earlier one left there, with a figure for the sets that differ
+/// in the modulation alone; returns the files.
 pub fn write(
     study: &Study,
     findings: &Findings,

@@ -93,8 +93,8 @@ impl Selection for DriveAlone {
 }
 
 columns! {
-    /// One solver at one set of parameters. Costs are those of its cheapest realisation per step: other work on the machine
-    /// can only add to them. Errors of break times are left out where they would take too long.
+    /// One solver at one set of parameters. Costs are those of its cheapest realisation per step: other work on the
+    /// machine can only add to them. Errors of break times are left out where they would take too long.
     #[derive(Clone, Debug, PartialEq)]
     pub struct MethodRow {
         parameters: Selected<DriveAlone>;

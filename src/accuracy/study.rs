@@ -1,10 +1,10 @@
 //! The study: every solver at several settings, in one run, on one thread, interleaved; cost and errors of each.
 //!
-//! The event-driven solver counts as two methods, by how it resolves motion. At each set of parameters: the first breaks
-//! against the tightest tolerance there is; and an ensemble of slips that is timed and whose distributions are compared
-//! with a reference ensemble of other seeds. At the first set more realisations, not timed, make the ensembles large
-//! enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its slips: it is
-//! timed over a short stretch, and its cost per slip follows from the steps of an interval.
+//! The event-driven solver counts as two methods, by how it resolves motion. At each set of parameters: the first
+//! breaks against the tightest tolerance there is; and an ensemble of slips that is timed and whose distributions are
+//! compared with a reference ensemble of other seeds. At the first set more realisations, not timed, make the ensembles
+//! large enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its
+//! slips: it is timed over a short stretch, and its cost per slip follows from the steps of an interval.
 
 use super::comparison::{Bias, BreakErrors, Comparison, Reference, Sample};
 use super::{BiasRow, Cost, Findings, MethodRow, SolverColumns, set_in_words};
@@ -193,8 +193,8 @@ impl Ensemble {
         self.slips.extend(slips);
     }
 
-    /// The cost, by the CPU time per step of the fastest realisation. If none of its slips was timed, the cost of a slip
-    /// follows from the steps in a mean interval (in s).
+    /// The cost, by the CPU time per step of the fastest realisation. If none of its slips was timed, the cost of a
+    /// slip follows from the steps in a mean interval (in s).
     fn cost(&self, mean_interval: f64) -> Cost {
         let per_step = self.per_step.iter().copied().fold(f64::INFINITY, f64::min);
         let steps = self.steps as f64;

@@ -1,5 +1,5 @@
-//! What a study says of one solver, in a few lines: whether its slips are biased, by how much its breaks are off, and whether
-//! the statistical error of a sweep is larger.
+//! What a study says of one solver, in a few lines: whether its slips are biased, by how much its breaks are off, and
+//! whether the statistical error of a sweep is larger.
 //!
 //! A bias counts if it is significant at 5 % after Bonferroni's correction for the number of comparisons: of a solver
 //! without bias, one study in twenty reports one by chance. With few slips, or one realisation, no bias counts.
@@ -256,7 +256,8 @@ mod tests {
             )
             .remove(0)
         };
-        // 1.2 half-widths, or 2.35 standard errors, count for one comparison and not for five, of which 2.58 are needed.
+        // 1.2 half-widths, or 2.35 standard errors, count for one comparison and not for five, of which 2.58 are
+        // needed.
         assert!(
             with(1000, 1.2e-3)
                 .contains("no bias found; with 1000 slips per solver a bias below 1.3 %")

@@ -1,5 +1,5 @@
-//! The physics, for any program: the slider held by breakable contacts of Capozza et al., "Stabilizing stick-slip friction",
-//! PRL 107, 024301 (2011). Knows no sweep and no file.
+//! The physics, for any program: the slider held by breakable contacts of Capozza et al., "Stabilizing stick-slip
+//! friction", PRL 107, 024301 (2011). Knows no sweep and no file.
 //!
 //! ```text
 //! model/       the paper's equations: parameters, drive, slider, interface, disorder, theory

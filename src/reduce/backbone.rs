@@ -53,8 +53,8 @@ struct Bin {
 /// A sum of unit vectors over sets that have seeds in common.
 ///
 /// Slips of the same seed may deviate alike from the means of sets that resemble each other. Deviations are summed over
-/// sets, seed by seed and stretch by stretch: products of the sums hold the variances of the sets and the covariances of jobs
-/// of the same seed, pooled over all pairs of sets.
+/// sets, seed by seed and stretch by stretch: products of the sums hold the variances of the sets and the covariances
+/// of jobs of the same seed, pooled over all pairs of sets.
 #[derive(Clone, Debug, Default)]
 struct Together {
     count: u64,
@@ -125,8 +125,8 @@ fn bin_of(eta: f64) -> i32 {
 }
 
 impl Backbone {
-    /// Adds a set. Left out are sets without modulation, which have no phase, with a ramp, which have no single η, and with a
-    /// single slip, whose phase has no interval.
+    /// Adds a set. Left out are sets without modulation, which have no phase, with a ramp, which have no single η, and
+    /// with a single slip, whose phase has no interval.
     pub(super) fn push(&mut self, set: &FinishedSet) {
         if set.row.parameters.ramp_time > 0.0 || set.phases.mean.count() < 2 {
             return;

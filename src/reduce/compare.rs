@@ -1,8 +1,9 @@
-//! Sets of two directories compared seed by seed. A seed gives the same disorder in both, so its effect cancels in their
-//! difference, and smaller effects show than in two separate intervals.
+//! Sets of two directories compared seed by seed. A seed gives the same disorder in both, so its effect cancels in
+//! their difference, and smaller effects show than in two separate intervals.
 //!
-//! Values are those of the table of sets, of the jobs with seeds that both have. The error of a difference is that of a mean
-//! over these seeds, of what each adds to it: the jackknife to first order, in a time proportional to the number of slips.
+//! Values are those of the table of sets, of the jobs with seeds that both have. The error of a difference is that of a
+//! mean over these seeds, of what each adds to it: the jackknife to first order, in a time proportional to the number
+//! of slips.
 
 use super::gather::{Gathered, Gathering, MAX_SLIPS, by_parameters, each_job};
 use super::sequence::{Sequences, Sum, unit};
@@ -147,8 +148,8 @@ fn pairs<'a>(a: &'a [Set], b: &'a [Set], keys: &[Symbol]) -> Vec<Pair<'a>> {
     a.iter().filter_map(pair).collect()
 }
 
-/// Sets of two directories A and B that agree in all parameters that either varies: these parameters, the common seeds, and
-/// mean interval, mean friction and resultant length in A, in B, and their differences B - A with 95 % intervals.
+/// Sets of two directories A and B that agree in all parameters that either varies: these parameters, the common seeds,
+/// and mean interval, mean friction and resultant length in A, in B, and their differences B - A with 95 % intervals.
 pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsError> {
     let sets_of_a = sets_of(a)?;
     let sets_of_b = sets_of(b)?;

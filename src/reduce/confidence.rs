@@ -1,13 +1,13 @@
 //! Confidence intervals: they contain the true value in 95 of 100 repetitions.
 //!
-//! Where few slips differ from all others, as in a deep tongue, sums of jobs hardly vary, and their small variation is skewed.
-//! Two things are added to Student's t: towards the side on which a sum is skewed, what the third moment says of rare events;
-//! and slips of a kind that was not seen at all, of which there may be [`MAX_UNSEEN`]. Errors on one side are combined by
-//! their squares (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693 (2008)).
+//! Where few slips differ from all others, as in a deep tongue, sums of jobs hardly vary, and their small variation is
+//! skewed. Two things are added to Student's t: towards the side on which a sum is skewed, what the third moment says
+//! of rare events; and slips of a kind that was not seen at all, of which there may be [`MAX_UNSEEN`]. Errors on one
+//! side are combined by their squares (MOVER: G. Zou and A. Donner, Stat. Med. 27, 1693 (2008)).
 //!
-//! In a tongue, the intervals of a set are n periods each, up to a jitter. Few slips are off n there, and a small set may have
-//! seen none. Each would change its statistics much, so its intervals allow for some of them (`Unseen`). How much each would
-//! change is a choice by which intervals hold the true value as often as they say: docs/coverage.md.
+//! In a tongue, the intervals of a set are n periods each, up to a jitter. Few slips are off n there, and a small set
+//! may have seen none. Each would change its statistics much, so its intervals allow for some of them (`Unseen`). How
+//! much each would change is a choice by which intervals hold the true value as often as they say: docs/coverage.md.
 
 use super::sequence::{Centred, Estimate, heading};
 use crate::model::standard_normal_quantile;
@@ -23,8 +23,8 @@ const LONG: f64 = 0.5;
 /// Events of which none is seen in 5 of 100 repetitions: -ln 0.05.
 const MAX_UNSEEN: f64 = 3.0;
 
-/// The interval of a count k of rare events is k + a ± √(1.96² k + a²) with this a: that of the Poisson distribution (mid-P) to
-/// 0.07 events, and [`MAX_UNSEEN`] at k = 0.
+/// The interval of a count k of rare events is k + a ± √(1.96² k + a²) with this a: that of the Poisson distribution
+/// (mid-P) to 0.07 events, and [`MAX_UNSEEN`] at k = 0.
 const RARE: f64 = 0.5 * MAX_UNSEEN;
 
 /// Relative error of a mean.
@@ -77,8 +77,8 @@ impl Estimate<1> {
         })
     }
 
-    /// Standard deviation (n - 1) of the values whose squared deviations from their mean these are, and its interval; `None`
-    /// for fewer than two values, and no interval for fewer than [`MIN_VALUES`].
+    /// Standard deviation (n - 1) of the values whose squared deviations from their mean these are, and its interval;
+    /// `None` for fewer than two values, and no interval for fewer than [`MIN_VALUES`].
     pub(super) fn deviation(&self, unseen: Unseen) -> (Option<f64>, Option<Interval>) {
         let n = self.count() as f64;
         let of_sample = |square: f64| (square.max(0.0) * n / (n - 1.0)).sqrt();
@@ -92,8 +92,8 @@ impl Estimate<1> {
         (square.map(of_sample), ends)
     }
 
-    /// Shares of the values between whose quantiles the median lies, if these are the values' indicators of not exceeding it
-    /// (Woodruff, J. Am. Stat. Assoc. 47, 635 (1952)).
+    /// Shares of the values between whose quantiles the median lies, if these are the values' indicators of not
+    /// exceeding it (Woodruff, J. Am. Stat. Assoc. 47, 635 (1952)).
     pub(super) fn shares_about_median(&self) -> Option<[f64; 2]> {
         // A value more or less is the least that a share can be off.
         let half = self.half()?.max(1.0 / self.count() as f64);
@@ -139,12 +139,12 @@ impl Estimate<2> {
 }
 
 impl Centred<2> {
-    /// Of the resultant length R of unit vectors, of which vectors may be missing that each take `unseen` from the sum; `None`
-    /// for fewer than [`MIN_VALUES`].
+    /// Of the resultant length R of unit vectors, of which vectors may be missing that each take `unseen` from the sum;
+    /// `None` for fewer than [`MIN_VALUES`].
     ///
     /// Of short ones: the square of the length of a mean has the mean R² + s² + s'² and the variance 4 R² s² + 2 (s⁴ +
-    /// s'⁴), with the variances s² along and s'² across. The interval contains every R from which the measured square is
-    /// less than t standard deviations away (score interval). It also holds near R = 0, where chance alone makes a
+    /// s'⁴), with the variances s² along and s'² across. The interval contains every R from which the measured square
+    /// is less than t standard deviations away (score interval). It also holds near R = 0, where chance alone makes a
     /// resultant longer. Long ones are the mean of the components along their direction.
     pub(super) fn length_interval(&self, unseen: f64) -> Option<Interval> {
         let mean = &self.mean;
@@ -227,7 +227,8 @@ fn cosine_integral(angle: f64, nu: f64) -> f64 {
     width / 3.0 * (0..=STEPS).map(weighted).sum::<f64>()
 }
 
-/// Standard deviation of intervals about whole numbers of periods, in periods, from which jitter alone puts slips off n.
+/// Standard deviation of intervals about whole numbers of periods, in periods, from which jitter alone puts slips off
+/// n.
 const MAX_JITTER: f64 = 0.1;
 
 /// What a slip off n takes from the sum of phases as unit vectors.

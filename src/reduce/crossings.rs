@@ -1,14 +1,15 @@
 //! Edges: where a statistic of the population crosses a threshold along an axis, each with its 95 % interval.
 //!
-//! A set is clear if its interval lies on one side of the threshold. Between two clear neighbours of opposite sides, unclear
-//! sets left out, lies an edge; up and down are separate edges. Of the sets in between, two neighbours count between
-//! which the estimate crosses. If both are clear, the edge lies between them, and nothing is said of the response there.
-//! If not, it is near: where a line through the sets of a small window crosses, with Fieller's interval (E. C. Fieller,
-//! J. R. Stat. Soc. B 16, 175 (1954)); where that has no end, as the line may be level, with the bracket of clear sets.
+//! A set is clear if its interval lies on one side of the threshold. Between two clear neighbours of opposite sides,
+//! unclear sets left out, lies an edge; up and down are separate edges. Of the sets in between, two neighbours count
+//! between which the estimate crosses. If both are clear, the edge lies between them, and nothing is said of the
+//! response there. If not, it is near: where a line through the sets of a small window crosses, with Fieller's interval
+//! (E. C. Fieller, J. R. Stat. Soc. B 16, 175 (1954)); where that has no end, as the line may be level, with the
+//! bracket of clear sets.
 //!
-//! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is one realisation
-//! of the disorder in all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal size).
-//! Places on the axis are rows of the grid and fractions of them.
+//! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is one
+//! realisation of the disorder in all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal
+//! size). Places on the axis are rows of the grid and fractions of them.
 
 use super::confidence::student;
 use super::drive_alone::Explained;
@@ -26,8 +27,8 @@ use std::collections::BTreeMap;
 
 /// Groups of seeds, so that the cost of leaving them out is bounded.
 pub const GROUPS: usize = 30;
-/// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width. Fewer where
-/// they are a larger share of the value at the edge, over which responses bend.
+/// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width. Fewer
+/// where they are a larger share of the value at the edge, over which responses bend.
 const WINDOW: f64 = 3.0;
 const LARGEST_SHARE: f64 = 0.2;
 /// Factor of the interval of a line, as windows that are steep by chance end first: measured, docs/rounds.md.
@@ -90,7 +91,8 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// From the jobs of each group, and the value of all jobs except those of a group; `None` if one of these values is missing.
+    /// From the jobs of each group, and the value of all jobs except those of a group; `None` if one of these values is
+    /// missing.
     pub fn new(
         counts: &[u64; GROUPS],
         threshold: f64,
@@ -187,8 +189,8 @@ pub struct Edge<'a> {
 }
 
 impl<'a> Edge<'a> {
-    /// Between two sets of a line that are clear, those in between being unclear. `width` is wanted; `window` are the rows
-    /// for a line at a place.
+    /// Between two sets of a line that are clear, those in between being unclear. `width` is wanted; `window` are the
+    /// rows for a line at a place.
     fn between(
         all: &[Placed<'a>],
         [first, last]: [usize; 2],

@@ -1,9 +1,9 @@
 //! What the drive alone explains: slips at the loads of an unmodulated slider, under the modulation.
 //!
-//! The control of a job has its parameters and seed, and no modulation. Its onset at t comes when the driven end has moved
-//! V0 t; under the modulation it first gets there at the [first passage](Drive::first_passage), through start-up as in the run.
-//! Phases and intervals of these passages go through the estimators of the slips. What is seen beyond them is due to the
-//! slider: the excess, of pairs of a job and its control.
+//! The control of a job has its parameters and seed, and no modulation. Its onset at t comes when the driven end has
+//! moved V0 t; under the modulation it first gets there at the [first passage](Drive::first_passage), through start-up
+//! as in the run. Phases and intervals of these passages go through the estimators of the slips. What is seen beyond
+//! them is due to the slider: the excess, of pairs of a job and its control.
 
 use super::confidence::{MIN_VALUES, OF_INTERVALS, OF_PHASES, ROUNDING, Unseen};
 use super::sequence::{Centred, Sequences, Sum, unit};
@@ -201,8 +201,8 @@ impl Beyond {
     }
 }
 
-/// The passages of a job: their times in s and the unit vectors of their phases, and those of their intervals in periods as
-/// angles.
+/// The passages of a job: their times in s and the unit vectors of their phases, and those of their intervals in
+/// periods as angles.
 #[derive(Debug)]
 struct Passage {
     phases: Vec<(f64, [f64; 2])>,
@@ -245,8 +245,8 @@ mod tests {
 
     const FREQUENCY: f64 = 29.0;
 
-    /// What is found of a set with this amplitude, of which the control has these onsets, and of whose jobs with these seeds
-    /// the phases and intervals are `seen`.
+    /// What is found of a set with this amplitude, of which the control has these onsets, and of whose jobs with these
+    /// seeds the phases and intervals are `seen`.
     fn explained(
         amplitude: f64,
         onsets: &[Vec<f64>],

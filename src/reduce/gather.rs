@@ -1,7 +1,7 @@
 //! The sets of jobs, gathered from the tables: jobs once, slips as often as memory asks for.
 //!
-//! Contract: a function of the wanted jobs and their rows alone. Sums over the jobs of a set are taken in the order of their
-//! seeds, in whatever files they lie, so that no digit depends on what was run earlier in the directory.
+//! Contract: a function of the wanted jobs and their rows alone. Sums over the jobs of a set are taken in the order of
+//! their seeds, in whatever files they lie, so that no digit depends on what was run earlier in the directory.
 //!
 //! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 50 more for the jobs of
 //! [`MAX_SLIPS`] slips and 48 to 96 for each of these, and as much again for those of the set at hand; where the tables
@@ -110,8 +110,8 @@ impl<'a> Gathering<'a> {
         })
     }
 
-    /// Hands on set after set before anything is computed, each with every `spacing`-th slip of the table as a point and its
-    /// place in the table, and with what the drive alone explains.
+    /// Hands on set after set before anything is computed, each with every `spacing`-th slip of the table as a point
+    /// and its place in the table, and with what the drive alone explains.
     pub(super) fn each_set(
         mut self,
         max_slips: u64,

@@ -1,5 +1,5 @@
-//! Reduction: the tables of a sweep become Fig. 3-style data: statistics per parameter set, the φ-η back-bone, histograms
-//! of τ, and a sample of slips for scatter figures.
+//! Reduction: the tables of a sweep become Fig. 3-style data: statistics per parameter set, the φ-η back-bone,
+//! histograms of τ, and a sample of slips for scatter figures.
 
 mod backbone;
 mod compare;
@@ -42,8 +42,8 @@ pub use values::{
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
 
-/// Upper end of the turn in which mean phases at some η are given, in rad. For η >= 1 the seam is in the middle of the gap
-/// between Φ_max - 2π and φ_min, where no slip begins.
+/// Upper end of the turn in which mean phases at some η are given, in rad. For η >= 1 the seam is in the middle of the
+/// gap between Φ_max - 2π and φ_min, where no slip begins.
 fn top_of_phases(eta: f64) -> f64 {
     minimum_phase(eta)
         .zip(load_maximum_phase(eta))

@@ -1,8 +1,9 @@
-//! The reduction of a results directory: sets, histograms of τ (Fig. 2), back-bone, points and edges, committed together.
-//! Sets stand in the order of their parameters, so the same tables give the same bytes. Sets of an adaptive sweep have
-//! further columns: the rounds in which a set ran, and whether it is as precise as is wanted.
+//! The reduction of a results directory: sets, histograms of τ (Fig. 2), back-bone, points and edges, committed
+//! together. Sets stand in the order of their parameters, so the same tables give the same bytes. Sets of an adaptive
+//! sweep have further columns: the rounds in which a set ran, and whether it is as precise as is wanted.
 //!
-//! Reduced data are up to date by the content of the tables that they were made from, as a copied folder has other times.
+//! Reduced data are up to date by the content of the tables that they were made from, as a copied folder has other
+//! times.
 
 use super::backbone::{Backbone, BackboneBin};
 use super::crossings::{EdgeRow, edge_rows};
@@ -311,7 +312,8 @@ fn source(results: &Results<'_>) -> Result<String, ResultsError> {
     Ok(hexadecimal(&digest.finalize()))
 }
 
-/// A directory whose reduced data are up to date. If nothing can be written there, they lie elsewhere as long as this lives.
+/// A directory whose reduced data are up to date. If nothing can be written there, they lie elsewhere as long as this
+/// lives.
 pub struct Renewed<'a> {
     results: Results<'a>,
     _elsewhere: Option<TempDir>,

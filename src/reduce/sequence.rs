@@ -1,13 +1,14 @@
 //! Values of a quantity slip by slip, job by job, and the uncertainty of their mean.
 //!
-//! Jobs of a set are independent, slips of a job are not. The variance of a mean of n values is that of the sums of jobs,
-//! which are independent whatever the correlation within them: n values in m jobs with the sums S_j of the deviations from the
-//! mean have m/(m-1) Σ_j S_j²/n² with m - 1 degrees of freedom. It is the jackknife over jobs of any function of means, to
-//! first order. Of fewer than [`MIN_STRETCHES`] jobs, each is cut into equal stretches that count as jobs (batch means). What
-//! that costs where stretches are no longer than the memory of slips is in docs/coverage.md. Quantiles are of sorted values.
+//! Jobs of a set are independent, slips of a job are not. The variance of a mean of n values is that of the sums of
+//! jobs, which are independent whatever the correlation within them: n values in m jobs with the sums S_j of the
+//! deviations from the mean have m/(m-1) Σ_j S_j²/n² with m - 1 degrees of freedom. It is the jackknife over jobs of
+//! any function of means, to first order. Of fewer than [`MIN_STRETCHES`] jobs, each is cut into equal stretches that
+//! count as jobs (batch means). What that costs where stretches are no longer than the memory of slips is in
+//! docs/coverage.md. Quantiles are of sorted values.
 //!
-//! Angles are unit vectors: their mean has a direction and a resultant length. What each job adds to a length is the jackknife
-//! over jobs, to first order.
+//! Angles are unit vectors: their mean has a direction and a resultant length. What each job adds to a length is the
+//! jackknife over jobs, to first order.
 
 use crate::table::value::floored;
 use std::f64::consts::TAU;

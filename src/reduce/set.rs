@@ -1,5 +1,5 @@
-//! The table of sets, a row for each with all seeds together: what the jobs table says (outcomes, averages over the time of
-//! each job), and from the slips, statistics of intervals, locking and phases.
+//! The table of sets, a row for each with all seeds together: what the jobs table says (outcomes, averages over the
+//! time of each job), and from the slips, statistics of intervals, locking and phases.
 
 use super::confidence::{OF_INTERVALS, OF_PHASES, Tongue};
 use super::sequence::{Centred, Estimate, Sequences, at_rank, unit};
@@ -17,7 +17,8 @@ use std::f64::consts::{PI, TAU};
 /// Width from which an interval of a mean phase counts as the whole turn, in rad: others are half a turn wide at most.
 const WHOLE_TURN: f64 = 1.5 * PI;
 
-/// The numbers of a slip that are kept until its set is complete. Missing values are NaN, so that a slip takes 48 bytes.
+/// The numbers of a slip that are kept until its set is complete. Missing values are NaN, so that a slip takes 48
+/// bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlipStats {
     onset: f64,
@@ -156,8 +157,8 @@ fn describe_phases(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongu
     phases
 }
 
-/// Whole cycles of a modulation whose period is at least the mean interval: a run holds few of them, and its beginning and end
-/// would show as a phase.
+/// Whole cycles of a modulation whose period is at least the mean interval: a run holds few of them, and its beginning
+/// and end would show as a phase.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cycles {
     period: f64,

@@ -1,7 +1,7 @@
 //! Columns of the sets by name, or formulas of them, as numbers: for figures, and for tables that people read.
 //!
-//! What was swept is inferred from the sets: the columns in which they differ. The first makes the axis of a figure, the
-//! second its colours, the third its panels.
+//! What was swept is inferred from the sets: the columns in which they differ. The first makes the axis of a figure,
+//! the second its colours, the third its panels.
 
 use crate::model::Symbol;
 use crate::sets::{Digits, FREQUENCY, Label, SetRow, label};
@@ -129,8 +129,8 @@ impl Values {
         self.label().scale(sizes.fold(0.0, f64::max))
     }
 
-    /// The digits that distinguish its values if it is a parameter, or computed from parameters; three for a statistic, whose
-    /// interval says how many are certain.
+    /// The digits that distinguish its values if it is a parameter, or computed from parameters; three for a statistic,
+    /// whose interval says how many are certain.
     pub fn digits(&self) -> Digits {
         let numbers = self.numbers.iter().flatten().copied();
         match self.name() {
@@ -264,9 +264,9 @@ pub fn differing<'a>(rows: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<S
     Symbol::ALL.into_iter().filter(differs).collect()
 }
 
-/// What was swept, the column with most values first; the period as 1/T, η or T, whichever was swept. Left out is a column
-/// that another one determines, such as the amplitude that is 0 where there is no period, or the second of two parameters
-/// that an axis moves together.
+/// What was swept, the column with most values first; the period as 1/T, η or T, whichever was swept. Left out is a
+/// column that another one determines, such as the amplitude that is 0 where there is no period, or the second of two
+/// parameters that an axis moves together.
 pub fn swept(rows: &[SetRow]) -> Vec<Values> {
     let column = |symbol: Symbol| {
         let names: &[&str] = if symbol == Symbol::T {

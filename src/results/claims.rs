@@ -1,13 +1,14 @@
 //! Claims: which worker runs a part, or reduces, so that nothing is done twice.
 //!
-//! `run/claims/<what>.<generation>` is a link to a file with the worker's name: of several workers that make it, one wins.
-//! A worker that finds the winner dead makes the next generation. A claim stays while any worker runs, as a worker that
-//! looked earlier may not know yet what became of it. A worker that has lost some claims lists them all again.
+//! `run/claims/<what>.<generation>` is a link to a file with the worker's name: of several workers that make it, one
+//! wins. A worker that finds the winner dead makes the next generation. A claim stays while any worker runs, as a
+//! worker that looked earlier may not know yet what became of it. A worker that has lost some claims lists them all
+//! again.
 //!
-//! Deaths: a worker keeps a note of each part that it has taken, in its staging folder, until the part is done. The worker that
-//! removes the folder of a dead worker moves its notes to `run/deaths/<part>.<worker>`. So a job that ends its process can
-//! be named, and does not stop the others. No job fails for a mark: kills, power cuts and queues leave marks, too.
-//! A run that ends in order removes the marks of parts that are done.
+//! Deaths: a worker keeps a note of each part that it has taken, in its staging folder, until the part is done. The
+//! worker that removes the folder of a dead worker moves its notes to `run/deaths/<part>.<worker>`. So a job that ends
+//! its process can be named, and does not stop the others. No job fails for a mark: kills, power cuts and queues leave
+//! marks, too. A run that ends in order removes the marks of parts that are done.
 
 use crate::results::layout::{Layout, claim};
 use crate::results::tables;

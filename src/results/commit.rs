@@ -1,8 +1,8 @@
 //! Commit: whole files appear under their names at once, in a given order, and survive a power cut.
 //!
 //! Stage, fsync, rename, fsync the folder. Contract: at every instant a target is absent, or the old file, or the whole
-//! new file; a file is there only if all files staged before it are. Each commit has staged names of its own, so that two
-//! commits of the same files at once never write into the same file.
+//! new file; a file is there only if all files staged before it are. Each commit has staged names of its own, so that
+//! two commits of the same files at once never write into the same file.
 
 use crate::results::layout::{Layout, shorter_in_tests};
 use crate::table::storage::{Lock, Storage, StorageError, StoredFile};
@@ -107,8 +107,8 @@ fn is_staged(name: &OsStr) -> bool {
     token.is_some_and(|token| token.len() == 16 && token.iter().all(u8::is_ascii_hexdigit))
 }
 
-/// Waits until no other process does what this writer does, and removes what a killed process left in its staging folder.
-/// A file system without locks lets in all, and nothing is removed: then some files may come from each process.
+/// Waits until no other process does what this writer does, and removes what a killed process left in its staging
+/// folder. A file system without locks lets in all, and nothing is removed: then some files may come from each process.
 pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
     layout.ensure_folder(&layout.locks())?;
     let file = layout.locks().join(writer);

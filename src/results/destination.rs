@@ -1,7 +1,7 @@
 //! Destinations: files and folders that the user names, outside of the data of a results directory.
 //!
-//! They are checked before anything is computed, written as a draft with a random name beside their place, and renamed. A
-//! killed process may leave its draft, which nothing reads.
+//! They are checked before anything is computed, written as a draft with a random name beside their place, and renamed.
+//! A killed process may leave its draft, which nothing reads.
 
 use crate::results::layout::{Layout, RUN};
 use crate::table::error::{ErrorKind, ResultsError};

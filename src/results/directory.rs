@@ -1,4 +1,5 @@
-//! A results directory as it was found: opened once, valid from then on. Any version is read; only the current one is run.
+//! A results directory as it was found: opened once, valid from then on. Any version is read; only the current one is
+//! run.
 
 use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
@@ -40,8 +41,8 @@ impl<'a> Results<'a> {
                 found.write_copies(|| Ok(member.commit()))?;
                 return Ok(found);
             }
-            // In this order: a living worker that was taken for dead can commit nothing any more. Its files of unfinished
-            // parts must go, since their jobs now belong to the new sweep.
+            // In this order: a living worker that was taken for dead can commit nothing any more. Its files of
+            // unfinished parts must go, since their jobs now belong to the new sweep.
             member.tidy()?;
             let done = found.done_parts()?;
             found.remove_unfinished(&done)?;

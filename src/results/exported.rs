@@ -1,11 +1,11 @@
 //! Export: the tables of a directory as one file each, elsewhere, for other tools.
 //!
-//! Rows stand in the order of the plan, extensions one after another, so the bytes depend on what is done alone and not on
-//! how it came to that. Every row has all swept parameters, so that no table need be joined. Nothing of the directory is
-//! changed. Memory: one part, and one row group.
+//! Rows stand in the order of the plan, extensions one after another, so the bytes depend on what is done alone and not
+//! on how it came to that. Every row has all swept parameters, so that no table need be joined. Nothing of the
+//! directory is changed. Memory: one part, and one row group.
 //!
-//! Exports and the Python module read joined tables, part by part. They have columns that their files lack: those of the jobs
-//! of their rows, and whether a row belongs to a control.
+//! Exports and the Python module read joined tables, part by part. They have columns that their files lack: those of
+//! the jobs of their rows, and whether a row belongs to a control.
 
 use crate::model::Selected;
 use crate::results::destination::{NewFolder, refuse_stopped};
@@ -48,7 +48,8 @@ pub struct ExportedFile {
 }
 
 impl Results<'_> {
-    /// Writes the tables to a new folder, all or none. `progress` gets the number of finished parts of tables, and of all.
+    /// Writes the tables to a new folder, all or none. `progress` gets the number of finished parts of tables, and of
+    /// all.
     pub fn export(
         &self,
         path: &Path,
@@ -270,7 +271,8 @@ impl<'a> JoinedTable<'a> {
     }
 }
 
-/// Rows with the columns of a schema: their own, or others by name; null for a column that another version did not have.
+/// Rows with the columns of a schema: their own, or others by name; null for a column that another version did not
+/// have.
 pub fn with_columns(
     rows: &RecordBatch,
     schema: &SchemaRef,

@@ -1,12 +1,12 @@
 //! The files that say what the tables of a directory belong to: one for each extension, written once.
 //!
-//! `run/extension-EEE.json` holds versions, columns, the text of the sweep and all that decides which part has which job.
-//! Each holds the checksum of the file before, so the last one stands for all. `run/copies/` holds a second copy of each:
-//! the first that is whole counts. Both are made exclusively. The first file decides which worker was first; a worker that
-//! opens the directory writes missing copies.
+//! `run/extension-EEE.json` holds versions, columns, the text of the sweep and all that decides which part has which
+//! job. Each holds the checksum of the file before, so the last one stands for all. `run/copies/` holds a second copy
+//! of each: the first that is whole counts. Both are made exclusively. The first file decides which worker was first; a
+//! worker that opens the directory writes missing copies.
 //!
-//! A sweep that differs from the last one in axes, conditions or bounds alone is a further extension; anything else, such
-//! as another model, solver, recording or version, is refused before anything is written.
+//! A sweep that differs from the last one in axes, conditions or bounds alone is a further extension; anything else,
+//! such as another model, solver, recording or version, is refused before anything is written.
 
 #[cfg(test)]
 pub(super) mod tests;
@@ -38,12 +38,14 @@ pub(super) struct Record {
     model_version: u32,
     rng_scheme: String,
     plan_version: u32,
-    /// The id of a job with the model's defaults under this solver and recording: another once other things enter an id.
+    /// The id of a job with the model's defaults under this solver and recording: another once other things enter an
+    /// id.
     identity: String,
     /// Names of the columns of each table that is recorded.
     tables: BTreeMap<String, Vec<String>>,
     part_cost: f64,
-    /// The points that the extension before keeps from when this one began; all, if this is the next round of its sweep.
+    /// The points that the extension before keeps from when this one began; all, if this is the next round of its
+    /// sweep.
     kept_before: Option<Vec<RangeInclusive<u64>>>,
     round: Option<Round>,
     /// Checksum of the file before.
@@ -95,7 +97,8 @@ impl Record {
         checksum::to_json(self).unwrap_or_default()
     }
 
-    /// What distinguishes the parts of the extension from others in their footers: all but what follows from their columns.
+    /// What distinguishes the parts of the extension from others in their footers: all but what follows from their
+    /// columns.
     pub fn footer(&self, name: &str) -> Footer {
         let rest = Self {
             tables: BTreeMap::new(),

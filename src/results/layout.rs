@@ -11,8 +11,9 @@
 //!                run/quarantine/                                         damaged files that a repair took away
 //! ```
 //!
-//! EEE is the number of the extension, FFFFFF that of the part in it. Staging lies on the same file system as the tables,
-//! so that a rename moves a whole file at once, but outside their folders: a stray file there breaks some reader.
+//! EEE is the number of the extension, FFFFFF that of the part in it. Staging lies on the same file system as the
+//! tables, so that a rename moves a whole file at once, but outside their folders: a stray file there breaks some
+//! reader.
 
 use crate::sweep::{PartName, Sweep};
 use crate::table::error::ResultsError;
@@ -109,7 +110,8 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The names of table files in a folder. Hidden names and other endings, which other programs leave, are passed over.
+    /// The names of table files in a folder. Hidden names and other endings, which other programs leave, are passed
+    /// over.
     pub fn table_files(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
         let mut names = self.names_in(folder)?;
         names.retain(|name| is_table_file(name));
@@ -150,7 +152,8 @@ impl<'a> Layout<'a> {
         [self.run(), self.copies()].map(|folder| folder.join(extension_name(number)))
     }
 
-    /// The listed files of extensions, by number, copies last. A network file system may list a file before it finds it.
+    /// The listed files of extensions, by number, copies last. A network file system may list a file before it finds
+    /// it.
     pub(super) fn listed_extensions(&self) -> Result<BTreeMap<usize, Vec<PathBuf>>, StorageError> {
         // In this order: where a copy is listed, its first file was there before.
         let copies = self.names_in(&self.copies())?;
@@ -285,7 +288,8 @@ const LATE: Duration = shorter_in_tests(Duration::from_mins(1), Duration::from_m
 /// Time between two looks.
 const PAUSE: Duration = shorter_in_tests(Duration::from_millis(200), Duration::ZERO);
 
-/// Looks again until something is found, for a minute at most: a host of a network disk may not see yet what a folder lists.
+/// Looks again until something is found, for a minute at most: a host of a network disk may not see yet what a folder
+/// lists.
 pub(super) fn settled<T>(
     mut look: impl FnMut() -> Result<Option<T>, ResultsError>,
 ) -> Result<Option<T>, ResultsError> {

@@ -1,7 +1,7 @@
 //! Events of a run, for displays and for the log.
 //!
-//! The log is lines of JSON in `run/log/`, one file for each run, so that no two hosts write into one file. Tables never
-//! depend on it.
+//! The log is lines of JSON in `run/log/`, one file for each run, so that no two hosts write into one file. Tables
+//! never depend on it.
 
 use crate::results::claims::Marked;
 use crate::results::commit::own_number;
@@ -48,7 +48,8 @@ pub enum RunEvent {
         predicted_cost: f64,
         wall: f64,
     },
-    /// Memory, and not threads, limits the jobs at once: bytes that are free, and bytes that the next job is predicted to take.
+    /// Memory, and not threads, limits the jobs at once: bytes that are free, and bytes that the next job is predicted
+    /// to take.
     ShortOfMemory {
         allowed: f64,
         needed: f64,
@@ -90,7 +91,8 @@ pub enum RunEvent {
 pub struct RunReport {
     /// Jobs run, failed ones included.
     pub jobs_run: u64,
-    /// Jobs that count as failed: all that are asked for if no other worker was there at the end, else those of this run.
+    /// Jobs that count as failed: all that are asked for if no other worker was there at the end, else those of this
+    /// run.
     pub jobs_failed: u64,
     /// Jobs that are missing; other workers run them if this run was not stopped.
     pub jobs_left: u64,

@@ -1,5 +1,5 @@
-//! Rounds of a directory: each is an extension with the same sweep file, begun when all parts of the one before are done.
-//! One worker, which holds a lock, decides what the next round runs, and writes it.
+//! Rounds of a directory: each is an extension with the same sweep file, begun when all parts of the one before are
+//! done. One worker, which holds a lock, decides what the next round runs, and writes it.
 
 use crate::results::commit::exclusive_lock;
 use crate::results::directory::Results;
@@ -59,8 +59,8 @@ impl Results<'_> {
         })
     }
 
-    /// The directory with its next round, once all its parts are done: a round that another worker has begun meanwhile, or
-    /// the one that `decide` chooses. `None` if the rounds are over, or if there are none.
+    /// The directory with its next round, once all its parts are done: a round that another worker has begun meanwhile,
+    /// or the one that `decide` chooses. `None` if the rounds are over, or if there are none.
     pub fn next_round(
         &self,
         member: &Member<'_>,

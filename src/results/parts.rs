@@ -1,8 +1,8 @@
 //! Parts: consecutive jobs of the plan whose rows are committed together, in the plan's order.
 //!
 //! A part has one file in each table. The one in `jobs` comes last, and a part is done if all are there. What a stopped
-//! run had finished of other parts is *spilled*: the same files, with the rows of these jobs alone, aside from the tables
-//! until the part is committed.
+//! run had finished of other parts is *spilled*: the same files, with the rows of these jobs alone, aside from the
+//! tables until the part is committed.
 
 use crate::observe::Measurements;
 use crate::results::commit::Commit;
@@ -30,8 +30,8 @@ pub type Outcome = Result<Measurements, String>;
 pub type Outcomes = BTreeMap<usize, Outcome>;
 
 impl<'a> Results<'a> {
-    /// The files of a table that count beside these of `jobs`: those of the same parts, with as many rows as these say. A
-    /// run killed in between leaves the slips of a part without its jobs. A part without its slips is damaged.
+    /// The files of a table that count beside these of `jobs`: those of the same parts, with as many rows as these say.
+    /// A run killed in between leaves the slips of a part without its jobs. A part without its slips is damaged.
     pub fn committed_files(
         &self,
         table: &str,
@@ -70,8 +70,8 @@ impl<'a> Results<'a> {
         self.write(member, part, outcomes, is_finished, (from, &spill))
     }
 
-    /// Commits a part. Jobs without an outcome keep the rows that they have, in the tables or, at these positions, spilled.
-    /// On an error the part counts as before, or as done, but never as half done.
+    /// Commits a part. Jobs without an outcome keep the rows that they have, in the tables or, at these positions,
+    /// spilled. On an error the part counts as before, or as done, but never as half done.
     pub fn commit(
         &self,
         member: &Member<'_>,
@@ -117,7 +117,8 @@ impl<'a> Results<'a> {
         })
     }
 
-    /// Writes files of a part, from and to the tables or the spill: new rows of jobs with an outcome, old ones of others.
+    /// Writes files of a part, from and to the tables or the spill: new rows of jobs with an outcome, old ones of
+    /// others.
     fn write(
         &self,
         member: &Member<'_>,

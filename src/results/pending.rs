@@ -180,8 +180,8 @@ impl<'a> Pending<'a> {
         }
     }
 
-    /// How far the parts are. Reads finished parts only if jobs of them may run again, or, with `looks`, all of them. Visits
-    /// failed jobs, each with its part, its position and the reason.
+    /// How far the parts are. Reads finished parts only if jobs of them may run again, or, with `looks`, all of them.
+    /// Visits failed jobs, each with its part, its position and the reason.
     pub fn overview(
         &self,
         looks: bool,

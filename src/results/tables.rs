@@ -1,4 +1,5 @@
-//! The tables of a sweep: slips, precursors, jobs. What is measured is described in [`crate::observe`], what labels it here.
+//! The tables of a sweep: slips, precursors, jobs. What is measured is described in [`crate::observe`], what labels it
+//! here.
 //!
 //! Quantities are SI. Nothing in a table says when, where or how fast it was computed.
 

@@ -1,12 +1,13 @@
 //! Workers: the processes that run jobs of a directory, known to each other by a file each.
 //!
-//! `run/workers/<name>` holds host, process and threads. The worker writes it again every [`BEAT`], and removes it when it
-//! ends. On its own host a process is looked up. On another host it lives if its file is at most [`SILENCE`] older than
-//! that of the worker that looks: both times are the file server's, so no clocks are compared.
+//! `run/workers/<name>` holds host, process and threads. The worker writes it again every [`BEAT`], and removes it when
+//! it ends. On its own host a process is looked up. On another host it lives if its file is at most [`SILENCE`] older
+//! than that of the worker that looks: both times are the file server's, so no clocks are compared.
 //!
-//! A worker commits from its staging folder alone. A worker that takes over the parts of a dead worker, or begins another
-//! sweep, removes the dead worker's folder first. So a suspended worker that wakes commits nothing, and reports why. All
-//! living workers run the same sweep: of two that join for different sweeps at once, one at least sees the other, and leaves.
+//! A worker commits from its staging folder alone. A worker that takes over the parts of a dead worker, or begins
+//! another sweep, removes the dead worker's folder first. So a suspended worker that wakes commits nothing, and reports
+//! why. All living workers run the same sweep: of two that join for different sweeps at once, one at least sees the
+//! other, and leaves.
 
 use crate::results::commit::{Commit, own_number};
 use crate::results::layout::{Layout, claim, shorter_in_tests};
@@ -380,8 +381,8 @@ impl<'a> Member<'a> {
         Commit::within(self.layout.storage, &self.staging())
     }
 
-    /// Removes what dead workers left, and marks the parts that they were running. Their claims go only once this worker is
-    /// alone: another may have looked up what is done before they ended.
+    /// Removes what dead workers left, and marks the parts that they were running. Their claims go only once this
+    /// worker is alone: another may have looked up what is done before they ended.
     pub fn tidy(&self) -> Result<(), StorageError> {
         let layout = &self.layout;
         let storage = layout.storage;

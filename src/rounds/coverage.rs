@@ -1,5 +1,5 @@
-//! How often intervals hold the true value: what stopping by looking does to that, and the intervals of all statistics with
-//! the model.
+//! How often intervals hold the true value: what stopping by looking does to that, and the intervals of all statistics
+//! with the model.
 
 use super::{need, seeds_for};
 use crate::model::Parameters;
@@ -324,8 +324,8 @@ fn by_rule(
     Cell::of(&all)
 }
 
-/// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to each
-/// other, with two seeds in common.
+/// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to
+/// each other, with two seeds in common.
 fn of_backbone(pool: &Pool) -> [f64; 2] {
     let seeds = pool.sets[0].1.len();
     let truth = pool.bin(0..seeds);

@@ -4,19 +4,21 @@
 //! chosen jobs that are committed -> sets, reduced -> more seeds, or sets and seeds at edges
 //! ```
 //!
-//! Contract: a round is a pure function of the sweep and of the committed rows of the jobs that its earlier rounds chose: the
-//! same for any threads, workers, kills and order, and for a directory that has had other sweeps.
+//! Contract: a round is a pure function of the sweep and of the committed rows of the jobs that its earlier rounds
+//! chose: the same for any threads, workers, kills and order, and for a directory that has had other sweeps.
 //!
-//! With `[precision]`, a set gets seeds until every statistic is known to the target, or the set has the most. The half-width
-//! h of an interval of n seeds falls as 1/√n, so n (h/target)² seeds are predicted to do. A set gets these, but a quarter more
-//! than it has at least, since the prediction is as uncertain as h, and at most twice as many, so that a poor one costs little.
+//! With `[precision]`, a set gets seeds until every statistic is known to the target, or the set has the most. The
+//! half-width h of an interval of n seeds falls as 1/√n, so n (h/target)² seeds are predicted to do. A set gets these,
+//! but a quarter more than it has at least, since the prediction is as uncertain as h, and at most twice as many, so
+//! that a poor one costs little.
 //!
-//! With `[refine]`, an edge gets a set between its neighbours, until these are close; then seeds of the sets near it, equally
-//! many, until its interval is as narrow as is wanted, by the same rule. All edges share the jobs.
+//! With `[refine]`, an edge gets a set between its neighbours, until these are close; then seeds of the sets near it,
+//! equally many, until its interval is as narrow as is wanted, by the same rule. All edges share the jobs.
 //!
-//! Looking again and again until an interval is short prefers those that are short by chance, and their sets hold the true
-//! value less often than 95 of 100 times: the more so, the fewer seeds it is when a set may end, and the more skewed its
-//! values are. No set ends with fewer than [`MIN_SEEDS`] seeds. What that does to coverage is measured in `docs/rounds.md`.
+//! Looking again and again until an interval is short prefers those that are short by chance, and their sets hold the
+//! true value less often than 95 of 100 times: the more so, the fewer seeds it is when a set may end, and the more
+//! skewed its values are. No set ends with fewer than [`MIN_SEEDS`] seeds. What that does to coverage is measured in
+//! `docs/rounds.md`.
 
 use crate::reduce::{
     Line, SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges,
@@ -31,8 +33,8 @@ mod coverage;
 #[cfg(test)]
 mod tests;
 
-/// The round after those that a directory has, all of whose jobs must be done. A round that chooses no new point would repeat
-/// for ever, so it is the end.
+/// The round after those that a directory has, all of whose jobs must be done. A round that chooses no new point would
+/// repeat for ever, so it is the end.
 pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
     let sweep = results.sweep();
     let round = match sweep.rounds().map(|rounds| &rounds.goal) {
@@ -66,14 +68,14 @@ fn more_seeds(sweep: &Sweep, precision: &Precision, sets: &BTreeMap<u64, SetRow>
     }
 }
 
-/// The seeds that a set with `seeds` seeds and these statistics is to have next: the same number if it has the most. `None` if
-/// every statistic is known to the target, or if no job has a value.
+/// The seeds that a set with `seeds` seeds and these statistics is to have next: the same number if it has the most.
+/// `None` if every statistic is known to the target, or if no job has a value.
 fn need(precision: &Precision, seeds: u64, most: u64, row: &SetRow) -> Option<u64> {
     seeds_for(seeds, error_over_target(row, precision)?, MIN_SEEDS, most)
 }
 
-/// The seeds that a set with `seeds` seeds gets next, if its half-width is `error` times the target; `None` if it needs no more.
-/// It ends with `least` at least, and with `most` at most.
+/// The seeds that a set with `seeds` seeds gets next, if its half-width is `error` times the target; `None` if it needs
+/// no more. It ends with `least` at least, and with `most` at most.
 fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option<u64> {
     let least = least.min(most);
     if error <= 1.0 && seeds >= least {

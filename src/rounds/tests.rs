@@ -86,7 +86,8 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
     }
 }
 
-/// Where on a linear axis the edges of each row lie, with their intervals, and whether these are as narrow as is wanted.
+/// Where on a linear axis the edges of each row lie, with their intervals, and whether these are as narrow as is
+/// wanted.
 fn found(sweep: &Sweep, sets: &BTreeMap<u64, SetOfEdges>) -> Vec<Vec<([f64; 3], bool)>> {
     let axis = sweep.refinement().unwrap().axis;
     let [first, second] = [0, 1].map(|row| sweep.value_at(axis, row).1);
@@ -175,8 +176,8 @@ fn skewed(place: f64) -> f64 {
     2.0 * libm::exp(-libm::exp(-place) * std::f64::consts::LN_2) - 1.0
 }
 
-/// Jobs of plain bisection to the same width, and the share of brackets that hold the edge, in %: a set gets twice as many
-/// seeds until it is clear on which side it lies, and at the cap it counts by its estimate.
+/// Jobs of plain bisection to the same width, and the share of brackets that hold the edge, in %: a set gets twice as
+/// many seeds until it is clear on which side it lies, and at the cap it counts by its estimate.
 fn plain_bisection(
     repetitions: u64,
     steepness: f64,

@@ -1,4 +1,5 @@
-//! The collector hands jobs to the threads, puts their outcomes together into parts, and commits them. Only it uses the disk.
+//! The collector hands jobs to the threads, puts their outcomes together into parts, and commits them. Only it uses the
+//! disk.
 
 use crate::results::ResultsError;
 use crate::results::layout::shorter_in_tests;
@@ -124,8 +125,8 @@ impl<'a, 'e> Collector<'a, 'e> {
         }
     }
 
-    /// Runs pending jobs until none is left for this worker, the flag turns true, the time is over, or something other than
-    /// a job fails. Returns whether it took all that it could.
+    /// Runs pending jobs until none is left for this worker, the flag turns true, the time is over, or something other
+    /// than a job fails. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let mut threads = self.joined.threads;
         let work = Work::new(

@@ -2,8 +2,8 @@
 //!
 //! The number of threads is as asked for, as a batch system grants, or one for each core.
 //!
-//! Walltime: no part is taken when less time is left than the longest part took so far, until it was committed. A part that
-//! takes longer is interrupted at the end, and its finished jobs are kept.
+//! Walltime: no part is taken when less time is left than the longest part took so far, until it was committed. A part
+//! that takes longer is interrupted at the end, and its finished jobs are kept.
 
 use crate::sweep::LARGE;
 use crate::table::shown::shown;
@@ -14,8 +14,8 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Variables that hold the cores of a job, the most specific first: Slurm, OpenMP and HyperQueue, PBS, Grid Engine, LSF.
-/// `HQ_CPUS` is not among them: it lists the cores by their ids.
+/// Variables that hold the cores of a job, the most specific first: Slurm, OpenMP and HyperQueue, PBS, Grid Engine,
+/// LSF. `HQ_CPUS` is not among them: it lists the cores by their ids.
 const VARIABLES: [&str; 5] = [
     "SLURM_CPUS_PER_TASK",
     "OMP_NUM_THREADS",

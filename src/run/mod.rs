@@ -5,10 +5,9 @@
 //! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
-//! Only the kernel runs on other threads than the calling one.
-//! A killed run resumes by looking which part files are missing. The same command, started several times, shares the parts.
-//! An adaptive sweep runs in rounds: the worker that first finds all parts done adds those of the next round (`rounds/`),
-//! and no worker ends before the last round.
+//! Only the kernel runs on other threads than the calling one. A killed run resumes by looking which part files are
+//! missing. The same command, started several times, shares the parts. An adaptive sweep runs in rounds: the worker
+//! that first finds all parts done adds those of the next round (`rounds/`), and no worker ends before the last round.
 //! Contract: the bytes of the tables depend on neither threads nor workers nor interruptions. Memory: the parts with a
 //! job in flight.
 

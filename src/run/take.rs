@@ -1,9 +1,9 @@
 //! Which of the missing parts this worker takes.
 //!
-//! Workers take parts by claims, in two passes. The first goes through the plan, from a place of its own if others run, and
-//! takes unclaimed parts. The second takes the parts of dead workers, until living workers have all that are left. Parts
-//! that may not fit in memory come later, and parts at which workers died last; after some deaths they run alone, as a job
-//! that ends its process must not end others.
+//! Workers take parts by claims, in two passes. The first goes through the plan, from a place of its own if others run,
+//! and takes unclaimed parts. The second takes the parts of dead workers, until living workers have all that are left.
+//! Parts that may not fit in memory come later, and parts at which workers died last; after some deaths they run alone,
+//! as a job that ends its process must not end others.
 //!
 //! Shards: a share of the parts for each of several runs without a common disk.
 //!
@@ -178,8 +178,8 @@ impl<'a> Work<'a> {
         self.jobs.push_front(job);
     }
 
-    /// The next job; `None` while this worker has no job to run. With `is_busy`, other jobs run; with `is_ahead`, the job
-    /// would wait for a thread.
+    /// The next job; `None` while this worker has no job to run. With `is_busy`, other jobs run; with `is_ahead`, the
+    /// job would wait for a thread.
     pub fn next(&mut self, is_busy: bool, is_ahead: bool) -> Result<Option<PartJob>, ResultsError> {
         if self.jobs.is_empty() && !self.has_ended {
             self.take_next(is_busy, is_ahead)?;
@@ -229,7 +229,8 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Takes a part in the first pass: unclaimed, or finished with jobs that may run again and no worker that runs them.
+    /// Takes a part in the first pass: unclaimed, or finished with jobs that may run again and no worker that runs
+    /// them.
     fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
         let name = outline.name.to_string();
         if !self.pending.done.contains(&outline.name) {

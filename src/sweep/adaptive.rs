@@ -1,8 +1,8 @@
 //! An adaptive sweep: its virtual grid, its sets, and its first round.
 //!
-//! The seed axis of the grid has as many seeds as a set may get, and a refined axis is as fine as is wanted. A round runs
-//! some of its points. The first round follows from the sweep; each later one from the rows of earlier rounds, see `rounds/`.
-//! A set is named by the number of its point with the first seed.
+//! The seed axis of the grid has as many seeds as a set may get, and a refined axis is as fine as is wanted. A round
+//! runs some of its points. The first round follows from the sweep; each later one from the rows of earlier rounds, see
+//! `rounds/`. A set is named by the number of its point with the first seed.
 
 use super::axes::Axis;
 use super::grid::{Sweep, find_rows};
@@ -81,8 +81,8 @@ impl Sweep {
         Some(self.set_of(point))
     }
 
-    /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ in
-    /// the period alone are one set.
+    /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ
+    /// in the period alone are one set.
     pub fn set_at(&self, rows: &[u64]) -> Option<u64> {
         self.set_with(&self.point(rows).canonical().parameters)
     }

@@ -1,13 +1,13 @@
 //! Axes: rows of values that move together, and the look-up of a row by the parameters that it leads to.
 //!
 //! A grid axis has one column, a zip or a sample several. The points of a sweep are all combinations of one row of each
-//! axis. Contract: no two rows of an axis are equal, and the values of a column that differ are no twins (`checks.rs`), so
-//! that two points lead to the same parameters only where both are without modulation and differ in nothing but what fixes
-//! the period. Of such points the first counts: the row that [`Axis::is_first`].
+//! axis. Contract: no two rows of an axis are equal, and the values of a column that differ are no twins (`checks.rs`),
+//! so that two points lead to the same parameters only where both are without modulation and differ in nothing but what
+//! fixes the period. Of such points the first counts: the row that [`Axis::is_first`].
 //!
 //! The values of a range are evenly spaced, or fill it together with the ranges of other quantities: Sobol points,
-//! Owen-scrambled (B. Burley, JCGT 9(4), 2020; crate `sobol_burley`). The first points of a longer sample are those of a
-//! shorter one. Logarithms and exponentials come from `libm`: the same bits on every machine.
+//! Owen-scrambled (B. Burley, JCGT 9(4), 2020; crate `sobol_burley`). The first points of a longer sample are those of
+//! a shorter one. Logarithms and exponentials come from `libm`: the same bits on every machine.
 
 use super::quantity::{Point, Quantity};
 use crate::model::{Parameters, Symbol, Value};
@@ -160,7 +160,8 @@ impl Axis {
         Some(Box::new(found.filter_map(seed)))
     }
 
-    /// The only row that can lead to these parameters; without modulation the first of those that differ in the period alone.
+    /// The only row that can lead to these parameters; without modulation the first of those that differ in the period
+    /// alone.
     pub fn find(&self, wanted: &Parameters) -> Option<u64> {
         match self {
             Self::Counted {
@@ -250,7 +251,8 @@ const fn index(row: u64) -> usize {
 
 /// Length of the Sobol sequence.
 pub(super) const MAX_SAMPLE: u64 = 1 << 16;
-/// Significant digits of a value between the ends of a range: 1e-4 as people write it, not what a logarithm makes of it.
+/// Significant digits of a value between the ends of a range: 1e-4 as people write it, not what a logarithm makes of
+/// it.
 const DIGITS: usize = 12;
 
 /// A range of a quantity, low < high.

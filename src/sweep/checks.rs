@@ -1,11 +1,11 @@
 //! Checks of a sweep as a whole: nothing is set twice, nothing is without effect, every job is valid.
 //!
-//! Single values were checked where they were read. What is left are rules between parameters (`N N_s`, `dfs <= fs`, the
-//! period behind η, a whole ramp), checked at every point. No rule reads the seed, so the points of one seed stand for all;
-//! where one of them is invalid, all are walked through, since a condition may drop it.
+//! Single values were checked where they were read. What is left are rules between parameters (`N N_s`, `dfs <= fs`,
+//! the period behind η, a whole ramp), checked at every point. No rule reads the seed, so the points of one seed stand
+//! for all; where one of them is invalid, all are walked through, since a condition may drop it.
 //!
-//! Twins are two values of a quantity that agree in twelve digits but not in all, such as 30 and 29.999999999999996. Both
-//! would be sets with the same realisations, counted twice where rows are grouped by a column.
+//! Twins are two values of a quantity that agree in twelve digits but not in all, such as 30 and 29.999999999999996.
+//! Both would be sets with the same realisations, counted twice where rows are grouped by a column.
 
 use super::axes::Axis;
 use super::grid::Sweep;
@@ -81,8 +81,9 @@ impl<'a> Places<'a> {
     }
 }
 
-/// Most points of a sweep. Each process that works on it walks through all of them before it starts a job, at 0.14 to 0.2 µs
-/// each, and longer where earlier sweeps of the directory are asked for them: seconds, in which nothing needs to be watched.
+/// Most points of a sweep. Each process that works on it walks through all of them before it starts a job, at 0.14 to
+/// 0.2 µs each, and longer where earlier sweeps of the directory are asked for them: seconds, in which nothing needs to
+/// be watched.
 const MAX_POINTS: u64 = 10_000_000;
 
 /// All checks of a sweep that is read. What is new in this program is asked of a new one only.
@@ -105,7 +106,8 @@ pub(super) fn whole(
         ));
     };
     recording(sweep, file)?;
-    // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others continue.
+    // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others
+    // continue.
     let solver = file
         .entry("solver")
         .and_then(|entry| entry.section("[solver]"));
@@ -190,8 +192,8 @@ pub(super) fn rounds(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
 
 /// Drive velocity in m/s from which a slip of microseconds would be driven through: micrometres per second were meant.
 const FAST: f64 = 0.1;
-/// η for which locking is expected: far below, the load hardly swings; far above, a cycle gains less than a slip's inertia
-/// hides.
+/// η for which locking is expected: far below, the load hardly swings; far above, a cycle gains less than a slip's
+/// inertia hides.
 const USUAL_ETA: RangeInclusive<f64> = 1e-3..=1e5;
 /// Most points that are examined for warnings.
 const MAX_LOOKED_AT: usize = 100_000;
@@ -228,8 +230,8 @@ impl Sweep {
     }
 }
 
-/// A period and controls without modulation have no effect, a modulation without period no meaning, and what the drive alone
-/// explains needs controls.
+/// A period and controls without modulation have no effect, a modulation without period no meaning, and what the drive
+/// alone explains needs controls.
 fn modulation(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), Refused> {
     let is_modulated = sweep.points_of_one_seed().any(|point| point.is_modulated());
     match places.set.iter().find(|place| place.quantity.is_period()) {
@@ -377,8 +379,8 @@ impl Sweep {
         quantities.find(|quantity| matches!(quantity, Quantity::Eta | Quantity::Frequency))
     }
 
-    /// The values of a quantity, each once, ascending, also of the period where another quantity fixes it; empty for whole
-    /// numbers and words.
+    /// The values of a quantity, each once, ascending, also of the period where another quantity fixes it; empty for
+    /// whole numbers and words.
     fn reals(&self, quantity: Quantity) -> Vec<f64> {
         let of_axes = self.axes.iter().find_map(|axis| axis.values_of(quantity));
         let values = match (of_axes, quantity) {

@@ -1,8 +1,8 @@
 //! Controls: the same jobs without modulation, from which follows what the drive alone explains (`control = true`).
 //!
-//! They are points of the sweep, after those of its grid: its axes but for those of the modulation, and the conditions that
-//! name none of them, as far as a modulated job needs them. A job of the grid is no control, nor is a set that the grid of
-//! any sweep in the directory has.
+//! They are points of the sweep, after those of its grid: its axes but for those of the modulation, and the conditions
+//! that name none of them, as far as a modulated job needs them. A job of the grid is no control, nor is a set that the
+//! grid of any sweep in the directory has.
 
 use super::axes::{Axis, Column};
 use super::grid::Sweep;

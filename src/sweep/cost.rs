@@ -1,12 +1,12 @@
 //! What a job will cost, from its parameters alone: CPU seconds for balancing parts and for the time left, and memory.
 //!
-//! Contact events and steps, each times what one takes. How many follows from what the slider is expected to do: slip, with
-//! quiet time in between; slide, until the job gives up; or follow a strong modulation. Contract: a pure function in basic
-//! arithmetic and square roots, so that the same file gives the same parts on every machine. Changing a number here changes
-//! the parts: raise [`PLAN_VERSION`](super::PLAN_VERSION) with it.
+//! Contact events and steps, each times what one takes. How many follows from what the slider is expected to do: slip,
+//! with quiet time in between; slide, until the job gives up; or follow a strong modulation. Contract: a pure function
+//! in basic arithmetic and square roots, so that the same file gives the same parts on every machine. Changing a number
+//! here changes the parts: raise [`PLAN_VERSION`](super::PLAN_VERSION) with it.
 //!
-//! Of 301 jobs with 1 to 560 blocks at 1e-6 to 1e-2 m/s, half of them at the edge of sliding or under strong modulation, and
-//! with all methods, some nine of ten cost half to twice the prediction. What it cannot know is when
+//! Of 301 jobs with 1 to 560 blocks at 1e-6 to 1e-2 m/s, half of them at the edge of sliding or under strong
+//! modulation, and with all methods, some nine of ten cost half to twice the prediction. What it cannot know is when
 //! chance ends a job: with few contacts, and where the slider hardly slips.
 
 use crate::model::Parameters;
@@ -20,7 +20,8 @@ const STEP_OF_A_BLOCK: f64 = 0.9e-9;
 /// CPU time of one fixed step beside its blocks, in s: the drive, the observer, the queue of reattachments.
 const STEP_OVERHEAD: f64 = 45e-9;
 
-/// CPU time of a break with its reattachment on the grid, of a step on one block, and of a step beside its blocks, in s.
+/// CPU time of a break with its reattachment on the grid, of a step on one block, and of a step beside its blocks, in
+/// s.
 const GRID_EVENT: f64 = 250e-9;
 const GRID_STEP_OF_A_BLOCK: f64 = 0.2e-9;
 const GRID_STEP_OVERHEAD: f64 = 8e-9;
@@ -39,8 +40,8 @@ const RESOLVED_REATTACHMENTS: f64 = 3.0;
 const RESOLVED_DAMPINGS: f64 = 100.0;
 /// Steps of the grid in a period of the modulation, if its amplitude were the way that the drive makes between slips.
 const STEPS_OF_A_PERIOD: f64 = 250.0;
-/// If the amplitude is more than the first share of that way, each period breaks the second share of the contacts, and motion
-/// is never quiet; if it is more than the third, the slider slips to and fro with the modulation.
+/// If the amplitude is more than the first share of that way, each period breaks the second share of the contacts, and
+/// motion is never quiet; if it is more than the third, the slider slips to and fro with the modulation.
 const SHAKEN: f64 = 0.4;
 const BREAKS_OF_A_PERIOD: f64 = 0.2;
 const FOLLOWS: f64 = 0.6;
@@ -110,8 +111,8 @@ impl Motion {
         let stiffness =
             1.0 / (1.0 / parameters.drive_stiffness + 1.0 / parameters.slider_stiffness);
         let duration = PI * (mass / stiffness).sqrt() + damping / stiffness;
-        // At a velocity v a contact holds for reach/v and is off for the delay, so that friction is half the strength times
-        // reach/(reach + v delay). Sliding is stable where damping grows faster with v than this falls.
+        // At a velocity v a contact holds for reach/v and is off for the delay, so that friction is half the strength
+        // times reach/(reach + v delay). Sliding is stable where damping grows faster with v than this falls.
         let critical =
             ((0.5 * total_strength(parameters) * reach * delay / damping).sqrt() - reach) / delay;
 
@@ -169,8 +170,8 @@ fn step_length(parameters: &Parameters) -> f64 {
         .max(of_modulation)
 }
 
-/// Bytes of memory. Measured with all methods on 100 to 100,000 blocks with 2 to 10,000 contacts each: 340 a contact and 1170 a
-/// block from the beginning of a job on, and 320 a slip.
+/// Bytes of memory. Measured with all methods on 100 to 100,000 blocks with 2 to 10,000 contacts each: 340 a contact
+/// and 1170 a block from the beginning of a job on, and 320 a slip.
 const MEMORY_OF_A_CONTACT: f64 = 350.0;
 const MEMORY_OF_A_BLOCK: f64 = 1250.0;
 /// Until its part is committed, which takes the same again.

@@ -9,8 +9,8 @@
 //! factor     = "-" factor | number | name | "(" sum ")"
 //! ```
 //!
-//! A comparison with something undefined, such as 0/0, does not hold. Names of the conditions of a sweep are the keys of the
-//! parameters, `eta` and `frequency`, in SI. Read by operator precedence (V. R. Pratt, POPL 1973).
+//! A comparison with something undefined, such as 0/0, does not hold. Names of the conditions of a sweep are the keys
+//! of the parameters, `eta` and `frequency`, in SI. Read by operator precedence (V. R. Pratt, POPL 1973).
 
 use std::cmp::Ordering;
 

@@ -1,9 +1,9 @@
 //! A sweep: the points of its axes in grid order, those that are jobs, and the look-up of a job without walking.
 //!
-//! Grid order: axes as in the file, the last moves fastest. A point is a job if the conditions hold and no earlier point
-//! has the same parameters; that happens without modulation only, where T, η and the frequency mean nothing: there the
-//! first row of the axis that fixes the period counts (see [`Axis`]). Conditions see canonical values, so they judge such
-//! points alike. Memory does not grow with the number of points.
+//! Grid order: axes as in the file, the last moves fastest. A point is a job if the conditions hold and no earlier
+//! point has the same parameters; that happens without modulation only, where T, η and the frequency mean nothing:
+//! there the first row of the axis that fixes the period counts (see [`Axis`]). Conditions see canonical values, so
+//! they judge such points alike. Memory does not grow with the number of points.
 
 use super::axes::Axis;
 use super::cost::predicted_cost;
@@ -172,8 +172,8 @@ impl Sweep {
         self
     }
 
-    /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
-    /// that read back to the same bits.
+    /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in
+    /// digits that read back to the same bits.
     pub fn command(&self, job: &Job) -> String {
         let mut words = vec![self.command_of_set(&job.parameters)];
         let seed = job.parameters.seed;

@@ -1,8 +1,8 @@
 //! A job, and the names by which results know it.
 //!
-//! An id is the first half of SHA-256 over the model version, the scheme of random numbers, and all of solver, recording
-//! and parameters that is not at its default, parameters with their exact bits: never over the place in a grid. So keys that
-//! are added later change no id. Contract: pinned by known-answer tests, and so are the defaults.
+//! An id is the first half of SHA-256 over the model version, the scheme of random numbers, and all of solver,
+//! recording and parameters that is not at its default, parameters with their exact bits: never over the place in a
+//! grid. So keys that are added later change no id. Contract: pinned by known-answer tests, and so are the defaults.
 
 use crate::model::Selection;
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Symbol, Value};
@@ -35,8 +35,8 @@ pub(super) fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
         .collect()
 }
 
-/// Keys and values of the solver and the recording. The longest time, the budget of events and the controls count as the
-/// default: they change no job that ends by itself.
+/// Keys and values of the solver and the recording. The longest time, the budget of events and the controls count as
+/// the default: they change no job that ends by itself.
 pub(super) fn settings(
     solver: Solver,
     recording: &Recording,
@@ -151,8 +151,8 @@ mod tests {
 
     #[test]
     fn defaults_are_pinned() {
-        // What is at its default is no part of an id: with another default an id would name another job. Change one, and
-        // raise MODEL_VERSION; what is added is added here alone.
+        // What is at its default is no part of an id: with another default an id would name another job. Change one,
+        // and raise MODEL_VERSION; what is added is added here alone.
         let defaults = Parameters::default();
         let parameters =
             Symbol::ALL.map(|symbol| format!("{}={}", symbol.key(), defaults.get(symbol)));

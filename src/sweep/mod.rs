@@ -10,9 +10,9 @@
 //! variation.rs: a file with other values, as text
 //! ```
 //!
-//! Nothing here runs or writes anything. A plan is a function of texts and of the jobs that were done earlier: the same jobs in
-//! the same order, the same ids, the same parts on every machine. Points are never held: a sweep walks through them, and looks
-//! one up without walking.
+//! Nothing here runs or writes anything. A plan is a function of texts and of the jobs that were done earlier: the same
+//! jobs in the same order, the same ids, the same parts on every machine. Points are never held: a sweep walks through
+//! them, and looks one up without walking.
 
 mod adaptive;
 mod axes;
@@ -47,6 +47,6 @@ pub use rounds::{
 pub use source::{Mistake, SweepError};
 pub use variation::{Change, varied};
 
-/// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,
-/// is left to [`Sweep::parse`].
+/// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <=
+/// fs`, is left to [`Sweep::parse`].
 pub const SCHEMA: &str = include_str!("../../docs/sweep.schema.json");

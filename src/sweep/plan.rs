@@ -1,11 +1,11 @@
 //! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
 //!
 //! Each sweep that is run in a directory opens an *extension*, which owns its jobs except those that earlier extensions
-//! keep: what they had done by then. Each round of an adaptive sweep is one, too. A *part* is a run of consecutive jobs of an
-//! extension, committed together. Parts are small, so that many workers can share them and little is lost with one, but not
-//! many: see [`Extension::new`].
-//! Contract: parts are a function of the texts of the sweeps, of what was done when each began, and of [`PLAN_VERSION`].
-//! Memory: one part. The outlines of all parts, from which single parts are built again, take some 60 bytes each.
+//! keep: what they had done by then. Each round of an adaptive sweep is one, too. A *part* is a run of consecutive jobs
+//! of an extension, committed together. Parts are small, so that many workers can share them and little is lost with
+//! one, but not many: see [`Extension::new`]. Contract: parts are a function of the texts of the sweeps, of what was
+//! done when each began, and of [`PLAN_VERSION`]. Memory: one part. The outlines of all parts, from which single parts
+//! are built again, take some 60 bytes each.
 
 use super::cost::{MEMORY_OF_A_SLIP, predicted_memory};
 use super::grid::Sweep;
@@ -18,7 +18,8 @@ use std::ops::{Deref, Range, RangeInclusive};
 pub const PART_COST: f64 = 5.0;
 /// Least number of parts of a sweep with jobs of equal cost, if it has as many jobs: enough for some dozens of workers.
 const MIN_PARTS: f64 = if cfg!(test) { 2.0 } else { 64.0 };
-/// Least predicted CPU time of a part of a round, in s: of many rounds, most have few jobs, and a commit takes some 20 ms.
+/// Least predicted CPU time of a part of a round, in s: of many rounds, most have few jobs, and a commit takes some 20
+/// ms.
 const ROUND_PART_COST: f64 = if cfg!(test) { 0.0 } else { 0.25 };
 /// A sweep has hardly more parts than twice this: names in a folder stay few.
 const MANY_PARTS: f64 = 20_000.0;
@@ -26,8 +27,8 @@ const MANY_PARTS: f64 = 20_000.0;
 const ROUNDING: f64 = 1e-9;
 /// Most jobs of a part, so that a part of cheap jobs fits in memory.
 pub const PART_JOBS: usize = 4096;
-/// Version of how sweeps become parts: values of axes, order, cost and limits. A directory keeps the one that it was started
-/// with.
+/// Version of how sweeps become parts: values of axes, order, cost and limits. A directory keeps the one that it was
+/// started with.
 pub const PLAN_VERSION: u32 = 7;
 
 /// A sweep of a directory, and what of it counts there.
@@ -36,8 +37,8 @@ pub struct Extension {
     pub sweep: Sweep,
     /// Most predicted CPU time of a part with more than one job, in s.
     pub part_cost: f64,
-    /// Where in the grid the jobs lie that it keeps, as first and last points of its parts; `None` for the last extension,
-    /// which owns all that no earlier one keeps.
+    /// Where in the grid the jobs lie that it keeps, as first and last points of its parts; `None` for the last
+    /// extension, which owns all that no earlier one keeps.
     pub kept: Option<Vec<RangeInclusive<u64>>>,
     /// Its round in an adaptive sweep; in any other sweep, all points are jobs.
     pub round: Option<Round>,
@@ -102,8 +103,8 @@ pub struct Totals {
 }
 
 impl Extension {
-    /// Begins an extension. Its parts have a 64th of its predicted cost at most, and mostly 5 s; where that would be too
-    /// many, a 20,000th. An expensive job is a separate part.
+    /// Begins an extension. Its parts have a 64th of its predicted cost at most, and mostly 5 s; where that would be
+    /// too many, a 20,000th. An expensive job is a separate part.
     pub fn new(sweep: &Sweep, earlier: &[Self]) -> Self {
         Self::in_round(sweep, earlier, sweep.first_round())
     }
@@ -158,7 +159,8 @@ fn own_jobs<'a>(
 }
 
 impl<'a> Plan<'a> {
-    /// The plan of these extensions. Their sweeps differ in axes, conditions and bounds only, see [`Sweep::differences`].
+    /// The plan of these extensions. Their sweeps differ in axes, conditions and bounds only, see
+    /// [`Sweep::differences`].
     pub const fn new(extensions: &'a [Extension]) -> Self {
         Self { extensions }
     }

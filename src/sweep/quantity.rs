@@ -154,8 +154,8 @@ impl Point {
         }
     }
 
-    /// A quantity of a canonical point as a number; NaN for a word. Without modulation η and the frequency are 0 and T is
-    /// infinite. What an axis has set is returned unchanged.
+    /// A quantity of a canonical point as a number; NaN for a word. Without modulation η and the frequency are 0 and T
+    /// is infinite. What an axis has set is returned unchanged.
     pub fn number(&self, quantity: Quantity) -> f64 {
         let parameters = &self.parameters;
         match (quantity, self.fixes_period) {

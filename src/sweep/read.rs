@@ -50,8 +50,8 @@ impl Sweep {
         read(&source, true, PLAN_VERSION).map_err(|_| source.error())
     }
 
-    /// The same with a text that a results directory holds, under its version of the plan: what its sweep was allowed when it
-    /// began stays readable.
+    /// The same with a text that a results directory holds, under its version of the plan: what its sweep was allowed
+    /// when it began stays readable.
     pub fn parse_stored(text: &str, path: &Path, plan_version: u32) -> Result<Self, SweepError> {
         let source = Source::new(path, text);
         read(&source, false, plan_version).map_err(|_| source.error())

@@ -8,8 +8,9 @@
 //! [axes.sobol]                                  points, seed and a range for each quantity
 //! ```
 //!
-//! Axes stand in the order of the file; the last moves fastest. Values of a range are rounded to twelve digits, those of a
-//! whole-number quantity to whole numbers. An axis reports its first mistake, a zip or a sample that of each column.
+//! Axes stand in the order of the file; the last moves fastest. Values of a range are rounded to twelve digits, those
+//! of a whole-number quantity to whole numbers. An axis reports its first mistake, a zip or a sample that of each
+//! column.
 
 use super::axes::{Axis, Column, MAX_ROWS, MAX_SAMPLE, Range, Repeated, sobol};
 use super::checks::Places;

@@ -77,7 +77,8 @@ pub(super) fn read_seeds(
     })
 }
 
-/// Reads a statistic that is allowed, or a list of them; `problem` is what is wrong with others, before the allowed ones.
+/// Reads a statistic that is allowed, or a list of them; `problem` is what is wrong with others, before the allowed
+/// ones.
 fn read_statistics(
     entry: &Entry<'_>,
     is_allowed: fn(Statistic) -> bool,

@@ -101,7 +101,8 @@ pub struct Standing {
 pub struct Bounds {
     pub sets: u64,
     pub jobs: u64,
-    /// Predicted CPU time of these jobs, in s; sets that are not known yet count as the most expensive of the first round.
+    /// Predicted CPU time of these jobs, in s; sets that are not known yet count as the most expensive of the first
+    /// round.
     pub predicted_cost: f64,
 }
 

@@ -1,11 +1,11 @@
 //! The text of a sweep file: sections, entries and values that know their place, and errors that name it.
 //!
-//! A mistake is reported where it is found, and [`Refused`] says so from there on: the reader continues with what does not
-//! depend on it, and all mistakes of a file are reported at once.
+//! A mistake is reported where it is found, and [`Refused`] says so from there on: the reader continues with what does
+//! not depend on it, and all mistakes of a file are reported at once.
 //!
-//! Reads TOML with spans (crate `toml`), so that every refusal says file, line, key and value as written. Not by serde's
-//! derive: the keys come from tables ([`fields!`](crate::model::fields)) or are open, and its errors name neither the
-//! value as written nor the way out.
+//! Reads TOML with spans (crate `toml`), so that every refusal says file, line, key and value as written. Not by
+//! serde's derive: the keys come from tables ([`fields!`](crate::model::fields)) or are open, and its errors name
+//! neither the value as written nor the way out.
 
 use super::quantity::{Quantity, hint, nearest};
 use crate::table::shown::{shown, shown_text};

@@ -48,8 +48,8 @@ impl Change {
         }
     }
 
-    /// A key with several values: `1e-5,1e-4`, `log:1e-5:1e-3:9`, `linear:0:1e-6:5`, `count:4`, or as a sweep file has them.
-    /// The error is what to write in place of others.
+    /// A key with several values: `1e-5,1e-4`, `log:1e-5:1e-3:9`, `linear:0:1e-6:5`, `count:4`, or as a sweep file has
+    /// them. The error is what to write in place of others.
     pub fn axis(key: &str, values: &str) -> Result<Self, &'static str> {
         let value = match values.split(':').map(str::trim).collect::<Vec<_>>()[..] {
             _ if values.starts_with(['[', '{']) => values.to_owned(),
@@ -91,9 +91,9 @@ fn scalar(text: &str) -> String {
     }
 }
 
-/// The text of a sweep file with these changes. A key leaves all other sections, so that an axis becomes a parameter, or the
-/// other way round; a new key for the period, the target or the seeds replaces the one that is there; Delta = 0 removes all
-/// that has no effect without modulation. A text that is not TOML stays unchanged.
+/// The text of a sweep file with these changes. A key leaves all other sections, so that an axis becomes a parameter,
+/// or the other way round; a new key for the period, the target or the seeds replaces the one that is there; Delta = 0
+/// removes all that has no effect without modulation. A text that is not TOML stays unchanged.
 pub fn varied(text: &str, changes: &[Change]) -> String {
     let Ok(mut document) = text.parse::<DocumentMut>() else {
         return text.to_owned();

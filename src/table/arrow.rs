@@ -1,8 +1,8 @@
 //! Rows as Arrow record batches and as JSON.
 //!
-//! Units stand in the metadata of every Arrow field (`unit`, `description`) and, as JSON under `PANDAS_ATTRS`, in that of the
-//! Arrow schema, where pandas finds them for `DataFrame.attrs`. Counts are signed: differences of unsigned columns wrap
-//! around in every reader.
+//! Units stand in the metadata of every Arrow field (`unit`, `description`) and, as JSON under `PANDAS_ATTRS`, in that
+//! of the Arrow schema, where pandas finds them for `DataFrame.attrs`. Counts are signed: differences of unsigned
+//! columns wrap around in every reader.
 
 use super::columns::{Column, Field as _, Kind, Row, Value};
 use arrow_array::builder::{BooleanBuilder, Float64Builder, Int64Builder, StringBuilder};
@@ -90,7 +90,8 @@ pub fn json<R: Row>(row: &R) -> Json {
     object.into()
 }
 
-/// Rows of one table, column by column, before they become a record batch. How rows came in leaves no trace in the batch.
+/// Rows of one table, column by column, before they become a record batch. How rows came in leaves no trace in the
+/// batch.
 pub struct RowBuffer {
     schema: SchemaRef,
     /// One for each column of the row type; `None` for a column that is left out.

@@ -18,8 +18,8 @@ pub enum ErrorKind {
     Stopped,
     /// A file is not as it was written: cut off, changed or no table.
     Damaged,
-    /// A file operation failed, which says nothing about what the file holds; what was committed is kept, and the same can
-    /// be tried again.
+    /// A file operation failed, which says nothing about what the file holds; what was committed is kept, and the same
+    /// can be tried again.
     Disk(io::ErrorKind),
 }
 

@@ -1,8 +1,8 @@
 //! Datasets: a table as Parquet files, written with the same bytes for the same rows, and read file by file.
 //!
-//! zstd; doubles plain, other columns with dictionaries, which every reader knows: byte streams would save 1 % of tables and
-//! 4 % of reduced data. The footer holds program, model and sweep, sorted, and a checksum, but no clock, host or
-//! thread count. Row groups are cut by row count alone, so bytes do not depend on how the rows came in.
+//! zstd; doubles plain, other columns with dictionaries, which every reader knows: byte streams would save 1 % of
+//! tables and 4 % of reduced data. The footer holds program, model and sweep, sorted, and a checksum, but no clock,
+//! host or thread count. Row groups are cut by row count alone, so bytes do not depend on how the rows came in.
 
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
 use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};

@@ -1,5 +1,5 @@
-//! Rows of any schema, in the formats of other programs. A format is a variant of [`Format`], its description, its arm in
-//! [`RowWriter::new`], and an `Encoder`.
+//! Rows of any schema, in the formats of other programs. A format is a variant of [`Format`], its description, its arm
+//! in [`RowWriter::new`], and an `Encoder`.
 
 use crate::table::arrow;
 use crate::table::error::ResultsError;

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::path::Path;
 
-/// A path as messages show it: unchanged if it is plain. Control characters and those that turn the direction of writing
-/// are escaped as in Rust, and bytes that are not UTF-8 as `\xff`.
+/// A path as messages show it: unchanged if it is plain. Control characters and those that turn the direction of
+/// writing are escaped as in Rust, and bytes that are not UTF-8 as `\xff`.
 pub fn shown(path: &Path) -> Shown<'_> {
     Shown(path.as_os_str().as_encoded_bytes())
 }
@@ -35,8 +35,8 @@ impl fmt::Display for Shown<'_> {
     }
 }
 
-/// Whether a terminal shows a character for what it is, and nothing else happens: neither one that turns the direction of
-/// writing, nor one that cannot be seen or looks like a space.
+/// Whether a terminal shows a character for what it is, and nothing else happens: neither one that turns the direction
+/// of writing, nor one that cannot be seen or looks like a space.
 pub fn is_plain(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     let has_no_width = matches!(

@@ -71,13 +71,15 @@ pub trait Storage: Sync {
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError>;
     /// Renames a file within the file system, over another if there is one; or a folder.
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
-    /// Gives a file a second name that nothing has; false if something has it. Copies it where files have one name only.
+    /// Gives a file a second name that nothing has; false if something has it. Copies it where files have one name
+    /// only.
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError>;
     /// Returns when the names in a folder are on the disk.
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError>;
     /// Names in a folder, sorted; empty if there is no such folder.
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError>;
-    /// Opens a regular file for reading. Of anything else that has its name, the error [is no file](StorageError::is_no_file).
+    /// Opens a regular file for reading. Of anything else that has its name, the error [is no
+    /// file](StorageError::is_no_file).
     fn open(&self, file: &Path) -> Result<File, StorageError>;
     fn exists(&self, file: &Path) -> Result<bool, StorageError>;
     fn remove(&self, file: &Path) -> Result<(), StorageError>;

@@ -1,5 +1,5 @@
-//! A corpus of damage to results directories: each kind is found and named, nothing is changed by looking, and the commands
-//! that are printed make the tables what they were.
+//! A corpus of damage to results directories: each kind is found and named, nothing is changed by looking, and the
+//! commands that are printed make the tables what they were.
 
 use crate::program::{Ended, Folder};
 use serde_json::Value;

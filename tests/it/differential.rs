@@ -276,8 +276,8 @@ fn by_life(breaks: &[Found]) -> Lives {
     breaks.iter().map(|found| (found.life, *found)).collect()
 }
 
-/// The first break at which a run differs from a reference by more than is allowed, in words; else how many were compared,
-/// up to where the bound is coarse, and the largest ratio of difference and bound.
+/// The first break at which a run differs from a reference by more than is allowed, in words; else how many were
+/// compared, up to where the bound is coarse, and the largest ratio of difference and bound.
 fn compare(reference: &Run, allowed: &[f64], run: &Run) -> Result<(usize, f64), String> {
     let times = by_life(&run.breaks);
     let (mut compared, mut worst, mut until) = (0, 0.0_f64, 0.0);
@@ -521,8 +521,8 @@ fn check_fixed_step(
     })
 }
 
-/// Compares number, times and sizes of the slips that end before the last of the breaks compared. Observers may be told of
-/// breaks `late` s after their time; displacements may be off by a part `size` of the contact reach.
+/// Compares number, times and sizes of the slips that end before the last of the breaks compared. Observers may be told
+/// of breaks `late` s after their time; displacements may be off by a part `size` of the contact reach.
 fn compare_slips(
     parameters: &Parameters,
     reference: &Run,

@@ -19,7 +19,8 @@ struct ContactSums {
 
 /// Accelerations x'' of the blocks, in m/s²: the equation of motion, term by term.
 ///
-/// `displacement` in m, `velocity` in m/s and `contacts` have one entry a block; the drive is that of the cycle at `time`.
+/// `displacement` in m, `velocity` in m/s and `contacts` have one entry a block; the drive is that of the cycle at
+/// `time`.
 fn acceleration(
     parameters: &Parameters,
     drive: &Drive,
@@ -50,8 +51,8 @@ fn acceleration(
     (0..x.len()).map(of_block).collect()
 }
 
-/// Keeps the stiffness of the attached contacts of each block at the start, the number of breaks, and the displacements at
-/// the end.
+/// Keeps the stiffness of the attached contacts of each block at the start, the number of breaks, and the displacements
+/// at the end.
 #[derive(Default)]
 struct Contacts {
     sums: Vec<ContactSums>,

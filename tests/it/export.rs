@@ -1,4 +1,5 @@
-//! Exports by the built program: the same bytes whatever the history, all formats with the same rows, and no join needed.
+//! Exports by the built program: the same bytes whatever the history, all formats with the same rows, and no join
+//! needed.
 
 use crate::program::{Folder, json};
 use std::collections::BTreeMap;

@@ -1,4 +1,5 @@
-//! Jobs that fail, in the built program: they stop no other, are reported with their reason, and can be run again alone.
+//! Jobs that fail, in the built program: they stop no other, are reported with their reason, and can be run again
+//! alone.
 
 use crate::program::{FAILING, Folder, json};
 use std::collections::BTreeMap;

@@ -1,5 +1,5 @@
-//! Fuzzing of what is read from files that others may have changed: sweep files, the files in `run/`, tables. No panic, no
-//! hang, and never another result than that of the file as it was written.
+//! Fuzzing of what is read from files that others may have changed: sweep files, the files in `run/`, tables. No panic,
+//! no hang, and never another result than that of the file as it was written.
 //!
 //! `PROPTEST_CASES` sets the number of cases of each test.
 

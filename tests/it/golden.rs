@@ -1,7 +1,8 @@
-//! The golden net: tables, reduced data and figures of small sweeps have the bytes that are written down in `tests/golden/`,
-//! for one thread and for several, and after a kill and a resume.
+//! The golden net: tables, reduced data and figures of small sweeps have the bytes that are written down in
+//! `tests/golden/`, for one thread and for several, and after a kill and a resume.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --release --test it golden` writes them again, after a change that is meant to change results.
+//! `UPDATE_GOLDEN=1 cargo test --release --test it golden` writes them again, after a change that is meant to change
+//! results.
 
 use crate::program::{Cell, Folder, Rows, TABLES, wait};
 use sha2::{Digest, Sha256};

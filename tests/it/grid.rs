@@ -1,4 +1,5 @@
-//! The grid of the event-driven solver: break times of fourth order, the same slips as in Taylor steps, and what chooses it.
+//! The grid of the event-driven solver: break times of fourth order, the same slips as in Taylor steps, and what
+//! chooses it.
 
 use std::collections::HashMap;
 use stickslip::model::{Change, ContactEvent, Parameters};

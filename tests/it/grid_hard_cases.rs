@@ -246,8 +246,8 @@ fn run(parameters: &Parameters, solver: Solver, end_time: f64) -> Outcome {
     }
 }
 
-/// Events in order; a contact attaches when it is detached, and breaks in the life in which it attached, at its threshold
-/// and with the force of its elongation.
+/// Events in order; a contact attaches when it is detached, and breaks in the life in which it attached, at its
+/// threshold and with the force of its elongation.
 fn assert_consistent(name: &str, parameters: &Parameters, events: &[ContactEvent]) {
     let mut attached: HashMap<(usize, usize), ContactEvent> = HashMap::new();
     let mut lives: HashMap<(usize, usize), u32> = HashMap::new();

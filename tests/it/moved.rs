@@ -1,5 +1,5 @@
-//! A results directory that is moved, removed or replaced under a run: the run ends with an error, and nothing is written
-//! at its old place.
+//! A results directory that is moved, removed or replaced under a run: the run ends with an error, and nothing is
+//! written at its old place.
 
 use crate::program::{Folder, wait};
 use std::fs;

@@ -122,7 +122,8 @@ fn slips_of_a_few_blocks_let_go_of_most_contacts() {
     }
 }
 
-/// With Δ = 5 µm and 200 Hz the drive still pulls harder when the rupture reaches the leading edge; without, it never does.
+/// With Δ = 5 µm and 200 Hz the drive still pulls harder when the rupture reaches the leading edge; without, it never
+/// does.
 #[test]
 fn onsets_that_are_cut_off_are_flagged() {
     let cut = |parameters: &Parameters| {

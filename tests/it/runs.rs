@@ -1,5 +1,5 @@
-//! Whole runs of the built program: where results lie, that interruptions, threads, shards and extensions leave no trace in
-//! them, and what exit codes say.
+//! Whole runs of the built program: where results lie, that interruptions, threads, shards and extensions leave no
+//! trace in them, and what exit codes say.
 
 use crate::program::{Cell, FAILING, Folder, MANY, MANY_PARTS, json, wait};
 use std::fs;

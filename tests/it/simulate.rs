@@ -1,5 +1,5 @@
-//! One simulation on the command line: the first break of the model, the same slips as in a sweep, and records that agree
-//! with each other.
+//! One simulation on the command line: the first break of the model, the same slips as in a sweep, and records that
+//! agree with each other.
 
 use crate::program::{Folder, Rows, json};
 use std::collections::BTreeMap;
@@ -190,8 +190,8 @@ fn trace_and_map_agree_with_each_other_and_with_the_slips() {
             .all(|fraction| (0.0..=1.0).contains(fraction))
     );
     assert_eq!(attached[0], 1.0);
-    // The drive begins at F_S = 0. A leap reports the driven solution, without the free motion that dies away on its way: here
-    // that of the start, seen to be 0.02 N.
+    // The drive begins at F_S = 0. A leap reports the driven solution, without the free motion that dies away on its
+    // way: here that of the start, seen to be 0.02 N.
     assert!(forces[0].abs() < 0.05, "{} N", forces[0]);
     // A slip lets go of nearly all contacts at once.
     let least = attached.iter().copied().fold(1.0, f64::min);
@@ -303,7 +303,8 @@ fn a_plot_shows_the_panels_and_the_time_that_were_asked_for_in_every_file() {
             .starts_with(b"\x89PNG")
     );
     assert!(force.contains("Shear force") && !force.contains("Position x"));
-    // The ends of the axis bear numbers, though 1800 samples of 1e-4 s are a hair more than 0.18 s; nothing lies beyond.
+    // The ends of the axis bear numbers, though 1800 samples of 1e-4 s are a hair more than 0.18 s; nothing lies
+    // beyond.
     for (time, is_shown) in [("90", false), ("100", true), ("180", true), ("190", false)] {
         assert_eq!(force.contains(&format!(">{time}<")), is_shown, "{time}");
     }

@@ -1,5 +1,5 @@
-//! Statistics of the model with the default solver against those of an independent event-exact implementation, and Eq. 1
-//! against the simulated profile.
+//! Statistics of the model with the default solver against those of an independent event-exact implementation, and Eq.
+//! 1 against the simulated profile.
 //!
 //! Reference, at V0 = 1e-4 m/s with about 1,000 slips each (standard error of the mean in brackets):
 //!
@@ -162,7 +162,8 @@ fn identical_contacts_keep_the_distribution_broad() {
 
 #[test]
 fn modulated_intervals_sit_on_multiples_of_the_period_at_29_and_58_hz() {
-    // (1/T in Hz, mean of the reference in s, its median in periods: 4/29 s = 8/58 s). A longer run gave locking indices of 0.874 and 0.893.
+    // (1/T in Hz, mean of the reference in s, its median in periods: 4/29 s = 8/58 s). A longer run gave locking
+    // indices of 0.874 and 0.893.
     for (frequency, mean, periods) in [(29.0, 0.1371, 4), (58.0, 0.1273, 8)] {
         let intervals = Intervals::of(&modulated(frequency), 8, 40);
         let shown = intervals.describe();
@@ -369,8 +370,8 @@ impl Observer for FirstBreak {
     }
 }
 
-/// Displacement over that of the trailing edge, of the block and at the instant of the first break: as simulated, and by
-/// the static chain with the very contacts of this realisation.
+/// Displacement over that of the trailing edge, of the block and at the instant of the first break: as simulated, and
+/// by the static chain with the very contacts of this realisation.
 fn profile_at_the_first_break(parameters: &Parameters) -> (usize, f64, f64) {
     let mut observer = FirstBreak {
         contacts: vec![0.0; parameters.blocks],
@@ -401,8 +402,8 @@ fn profile_at_the_first_break(parameters: &Parameters) -> (usize, f64, f64) {
 
 #[test]
 fn displacement_before_the_first_break_decays_as_eq_1() {
-    // A wide spread of thresholds, so that the first contact to break lies now here, now there; slow, so that inertia and
-    // damping are below 1e-4 of the forces.
+    // A wide spread of thresholds, so that the first contact to break lies now here, now there; slow, so that inertia
+    // and damping are below 1e-4 of the forces.
     let of_seed = |seed| Parameters {
         seed,
         threshold_deviation: 0.45,
@@ -420,7 +421,8 @@ fn displacement_before_the_first_break_decays_as_eq_1() {
             block + 1
         );
     }
-    // The spread makes contacts softer, k E[sqrt(f/fs)], which takes 0.7 % from the rate, and differs from block to block.
+    // The spread makes contacts softer, k E[sqrt(f/fs)], which takes 0.7 % from the rate, and differs from block to
+    // block.
     let rates: Vec<f64> = profiles
         .iter()
         .filter(|(block, ..)| *block >= 3)

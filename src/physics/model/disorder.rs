@@ -15,8 +15,8 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 /// Name and version of the mapping from (seed, contact, generation) to a contact; written into every result.
 pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
 
-/// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits. A third deviate needs words beyond those
-/// of all redraws, or another `RNG_SCHEME`: a wider draw would change every contact.
+/// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits. A third deviate needs words
+/// beyond those of all redraws, or another `RNG_SCHEME`: a wider draw would change every contact.
 const WORDS_PER_DRAW: u128 = 4;
 /// Generations in one refill of 64 words, the four blocks that the generator makes at a time.
 const DRAWS_PER_REFILL: u32 = 16;

@@ -130,8 +130,8 @@ impl Drive {
         }
     }
 
-    /// When the driven end first gets as far as it would be at a time in s of the present cycle without modulation, in s: the
-    /// first t with u(t) >= V0 `time`.
+    /// When the driven end first gets as far as it would be at a time in s of the present cycle without modulation, in
+    /// s: the first t with u(t) >= V0 `time`.
     pub fn first_passage(&self, time: f64) -> f64 {
         const STEPS: u32 = 60;
         if !self.is_modulated() {

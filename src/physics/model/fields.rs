@@ -26,8 +26,8 @@
 //! | `"meaning"` | one line, without a full stop; it also heads columns of tables |
 //!
 //! Each row yields the field with its documentation, its default, its [`Description`], access by key, and a row of the
-//! table in `docs/`, which the tests write with `UPDATE_DOCS=1`. All this is tested with [`Parameters`](super::Parameters),
-//! in `parameters.rs`.
+//! table in `docs/`, which the tests write with `UPDATE_DOCS=1`. All this is tested with
+//! [`Parameters`](super::Parameters), in `parameters.rs`.
 
 use crate::columns::Column;
 use crate::value::Kind;

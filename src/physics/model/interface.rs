@@ -113,8 +113,8 @@ impl Attached {
     }
 }
 
-/// The force of eight contacts on their block, and where they break. Contact i of a block lies in row i div 8 of the block, lane
-/// i mod 8. Lanes beyond the last contact stay detached for ever.
+/// The force of eight contacts on their block, and where they break. Contact i of a block lies in row i div 8 of the
+/// block, lane i mod 8. Lanes beyond the last contact stay detached for ever.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 struct ContactRow {
@@ -270,8 +270,8 @@ impl Interface {
         next
     }
 
-    /// Visits the reattachments to come, in order, with time in s, block, and the life that begins, as long as `visit` is
-    /// true.
+    /// Visits the reattachments to come, in order, with time in s, block, and the life that begins, as long as `visit`
+    /// is true.
     pub fn look_ahead(&mut self, mut visit: impl FnMut(f64, usize, &Contact) -> bool) {
         let lives = &self.lives;
         let rows_per_block = self.rows_per_block;
@@ -315,8 +315,8 @@ impl Interface {
         change
     }
 
-    /// Breaks and counts every contact of a block whose threshold is reached at this displacement, in the order of contacts.
-    /// Passes each to `log`, with what `count` gives.
+    /// Breaks and counts every contact of a block whose threshold is reached at this displacement, in the order of
+    /// contacts. Passes each to `log`, with what `count` gives.
     #[inline(always)]
     pub fn break_reached(
         &mut self,
@@ -342,8 +342,8 @@ impl Interface {
         self.gather(Scalar512b, block);
     }
 
-    /// Writes the contacts of a block that break up to a displacement in m, with their break positions in m, in the order
-    /// in which the block comes to them.
+    /// Writes the contacts of a block that break up to a displacement in m, with their break positions in m, in the
+    /// order in which the block comes to them.
     #[inline(always)]
     pub(crate) fn reached<S: Simd>(
         &self,
@@ -386,8 +386,8 @@ impl Interface {
         }
     }
 
-    /// Breaks one contact, at a break position in m. Returns the change, and when the contact reattaches, in s. Leaves the
-    /// block's sums and nearest break positions unchanged: see [`Self::gather`].
+    /// Breaks one contact, at a break position in m. Returns the change, and when the contact reattaches, in s. Leaves
+    /// the block's sums and nearest break positions unchanged: see [`Self::gather`].
     #[inline(always)]
     pub(crate) fn break_contact<S: Simd>(
         &mut self,
@@ -401,8 +401,8 @@ impl Interface {
         (change, self.detach(simd, block, contact, time))
     }
 
-    /// Counts a change, in the order of time. Returns how many contacts are attached after it, and the integral of that number
-    /// up to there, in s.
+    /// Counts a change, in the order of time. Returns how many contacts are attached after it, and the integral of that
+    /// number up to there, in s.
     #[inline(always)]
     pub(crate) fn count(&mut self, change: &ContactChange) -> (u64, f64) {
         self.attached.change(change.change, change.time);

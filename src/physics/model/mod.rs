@@ -1,4 +1,5 @@
-//! The paper's equations: parameters, equation of motion, drive, interface, disorder, theory. Knows no solver and no file.
+//! The paper's equations: parameters, equation of motion, drive, interface, disorder, theory. Knows no solver and no
+//! file.
 
 mod disorder;
 mod drive;
@@ -20,6 +21,6 @@ pub(crate) use simd::{LANES, Row};
 /// The value of a parameter, in a file, on an axis or in a table.
 pub type Value = crate::value::Value<'static>;
 
-/// Version of equations, definitions and defaults; part of every job id. Raised when the same parameters, or a file that leaves
-/// them out, give other results.
+/// Version of equations, definitions and defaults; part of every job id. Raised when the same parameters, or a file
+/// that leaves them out, give other results.
 pub const MODEL_VERSION: u32 = 6;

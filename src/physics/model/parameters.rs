@@ -66,7 +66,8 @@ fields! {
 
 /// Largest number of contacts; a job holds about 350 bytes for each.
 const MAX_CONTACTS: usize = 10_000_000;
-/// Longest time between slips, in s: far beyond it, times and rates leave the range of doubles, and nothing ever breaks.
+/// Longest time between slips, in s: far beyond it, times and rates leave the range of doubles, and nothing ever
+/// breaks.
 const MAX_INTERVAL: f64 = 1e100;
 /// Longest ramp, in periods: each is one cycle to be stepped over.
 const MAX_RAMPED_PERIODS: f64 = 1e9;
@@ -97,8 +98,8 @@ impl Parameters {
         })
     }
 
-    /// Checks every range and rule and brings the values into canonical form: without modulation there is no period, and
-    /// no negative zero.
+    /// Checks every range and rule and brings the values into canonical form: without modulation there is no period,
+    /// and no negative zero.
     pub fn validated(mut self) -> Result<Self, ParameterError> {
         for symbol in Symbol::ALL {
             let value = self.get(symbol);
@@ -232,8 +233,8 @@ pub trait Selection {
     const SYMBOLS: &'static [Symbol];
 }
 
-/// Some of the parameters as columns, under their keys and with their units and meanings. Read back, the others have their
-/// defaults.
+/// Some of the parameters as columns, under their keys and with their units and meanings. Read back, the others have
+/// their defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selected<S> {
     pub parameters: Parameters,

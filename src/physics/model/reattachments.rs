@@ -1,8 +1,8 @@
 //! The reattachments to come, in order of time: a calendar queue (R. Brown, Commun. ACM 31, 1220, 1988).
 //!
-//! Times fall into bins of a fraction of the mean delay; the present bin is sorted, those ahead are lists, and what lies
-//! beyond a turn of the calendar waits aside. A contact has at most one reattachment, so lists run through the contacts
-//! and nothing is allocated. Contract: reattachments come in order of time, then block, then contact.
+//! Times fall into bins of a fraction of the mean delay; the present bin is sorted, those ahead are lists, and what
+//! lies beyond a turn of the calendar waits aside. A contact has at most one reattachment, so lists run through the
+//! contacts and nothing is allocated. Contract: reattachments come in order of time, then block, then contact.
 
 use crate::value::floored;
 

@@ -1,7 +1,7 @@
 //! Rows of eight doubles, and their arithmetic in registers for each set of processor features.
 //!
-//! Loops over contacts and over blocks run in this width, whatever the registers hold, so that the rounding of sums does
-//! not depend on the processor.
+//! Loops over contacts and over blocks run in this width, whatever the registers hold, so that the rounding of sums
+//! does not depend on the processor.
 //!
 //! A set of features is a token type of `pulp`, of which a value exists only where the processor has them: safe code
 //! cannot run a loop that the processor lacks. Contract: every operation is rounded in each lane as IEEE 754 says,

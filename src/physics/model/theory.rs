@@ -14,16 +14,16 @@ pub fn eta(angular_frequency: f64, amplitude: f64, drive_velocity: f64) -> f64 {
     to_twelve_digits(angular_frequency * amplitude / drive_velocity)
 }
 
-/// Φ_max = asin(1/η), in rad: the phase of the largest load in each period, for η >= 1; `None` below, where the load only
-/// grows.
+/// Φ_max = asin(1/η), in rad: the phase of the largest load in each period, for η >= 1; `None` below, where the load
+/// only grows.
 pub fn load_maximum_phase(eta: f64) -> Option<f64> {
     (eta >= 1.0).then(|| libm::asin(1.0 / eta))
 }
 
 /// φ_min, in rad: where the load first exceeds its preceding maximum, Eq. 2 with equality. `None` for η < 1.
 ///
-/// Solves φ + η cos φ = (Φ_max - 2π) + η cos Φ_max on the rising branch, between the load's minimum at -π - Φ_max and its
-/// maximum at Φ_max, in the form that loses no digits at large η.
+/// Solves φ + η cos φ = (Φ_max - 2π) + η cos Φ_max on the rising branch, between the load's minimum at -π - Φ_max and
+/// its maximum at Φ_max, in the form that loses no digits at large η.
 pub fn minimum_phase(eta: f64) -> Option<f64> {
     let maximum = load_maximum_phase(eta)?;
     // Both in the period of the slip: the preceding maximum lies at Φ_max - 2π and the load, in units of V0 T/2π, is

@@ -1,9 +1,10 @@
-//! Drops: slips as an experimentalist sees them, from the shear force alone, and how they fit the slips of the contacts.
+//! Drops: slips as an experimentalist sees them, from the shear force alone, and how they fit the slips of the
+//! contacts.
 //!
-//! Method: a zigzag with hysteresis. A fall of F_S runs from its largest value since the last rise to its least before the
-//! force has risen by the drop size again. Under modulation F_S swings by itself, so what the drive alone takes away
-//! between these two instants does not count: a drop is a fall that is deeper than that by the drop size. Nothing is
-//! sampled: the force is followed from one turning point to the next.
+//! Method: a zigzag with hysteresis. A fall of F_S runs from its largest value since the last rise to its least before
+//! the force has risen by the drop size again. Under modulation F_S swings by itself, so what the drive alone takes
+//! away between these two instants does not count: a drop is a fall that is deeper than that by the drop size. Nothing
+//! is sampled: the force is followed from one turning point to the next.
 
 use crate::columns::columns;
 use crate::model::{Drive, Parameters};

@@ -1,4 +1,5 @@
-//! From parameters to measurements: one job, simulated and observed; its averages over time, and the regime that they show.
+//! From parameters to measurements: one job, simulated and observed; its averages over time, and the regime that they
+//! show.
 
 use super::{Precursor, Recording, Slip, SlipObserver};
 use crate::model::Parameters;
@@ -90,7 +91,8 @@ impl Measurements {
     }
 }
 
-/// Simulates one realisation and measures what is to be recorded. The result is a function of the first three arguments.
+/// Simulates one realisation and measures what is to be recorded. The result is a function of the first three
+/// arguments.
 pub fn measure(
     parameters: &Parameters,
     recording: &Recording,

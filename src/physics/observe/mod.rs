@@ -1,6 +1,7 @@
 //! Observation: turns contact events and segments into measurements, as the model's definitions say.
 //!
-//! Knows neither the solvers nor files. Each observer measures one thing; a run has the observers that its sweep asks for.
+//! Knows neither the solvers nor files. Each observer measures one thing; a run has the observers that its sweep asks
+//! for.
 
 mod drops;
 mod measure;

@@ -35,7 +35,8 @@ fields! {
     }
 }
 
-/// Intervals between slips, as [`typical_interval`] has them, and periods without a slip after which a job ends by default.
+/// Intervals between slips, as [`typical_interval`] has them, and periods without a slip after which a job ends by
+/// default.
 const GIVE_UP_INTERVALS: f64 = 20.0;
 const GIVE_UP_PERIODS: f64 = 2.0;
 
@@ -50,8 +51,8 @@ impl Recording {
         distance / parameters.drive_velocity
     }
 
-    /// Model time at which a job ends that has slips at this interval, in s: with the last of `slips`, one interval after
-    /// `time`, or at `max_time`.
+    /// Model time at which a job ends that has slips at this interval, in s: with the last of `slips`, one interval
+    /// after `time`, or at `max_time`.
     pub fn expected_time(&self, interval: f64) -> f64 {
         let slips = self.slips.map_or(f64::INFINITY, |slips| slips as f64);
         ((slips + self.discard as f64) * interval).min(self.time_limit(interval))

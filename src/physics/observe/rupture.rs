@@ -1,5 +1,5 @@
-//! Ruptures: maximal runs of contact breaks in which no gap exceeds the wave crossing time; their fronts, what is measured
-//! on the force meanwhile, and what makes them slips or precursors.
+//! Ruptures: maximal runs of contact breaks in which no gap exceeds the wave crossing time; their fronts, what is
+//! measured on the force meanwhile, and what makes them slips or precursors.
 
 use crate::model::{ContactEvent, Parameters};
 use crate::solver::Spent;
@@ -50,8 +50,8 @@ impl Rupture {
         self.fronts.len()
     }
 
-    /// Whether it is a slip: it breaks contacts at every block, and lets go of at least half of those that were attached
-    /// before and a tenth of all.
+    /// Whether it is a slip: it breaks contacts at every block, and lets go of at least half of those that were
+    /// attached before and a tenth of all.
     pub fn is_slip(&self, contacts: u64) -> bool {
         let let_go = self.attached_before - self.least_attached;
         self.extent() == self.broken.len()
@@ -59,8 +59,8 @@ impl Rupture {
             && 10 * let_go >= contacts
     }
 
-    /// Speed of the front in m/s: slope of the distance from the nucleation against the time of the first break, block by
-    /// block, by least squares. `None` below three blocks or without an advance.
+    /// Speed of the front in m/s: slope of the distance from the nucleation against the time of the first break, block
+    /// by block, by least squares. `None` below three blocks or without an advance.
     pub fn front_speed(&self, parameters: &Parameters) -> Option<f64> {
         let spacing = parameters.slider_length / parameters.blocks as f64;
         let points = self

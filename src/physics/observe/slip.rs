@@ -63,8 +63,8 @@ impl Energies {
 }
 
 columns! {
-    /// One slip: a rupture that breaks contacts at every block and lets go of at least half of those that held, and a tenth
-    /// of all.
+    /// One slip: a rupture that breaks contacts at every block and lets go of at least half of those that held, and a
+    /// tenth of all.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Slip {
         number as "slip": u64 = "", "number of the slip within its job, from 0 past start-up";

@@ -1,9 +1,9 @@
 //! Finds slips and precursors from the contact events, and measures them on the shear force.
 //!
-//! Definitions: a slip is a rupture that breaks contacts at every block and lets go of at least half of those that held, and
-//! a tenth of all; a precursor any other of at least `precursor_size` breaks; smaller ones are creep. The onset of a slip is
-//! the largest shear force between the previous slip's end (its last break) and the instant at which its rupture reaches
-//! the leading edge; it lies at an extreme of F_S or at an event, located exactly.
+//! Definitions: a slip is a rupture that breaks contacts at every block and lets go of at least half of those that
+//! held, and a tenth of all; a precursor any other of at least `precursor_size` breaks; smaller ones are creep. The
+//! onset of a slip is the largest shear force between the previous slip's end (its last break) and the instant at which
+//! its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::drops::{DropDetector, Drops};
 use super::rupture::{Active, Criteria, Instant, Peak, Rupture, advance_speed};
@@ -148,9 +148,9 @@ impl SlipObserver {
         (self.slips, self.precursors)
     }
 
-    /// Averages over time, from the end of start-up to that of the last slip. What follows belongs to it if no slip has come
-    /// for half the time to give up: the slider then slides, and without a slip past start-up only that second half counts.
-    /// `None` for an empty span.
+    /// Averages over time, from the end of start-up to that of the last slip. What follows belongs to it if no slip has
+    /// come for half the time to give up: the slider then slides, and without a slip past start-up only that second
+    /// half counts. `None` for an empty span.
     pub fn averages(&self) -> Option<Averages> {
         let (start, end) = match self.span.settled {
             Some(settled) => {
@@ -185,7 +185,8 @@ impl SlipObserver {
             || time.is_some_and(|time| last.onset >= time)
     }
 
-    /// The present instant with all that is counted, after sliding since the last slip; from the last event on at its rate.
+    /// The present instant with all that is counted, after sliding since the last slip; from the last event on at its
+    /// rate.
     fn sliding(&self) -> Instant {
         Instant {
             attached_time: self.at_event.attached_time
@@ -385,8 +386,8 @@ impl SlipObserver {
 
 impl Observer for SlipObserver {
     fn advance(&mut self, segment: &Segment<'_>) {
-        // Each stretch contains the later ones, so a force that raises none of these peaks raises no other. The peak since the
-        // last break counts only once its rupture ends, and if that is recorded.
+        // Each stretch contains the later ones, so a force that raises none of these peaks raises no other. The peak
+        // since the last break counts only once its rupture ends, and if that is recorded.
         let recordable = self
             .rupture
             .as_ref()

@@ -104,7 +104,8 @@ pub(super) fn check(time_step: f64, parameters: &Parameters) -> Result<(), Simul
     }
 }
 
-/// Runs the scheme with a stable `time_step`, in s, compiled for these features of the processor; see [`super::simulate`].
+/// Runs the scheme with a stable `time_step`, in s, compiled for these features of the processor; see
+/// [`super::simulate`].
 pub(super) fn run(
     features: Arch,
     parameters: &Parameters,

@@ -81,8 +81,8 @@ impl Audit {
         }
     }
 
-    /// Enters the energies at the end: of blocks at these displacements in m with these velocities in m/s, their contacts,
-    /// and the driving spring, with its far end at `driven` m.
+    /// Enters the energies at the end: of blocks at these displacements in m with these velocities in m/s, their
+    /// contacts, and the driving spring, with its far end at `driven` m.
     pub fn record_final_energy(
         &self,
         interface: &Interface,

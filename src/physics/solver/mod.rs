@@ -110,7 +110,8 @@ pub trait Observer {
         true
     }
 
-    /// Whether it asks segments for the force between their ends or for its turns, and not only for extremes and impulse.
+    /// Whether it asks segments for the force between their ends or for its turns, and not only for extremes and
+    /// impulse.
     fn follows_force(&self) -> bool {
         true
     }

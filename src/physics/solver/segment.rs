@@ -285,8 +285,8 @@ impl Segment<'_> {
     }
 
     /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the
-    /// first and the last maximum and minimum; those in between lie on lines between them. On a grid its points are visited
-    /// as well.
+    /// first and the last maximum and minimum; those in between lie on lines between them. On a grid its points are
+    /// visited as well.
     pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
         let visit = |elapsed: f64, force: f64| visit(self.start + elapsed, force);
         match self.path {

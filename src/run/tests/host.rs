@@ -1,10 +1,10 @@
-//! A host: the operating system's disk, as one of several processes uses it, whose turns a [`Schedule`] gives, and through
-//! the caches of a network file system, if that is wanted.
+//! A host: the operating system's disk, as one of several processes uses it, whose turns a [`Schedule`] gives, and
+//! through the caches of a network file system, if that is wanted.
 //!
-//! What the caches do was measured on Linux NFS 3 and 4.2: a host that has looked for a file in vain does not see it when
-//! another host makes it, although the folder lists it; nor that one which it has seen is gone; and one that it has read
-//! may read as before when another host has put a new one in its place. What a host does itself it sees. Exclusive links
-//! and listings are true.
+//! What the caches do was measured on Linux NFS 3 and 4.2: a host that has looked for a file in vain does not see it
+//! when another host makes it, although the folder lists it; nor that one which it has seen is gone; and one that it
+//! has read may read as before when another host has put a new one in its place. What a host does itself it sees.
+//! Exclusive links and listings are true.
 
 use super::schedule::Schedule;
 use crate::results::workers::BEAT_THREAD;

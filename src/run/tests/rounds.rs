@@ -11,7 +11,8 @@ const OF_SEEDS: &str = "[precision]\nof = \"tau_mean\"\nrelative = 1e-3\n";
 const OF_EDGES: &str =
     "[refine]\naxis = \"V0\"\nby = \"tau_mean\"\nthreshold = 1.55\nto = 1e-6\njobs = 900\n";
 
-/// A sweep in rounds as a directory may hold it, also with conditions that a new one is refused; `None` if they drop all.
+/// A sweep in rounds as a directory may hold it, also with conditions that a new one is refused; `None` if they drop
+/// all.
 fn in_rounds(condition: &str, rounds: &str, control: bool) -> Option<Sweep> {
     let text = format!(
         "name = \"test\"\nwhere = \"{condition}\"\n[model]\nfrequency = 29\n[axes]\nDelta = [0, 1e-6]\n\

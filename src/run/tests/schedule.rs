@@ -59,8 +59,8 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Schedules `processes`. With `kill_before`, one of them is killed at one of its first operations, this number at most;
-    /// with `freeze_before`, the first is suspended likewise, for so long that others take it for dead.
+    /// Schedules `processes`. With `kill_before`, one of them is killed at one of its first operations, this number at
+    /// most; with `freeze_before`, the first is suspended likewise, for so long that others take it for dead.
     pub fn new(
         seed: u64,
         processes: usize,

@@ -1,6 +1,6 @@
-//! Several processes on one directory, whose operations on the disk are interleaved as a seed decides, with caches as of
-//! a network file system or without. Whatever the order, and whichever worker is killed, or suspended until others have
-//! taken over its work: nothing is lost, done twice, moved or reported as damaged, and the end is the same bytes.
+//! Several processes on one directory, whose operations on the disk are interleaved as a seed decides, with caches as
+//! of a network file system or without. Whatever the order, and whichever worker is killed, or suspended until others
+//! have taken over its work: nothing is lost, done twice, moved or reported as damaged, and the end is the same bytes.
 
 use super::faults::{files_below, results, small_sweep, small_sweep_in_rounds};
 use super::host::Host;

@@ -24,8 +24,8 @@ const BALANCED_TOLERANCES: f64 = 1.0;
 const BALANCED_FIXED_STEP: f64 = 2e-2;
 /// Largest difference of the breaks of two runs, relative to the larger count, that passes. Seen: 0.05.
 const ALIKE: f64 = 0.1;
-/// The same of the means over `SEEDS` seeds, in standard errors, where counts spread far from seed to seed: weak damping
-/// lets the whole slider vibrate, a soft one breaks in pieces, and a few contacts hold it up.
+/// The same of the means over `SEEDS` seeds, in standard errors, where counts spread far from seed to seed: weak
+/// damping lets the whole slider vibrate, a soft one breaks in pieces, and a few contacts hold it up.
 const ALIKE_MEANS: f64 = 3.0;
 const SEEDS: u64 = 24;
 
@@ -43,7 +43,8 @@ pub struct HardCase {
     slips: u64,
     /// Whether counts of breaks differ so far from seed to seed that only means compare.
     is_chaotic: bool,
-    /// If it must not reach its end: how its outcome begins, `refused` or `stopped`, and what that contains, - for a blank.
+    /// If it must not reach its end: how its outcome begins, `refused` or `stopped`, and what that contains, - for a
+    /// blank.
     failure: Option<(&'static str, &'static str)>,
 }
 

@@ -228,8 +228,8 @@ fn where_a_cycle_gains_less_than_the_tolerance_onsets_are_right_to_a_few_cycles(
 
 #[test]
 fn no_leap_hides_an_onset_that_is_larger_than_what_comes_before_later_contacts_break() {
-    // Without a contact the force rises above that at the break, for 1.6e-4 s, and settles. A larger one would come after
-    // an hour; but a contact attaches and breaks before.
+    // Without a contact the force rises above that at the break, for 1.6e-4 s, and settles. A larger one would come
+    // after an hour; but a contact attaches and breaks before.
     let parameters = Parameters {
         blocks: 1,
         contacts_per_block: 1,

@@ -269,8 +269,8 @@ impl<'a> Integration<'a> {
         );
     }
 
-    /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next change of the drive or the end.
-    /// The cycle of the modulation lasts for another `until_cycle_end` s. False if none is allowed yet.
+    /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next change of the drive or the
+    /// end. The cycle of the modulation lasts for another `until_cycle_end` s. False if none is allowed yet.
     #[inline(never)]
     fn try_leap(
         &mut self,
@@ -323,8 +323,8 @@ impl<'a> Integration<'a> {
         true
     }
 
-    /// Reports the shear force along a leap that began at `start` s, at `began` s in the frame, and attaches on the driven
-    /// solution what it passed from the grid.
+    /// Reports the shear force along a leap that began at `start` s, at `began` s in the frame, and attaches on the
+    /// driven solution what it passed from the grid.
     fn report_leap(
         &mut self,
         leap: &Plan,
@@ -373,8 +373,8 @@ impl<'a> Integration<'a> {
         self.frame.set_time(if is_due { due } else { reached });
     }
 
-    /// Breaks the contacts of a block that has reached a break position, at these displacements of it and of all blocks on
-    /// average in m and shear force `force` N.
+    /// Breaks the contacts of a block that has reached a break position, at these displacements of it and of all blocks
+    /// on average in m and shear force `force` N.
     fn break_block(
         &mut self,
         block: usize,

@@ -1,8 +1,8 @@
 //! The slider as it moves: its contacts, the chain that they make of the blocks, and the motion of the blocks.
 //!
-//! Blocks lie in rows of eight: block j in row j mod R of lane j div R, with R = ceil(N/8). The neighbours of a block are
-//! then the rows above and below in the same lane; beyond the first and the last row they lie in the next lane. Slots
-//! beyond the last block keep a coupling, a stiffness and a force of zero and stay at rest.
+//! Blocks lie in rows of eight: block j in row j mod R of lane j div R, with R = ceil(N/8). The neighbours of a block
+//! are then the rows above and below in the same lane; beyond the first and the last row they lie in the next lane.
+//! Slots beyond the last block keep a coupling, a stiffness and a force of zero and stay at rest.
 
 use crate::model::equation::StiffnessMatrix;
 use crate::model::simd::{Simd, Vector};

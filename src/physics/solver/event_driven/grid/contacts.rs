@@ -1,8 +1,8 @@
 //! Contact events within a step of the grid, without redoing it.
 //!
 //! Within a step, s from 0 to 1, a block moves as X(s) = x + s q + ((r³ - r) a0 + (s³ - s) a1)/6 with r = 1 - s, where
-//! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes the force on its block and so its motion by
-//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see
+//! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes the force on its block and so its motion
+//! by δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see
 //! [`taylor`](crate::solver::event_driven::taylor), where the same terms are derived. Added at s = 1 they correct the
 //! displacement, and at s = 0, backwards, the increment.
 
@@ -130,8 +130,8 @@ impl Path {
         self.from = s;
     }
 
-    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end: Halley's steps from where
-    /// Hermite's cubic has it, that of s by displacement with the slopes at both ends of the step.
+    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end: Halley's steps from
+    /// where Hermite's cubic has it, that of s by displacement with the slopes at both ends of the step.
     #[inline(always)]
     fn crossing(&self, level: f64) -> f64 {
         let within = |s: f64| {
@@ -206,8 +206,8 @@ pub(super) struct StepEvents {
     contacts: Vec<(f64, usize)>,
 }
 
-/// Breaks and attaches what the last step reaches and what is due in it, in the order of time at each block. The step began
-/// at `start` s in the frame.
+/// Breaks and attaches what the last step reaches and what is due in it, in the order of time at each block. The step
+/// began at `start` s in the frame.
 #[inline(always)]
 pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64) {
     break_reached(simd, slider, grid, start);
@@ -267,8 +267,8 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
     }
 }
 
-/// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach. `first` is
-/// where it reaches the nearest break position, if that is known.
+/// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach.
+/// `first` is where it reaches the nearest break position, if that is known.
 #[inline(always)]
 fn break_along<S: Simd>(
     simd: S,

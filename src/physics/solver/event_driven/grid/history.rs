@@ -15,7 +15,8 @@ pub(super) struct ForceHistory {
     first: f64,
     /// The time there, in s in the frame.
     start: f64,
-    /// Extremes over all steps but the first and the last, and the integral by steps from the beginning of the first, in N.
+    /// Extremes over all steps but the first and the last, and the integral by steps from the beginning of the first,
+    /// in N.
     inner: Extremes,
     integral: f64,
 }

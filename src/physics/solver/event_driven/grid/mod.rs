@@ -1,8 +1,8 @@
-//! The grid: motion in constant steps of time, of two stencils each ([`step`], where they are derived from the exact recurrence
-//! of a damped oscillator), corrected for contact events where they happen ([`contacts`]).
+//! The grid: motion in constant steps of time, of two stencils each ([`step`], where they are derived from the exact
+//! recurrence of a damped oscillator), corrected for contact events where they happen ([`contacts`]).
 //!
-//! Setting: `tolerance`, from which [`step_length`] follows; errors are of fourth order in the step. At tolerances of 1e-7
-//! and above it is several times as fast as Taylor steps, as nothing is computed twice when an event comes.
+//! Setting: `tolerance`, from which [`step_length`] follows; errors are of fourth order in the step. At tolerances of
+//! 1e-7 and above it is several times as fast as Taylor steps, as nothing is computed twice when an event comes.
 
 mod contacts;
 mod history;
@@ -57,8 +57,8 @@ pub(super) struct Grid {
     history: ForceHistory,
     /// Shear force at the present point, in N.
     force: f64,
-    /// The last break reported since an entry or a move of the frame, in s in the frame, and the pause after which a rupture
-    /// may begin, in s: half of that after which it does.
+    /// The last break reported since an entry or a move of the frame, in s in the frame, and the pause after which a
+    /// rupture may begin, in s: half of that after which it does.
     last_break: f64,
     pause: f64,
     /// The state one step before an entry.
@@ -337,9 +337,9 @@ impl Integration<'_> {
         }
     }
 
-    /// Reports what has happened in the last step, which began at `start` s in the frame, and the shear force up to it: change
-    /// after change to an observer that follows attachments; else up to the last break, and before to those at the leading
-    /// edge, at which a slip's onset is known, and to the first if it may begin a rupture.
+    /// Reports what has happened in the last step, which began at `start` s in the frame, and the shear force up to it:
+    /// change after change to an observer that follows attachments; else up to the last break, and before to those at
+    /// the leading edge, at which a slip's onset is known, and to the first if it may begin a rupture.
     fn report_changes(&mut self, start: f64, observer: &mut dyn Observer) {
         let changes = std::mem::take(&mut self.grid.events.changes);
         let mut attachments = std::mem::take(&mut self.grid.events.attachments);

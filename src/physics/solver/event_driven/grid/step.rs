@@ -9,7 +9,8 @@
 //!
 //! the expansion in Z of the exact recurrence of a damped oscillator, 2 e cos(√(Z - σ²)); the last term is what the
 //! drive u adds to the second derivative of the force. It is exact for damping, for equilibrium and for uniform motion.
-//! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present law.
+//! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present
+//! law.
 
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
@@ -165,7 +166,8 @@ impl GridStep {
         self.lower.copy_from_slice(&chain.lower);
     }
 
-    /// Takes over the force of a block's contacts: the diagonal of S in N/m, the pull in N, the nearest break positions in m.
+    /// Takes over the force of a block's contacts: the diagonal of S in N/m, the pull in N, the nearest break positions
+    /// in m.
     #[inline(always)]
     pub(super) fn update<S: Simd>(
         &mut self,

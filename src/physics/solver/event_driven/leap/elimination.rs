@@ -1,17 +1,17 @@
 //! The matrix of the chain, with any shift of its diagonal, eliminated in lanes: what a split of the motion solves.
 //!
-//! The last row, a block of every lane, cuts the chain into pieces, which are eliminated side by side, each from its first
-//! block on. With the diagonal d, the coupling c to the block before and pivots p,
+//! The last row, a block of every lane, cuts the chain into pieces, which are eliminated side by side, each from its
+//! first block on. With the diagonal d, the coupling c to the block before and pivots p,
 //!
 //! ```text
 //! p_r = d_r - c_r k_{r-1},   k_r = c_{r+1}/p_r,   y_{r+1} = k_r y_r,   y_0 = 1,
 //! H_r = 1/p_r + k_r² H_{r+1},   b_r = k_r b_{r+1},   H = 0 and b = 1 in the last row.
 //! ```
 //!
-//! H is the diagonal of the inverse of a piece alone. If w solves it alone, the blocks are at x_r = w_r + y_r H_r c_0 x_L +
-//! b_r x_R, with the cuts before and after it. These are left with couplings F = c_0 y and diagonals p_R - c_0² H_0, with
-//! c_0 and H_0 of the next lane, and are reduced cyclically: three times, each takes in the two beside it, which leaves
-//! diagonals 1/G_R. Since F is also what two neighbours are left with of all others, the inverse has
+//! H is the diagonal of the inverse of a piece alone. If w solves it alone, the blocks are at x_r = w_r + y_r H_r c_0
+//! x_L + b_r x_R, with the cuts before and after it. These are left with couplings F = c_0 y and diagonals p_R - c_0²
+//! H_0, with c_0 and H_0 of the next lane, and are reduced cyclically: three times, each takes in the two beside it,
+//! which leaves diagonals 1/G_R. Since F is also what two neighbours are left with of all others, the inverse has
 //!
 //! ```text
 //! G_LR = 2 F G_L G_R/(1 + sqrt(1 + 4 F² G_L G_R)),   G_r = H_r + (y_r H_r c_0)² G_L + 2 y_r H_r c_0 b_r G_LR + b_r² G_R.

@@ -1,11 +1,11 @@
 //! Leaps over quiet time along the driven solution.
 //!
-//! Setting: `tolerance`. Method: between events the motion is a driven solution and a free motion about it, which decays and
-//! is bounded for each block ([`split`], where the bound is derived). So a leap may start while the free motion is still
-//! large, if the bound shows that no block reaches a break position meanwhile, and that the shear force has been or will be
-//! larger than it can be meanwhile. When the next event comes, the rest of the free motion is below the tolerance and is
-//! dropped. Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at its end, no event on the
-//! way, and no largest shear force.
+//! Setting: `tolerance`. Method: between events the motion is a driven solution and a free motion about it, which
+//! decays and is bounded for each block ([`split`], where the bound is derived). So a leap may start while the free
+//! motion is still large, if the bound shows that no block reaches a break position meanwhile, and that the shear force
+//! has been or will be larger than it can be meanwhile. When the next event comes, the rest of the free motion is below
+//! the tolerance and is dropped. Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at
+//! its end, no event on the way, and no largest shear force.
 
 mod elimination;
 mod split;
@@ -28,8 +28,8 @@ const LOOK_AHEAD: f64 = 10.0;
 const PASSED_SHARE: f64 = 0.2;
 /// Free motion at which a contact may attach on the driven solution, in errors of a leap.
 const LOOSE: f64 = 3.0;
-/// How far a passed contact may be astray, in errors of a leap: by free motion where it attaches and later, and by what the
-/// others displace.
+/// How far a passed contact may be astray, in errors of a leap: by free motion where it attaches and later, and by what
+/// the others displace.
 const ASTRAY: f64 = 2.0 * LOOSE + PASSED_SHARE;
 
 /// A leap that may be taken.
@@ -60,9 +60,10 @@ pub(super) struct Bounds {
     pub passing: Option<[f64; 2]>,
 }
 
-/// How long a leap over reattachments may be, in s, with free motion of at most `largest` m now; if that is less than it must
-/// be, after how many seconds to look again. A contact that attaches on the way holds its block back by its stiffness times
-/// how far the block has moved since, which the driven solution leaves out; what all displace may be a part of the error.
+/// How long a leap over reattachments may be, in s, with free motion of at most `largest` m now; if that is less than
+/// it must be, after how many seconds to look again. A contact that attaches on the way holds its block back by its
+/// stiffness times how far the block has moved since, which the driven solution leaves out; what all displace may be a
+/// part of the error.
 fn passing_horizon(
     split: &Split,
     (chain, interface): (&Chain, &mut Interface),
@@ -107,8 +108,8 @@ fn passing_horizon(
     }
 }
 
-/// Looks for a leap under a drive that moves as given, with free motion of a block of at most `largest` m. Without one, returns
-/// after how many seconds to look again.
+/// Looks for a leap under a drive that moves as given, with free motion of a block of at most `largest` m. Without one,
+/// returns after how many seconds to look again.
 #[inline(always)]
 fn plan<S: Simd>(
     simd: S,
@@ -168,8 +169,8 @@ fn plan<S: Simd>(
     })
 }
 
-/// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force: one
-/// as large is on record, or comes later in the segment, or comes after it, in this cycle and before any break.
+/// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force:
+/// one as large is on record, or comes later in the segment, or comes after it, in this cycle and before any break.
 #[inline(always)]
 fn hides_no_peak<S: Simd>(
     simd: S,
@@ -362,7 +363,8 @@ fn first_reached<S: Simd>(
     let mut bend = 0.0;
     for (r, row) in split.rows.iter().enumerate() {
         if until != first.0 {
-            // The cosine exceeds its ends by no more than it bends in between; over long times it is anything up to |q|.
+            // The cosine exceeds its ends by no more than it bends in between; over long times it is anything up to
+            // |q|.
             until = first.0;
             let half = 0.5 * drive.angular_frequency * (until - decay);
             let is_short = drive.amplitude > 0.0 && half < 1.0;

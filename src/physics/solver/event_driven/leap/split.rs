@@ -1,8 +1,8 @@
-//! The motion of the chain, split into the driven solution, to which it decays between events, and the free motion about it,
-//! with a bound for each block.
+//! The motion of the chain, split into the driven solution, to which it decays between events, and the free motion
+//! about it, with a bound for each block.
 //!
-//! The driven solution is x_p(t) = p0 + p1 t + Re(q e^{iωt}): two real solves and, with modulation, a complex one. The free
-//! motion y = x - x_p is damped and undriven. With w = y', a rate a <= γ/2 and S' = S - m a (γ - a),
+//! The driven solution is x_p(t) = p0 + p1 t + Re(q e^{iωt}): two real solves and, with modulation, a complex one. The
+//! free motion y = x - x_p is damped and undriven. With w = y', a rate a <= γ/2 and S' = S - m a (γ - a),
 //!
 //! ```text
 //! E = ½ m |w + a y|² + ½ yᵀ S' y,    E' = -(γ - a) m |w + a y|² - a yᵀ S' y <= -2 a E,
@@ -97,8 +97,8 @@ impl Split {
         }
     }
 
-    /// Largest speed of a block on the driven solution, in m/s, and how far a force on it displaces it at most, per mass, in
-    /// s².
+    /// Largest speed of a block on the driven solution, in m/s, and how far a force on it displaces it at most, per
+    /// mass, in s².
     #[inline(always)]
     pub fn speed_and_compliance(&self, chain: &Chain, drive: &Harmonic, block: usize) -> [f64; 2] {
         let (row, lane) = chain.layout.slot(block);
@@ -107,8 +107,8 @@ impl Split {
         [speed, row.compliance[lane]]
     }
 
-    /// Splits a state, and bounds the free motion. Returns the largest bound on a displacement, in m; `None` if the free
-    /// motion does not decay.
+    /// Splits a state, and bounds the free motion. Returns the largest bound on a displacement, in m; `None` if the
+    /// free motion does not decay.
     #[inline(always)]
     pub fn update<S: Simd>(
         &mut self,
@@ -152,8 +152,8 @@ impl Split {
         Some(self.bound(simd, chain, twice_energy))
     }
 
-    /// Finds the decay rate a, from that of the last time, with which S' can be eliminated. Returns a (γ - a), by which S/m
-    /// is shifted, in 1/s².
+    /// Finds the decay rate a, from that of the last time, with which S' can be eliminated. Returns a (γ - a), by which
+    /// S/m is shifted, in 1/s².
     #[inline(always)]
     fn find_decay<S: Simd>(&mut self, simd: S, chain: &Chain) -> Option<f64> {
         let fastest = 0.5 * chain.damping_rate;
@@ -279,8 +279,8 @@ impl Split {
 }
 
 impl BlockMotion {
-    /// First instant in [`from`, `until`], in s, at which the block is at or beyond a break position; if none, one that is
-    /// later or infinite.
+    /// First instant in [`from`, `until`], in s, at which the block is at or beyond a break position; if none, one that
+    /// is later or infinite.
     pub fn reaches(
         &self,
         drive: &Harmonic,

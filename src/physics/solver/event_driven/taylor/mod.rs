@@ -1,8 +1,8 @@
 //! Taylor steps: motion as a series in time ([`series`]), each step up to its next contact events.
 //!
-//! Setting: `tolerance`, of which each step may take a share ([`super::tolerances`]). Method: Taylor series to the order at
-//! which they converge, as described by À. Jorba and M. Zou, Exp. Math. 14, 99 (2005); a bound on each block's motion
-//! isolates the first crossing of a break position ([`first_exit`](polynomial::first_exit)).
+//! Setting: `tolerance`, of which each step may take a share ([`super::tolerances`]). Method: Taylor series to the
+//! order at which they converge, as described by À. Jorba and M. Zou, Exp. Math. 14, 99 (2005); a bound on each block's
+//! motion isolates the first crossing of a break position ([`first_exit`](polynomial::first_exit)).
 //!
 //! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of
 //! k_i a_i over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and
@@ -15,8 +15,8 @@
 //!
 //! and by terms of higher order that spread along the chain. As long as these stay below a small part of the error of a
 //! step, the event is merged into it: the change is added to the series, which stays accurate after the event. The step
-//! ends where the series would no longer be accurate. Contract: events in the right order, also of blocks whose series has
-//! changed.
+//! ends where the series would no longer be accurate. Contract: events in the right order, also of blocks whose series
+//! has changed.
 
 mod series;
 

@@ -100,7 +100,8 @@ impl Series {
         }
     }
 
-    /// Mean displacement of the blocks at s, in m, to third order: the slider as a whole moves far more slowly than its blocks.
+    /// Mean displacement of the blocks at s, in m, to third order: the slider as a whole moves far more slowly than its
+    /// blocks.
     pub fn mean(&self, chain: &Chain, s: f64) -> f64 {
         let terms = self
             .terms
@@ -149,8 +150,8 @@ impl Series {
     }
 }
 
-/// State at s in [0, 1] of a step of `length` s: Horner's scheme, nested, Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same
-/// from Y_1 for the slope.
+/// State at s in [0, 1] of a step of `length` s: Horner's scheme, nested, Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the
+/// same from Y_1 for the slope.
 #[inline(always)]
 pub fn evaluate<S: Simd, const R: usize>(
     simd: S,
@@ -301,8 +302,8 @@ pub fn expand<S: Simd, const R: usize>(
     order.is_some()
 }
 
-/// Least order from which on what a modulated drive adds to the orders left out, times their order, is within `error` m.
-/// Terms may vanish that the drive is still to make: at rest, those of the first four orders do.
+/// Least order from which on what a modulated drive adds to the orders left out, times their order, is within `error`
+/// m. Terms may vanish that the drive is still to make: at rest, those of the first four orders do.
 #[inline(always)]
 fn order_of_drive(drive: DriveDerivatives, pulling: f64, error: f64) -> usize {
     let mut order = MIN_ORDER;
