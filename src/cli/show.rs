@@ -66,7 +66,7 @@ const MAX_READ: usize = 10_000;
 const MAX_NAMED: usize = 4;
 
 /// What is found of a set, where there is anything.
-const FOUND: [&str; 9] = [
+const FOUND: &[&str] = &[
     "regime",
     "slips",
     "tau_mean",
@@ -222,7 +222,7 @@ fn usual_names(rows: &[SetRow]) -> Vec<&'static str> {
 fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
     let columns = names
         .into_iter()
-        .chain(FOUND)
+        .chain(FOUND.iter().copied())
         .filter_map(|name| Values::of(rows, name).ok());
     columns
         .filter(|values| values.numbers.iter().any(Option::is_some))

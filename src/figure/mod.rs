@@ -60,7 +60,7 @@ impl BadOption {
 }
 
 /// The standing figures, which [`draw_all`] draws, in the order of the report.
-pub const STANDING: [&str; 8] = [
+pub const STANDING: &[&str] = &[
     overview::NAME,
     map::LOCKING,
     map::REGIMES,

@@ -122,15 +122,15 @@ fn asked(sweep: &Sweep) -> Vec<&'static str> {
 }
 
 /// The standing figures as SVG, by name: those that are small.
-fn figures(layout: &Layout<'_>) -> Result<Vec<(String, String)>, StorageError> {
+fn figures(layout: &Layout<'_>) -> Result<Vec<(&'static str, String)>, StorageError> {
     const LARGEST: usize = 500_000;
     let mut figures = Vec::new();
-    for name in STANDING {
+    for &name in STANDING {
         let file = layout.figures().join(format!("{name}.svg"));
         if layout.storage.exists(&file)? {
             let text = String::from_utf8(layout.storage.read(&file)?).unwrap_or_default();
             if (1..LARGEST).contains(&text.len()) {
-                figures.push((name.to_owned(), text));
+                figures.push((name, text));
             }
         }
     }
