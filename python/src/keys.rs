@@ -4,50 +4,17 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use stickslip::model::{Parameters, Symbol, Value};
 use stickslip::observe::{Recording, RecordingKey};
+use stickslip::solver::SolverKey;
 
 /// Sections of a sweep file.
 const MODEL: &str = "model";
 const RECORD: &str = "record";
 const SOLVER: &str = "solver";
 
-/// Keys in place of others, and keys of the solver: section, key, meaning, what is allowed.
-const OTHERS: [(&str, &str, &str, &str); 6] = [
-    (
-        MODEL,
-        "eta",
-        "2 pi Delta / (T V0), in place of T",
-        "a number > 0",
-    ),
-    (
-        MODEL,
-        "frequency",
-        "1/T, in place of T",
-        "a number > 0, in Hz",
-    ),
-    (
-        SOLVER,
-        "method",
-        "solver",
-        "\"event-driven\" or \"fixed-step\"",
-    ),
-    (
-        SOLVER,
-        "tolerance",
-        "tolerance of the event-driven solver, relative to fs/k",
-        "a number",
-    ),
-    (
-        SOLVER,
-        "resolve",
-        "how the event-driven solver resolves motion",
-        "\"auto\", \"grid\" or \"taylor\"",
-    ),
-    (
-        SOLVER,
-        "dt",
-        "step of the fixed-step solver",
-        "a number > 0, in s",
-    ),
+/// Keys in place of others: key, meaning, what is allowed.
+const OTHERS: [(&str, &str, &str); 2] = [
+    ("eta", "2 pi Delta / (T V0), in place of T", "a number > 0"),
+    ("frequency", "1/T, in place of T", "a number > 0, in Hz"),
 ];
 
 /// Every key, with its section.
@@ -58,7 +25,8 @@ fn sections() -> impl Iterator<Item = (&'static str, &'static str)> {
                 .into_iter()
                 .map(|record| (record.key(), RECORD)),
         )
-        .chain(OTHERS.map(|(section, other, ..)| (other, section)))
+        .chain(OTHERS.map(|(key, ..)| (key, MODEL)))
+        .chain(SolverKey::ALL.map(|key| (key.key(), SOLVER)))
 }
 
 /// The section of a key.
@@ -91,8 +59,12 @@ pub fn keys(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
             (field.meaning, field.requirement(), object(py, default)?),
         )?;
     }
-    for (_, key, meaning, allowed) in OTHERS {
+    for (key, meaning, allowed) in OTHERS {
         keys.set_item(key, (meaning, allowed, py.None()))?;
+    }
+    for key in SolverKey::ALL {
+        let field = key.description();
+        keys.set_item(field.key, (field.meaning, field.requirement(), py.None()))?;
     }
     Ok(keys)
 }

@@ -46,11 +46,10 @@ impl From<Solver> for SolverColumns {
 
 impl SolverColumns {
     /// The method without its setting, in words.
-    pub fn name(&self) -> &str {
+    pub fn name(&self) -> String {
         match self.method.as_str() {
-            "taylor" => "Taylor steps",
-            "fixed-step" => "fixed step",
-            name => name,
+            "taylor" => "Taylor steps".to_owned(),
+            word => word.replace('-', " "),
         }
     }
 }

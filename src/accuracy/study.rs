@@ -65,7 +65,7 @@ impl Study {
                 .flat_map(plain_and_modulated)
                 .collect(),
             solvers: solvers(
-                &[4e-6, 2e-6, 1e-6, 5e-7],
+                &[4e-6, 2e-6, 1e-6, 5e-7].map(Solver::fixed_step),
                 &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
                 &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10],
             ),
@@ -96,21 +96,27 @@ impl Study {
 
     /// The same at other sets, with tolerances of the event-driven solver and this one instead.
     pub fn at(self, sets: Vec<Parameters>, solver: Solver) -> Self {
-        let mut time_steps = Vec::new();
+        let mut in_fixed_steps = Vec::new();
         let mut on_the_grid = vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
         let mut in_taylor_steps = vec![1e-3, 1e-4, 1e-6, 1e-8];
         let tolerance = solver.tolerance;
-        let (settings, own) = match solver.time_step {
-            Some(_) => (&mut time_steps, solver),
-            None if solver.resolve.takes_grid(tolerance) => (&mut on_the_grid, grid(tolerance)),
-            None => (&mut in_taylor_steps, taylor(tolerance)),
+        let own = if solver.time_step.is_some() {
+            in_fixed_steps.push(solver);
+            solver
+        } else if solver.resolve.takes_grid(tolerance) {
+            on_the_grid.push(tolerance);
+            grid(tolerance)
+        } else {
+            in_taylor_steps.push(tolerance);
+            taylor(tolerance)
         };
-        settings.push(solver.setting());
-        settings.sort_by(|a, b| b.total_cmp(a));
-        settings.dedup();
+        for tolerances in [&mut on_the_grid, &mut in_taylor_steps] {
+            tolerances.sort_by(|a, b| b.total_cmp(a));
+            tolerances.dedup();
+        }
         Self {
             sets,
-            solvers: solvers(&time_steps, &on_the_grid, &in_taylor_steps),
+            solvers: solvers(&in_fixed_steps, &on_the_grid, &in_taylor_steps),
             own,
             first_set_multiple: 1,
             ..self
@@ -133,10 +139,8 @@ fn plain_and_modulated(drive_velocity: f64) -> [Parameters; 2] {
     [plain, modulated]
 }
 
-fn solvers(time_steps: &[f64], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> Vec<Solver> {
-    let fixed = time_steps
-        .iter()
-        .map(|&time_step| Solver::fixed_step(time_step));
+fn solvers(in_fixed_steps: &[Solver], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> Vec<Solver> {
+    let fixed = in_fixed_steps.iter().copied();
     let grid = on_the_grid.iter().map(|&tolerance| grid(tolerance));
     let taylor = in_taylor_steps.iter().map(|&tolerance| taylor(tolerance));
     fixed.chain(grid).chain(taylor).collect()
@@ -433,7 +437,7 @@ mod tests {
     fn a_small_study_distinguishes_a_coarse_step_from_the_grid_and_that_from_a_tight_tolerance() {
         let study = Study {
             sets: plain_and_modulated(1e-4).into(),
-            solvers: solvers(&[4e-6], &[1e-4], &[1e-8]),
+            solvers: solvers(&[Solver::fixed_step(4e-6)], &[1e-4], &[1e-8]),
             seeds: 1,
             first_set_multiple: 3,
             slips: 4,

@@ -198,7 +198,7 @@ fn a_directory_without_jobs_has_no_report() {
     fs::create_dir(folder.path("r")).unwrap();
     let ended = folder.ends(2, "report r");
     assert!(
-        ended.stderr.contains("no results directory") || ended.stderr.contains("manifest"),
+        ended.stderr.contains("not a results directory") || ended.stderr.contains("manifest"),
         "{}",
         ended.stderr
     );

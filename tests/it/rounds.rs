@@ -1,4 +1,4 @@
-//! The built program on sweeps that decide for themselves: the rounds are the same for any processes, kills and earlier
+//! The built program on adaptive sweeps: the rounds are the same for any processes, kills and earlier
 //! sweeps, and they end.
 
 use crate::program::{Folder, json, wait};
@@ -40,21 +40,23 @@ fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
     let ended: Vec<_> = shared.into_iter().map(wait).collect();
     assert!(ended.iter().all(|(code, ..)| *code == Some(0)), "{ended:?}");
 
-    // Kills at instants spread over the run, rounds and decisions alike; begun again whenever one has come to the end.
+    // Kills in each of the first rounds and after the decisions between them, however fast the machine is; begun again
+    // whenever the sweep has come to its end.
+    let rounds = || {
+        let file = |round: &usize| folder.path(&format!("killed/run/extension-{round:03}.json"));
+        (0..100).take_while(|round| file(round).exists()).count()
+    };
     let (mut kills, mut rounds_at_kills) = (0, BTreeSet::new());
     for run in 0.. {
         let mut child = folder.start("run map.toml --out killed --no-reduce");
-        std::thread::sleep(Duration::from_millis(50 + 60 * (run % 7)));
+        while rounds() < 1 + run % 5 && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        std::thread::sleep(Duration::from_millis(50 + 60 * (run as u64 % 7)));
         child.kill().unwrap();
         if wait(child).0.is_none() {
             kills += 1;
-            let is_there = |round: &usize| {
-                folder
-                    .path(&format!("killed/run/extension-{round:03}.json"))
-                    .exists()
-            };
-            let rounds = (0..100).take_while(is_there).count();
-            rounds_at_kills.insert(rounds);
+            rounds_at_kills.insert(rounds());
         } else {
             // One that had ended.
             fs::remove_dir_all(folder.path("killed")).unwrap();

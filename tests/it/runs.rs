@@ -2,6 +2,7 @@
 //! trace in them, and what exit codes say.
 
 use crate::program::{Cell, FAILING, Folder, MANY, MANY_PARTS, json, wait};
+use std::collections::BTreeSet;
 use std::fs;
 use std::time::{Duration, SystemTime};
 
@@ -385,18 +386,10 @@ fn reduced_data_and_figures_can_be_made_again() {
         (Some(TINY_JOBS), Some(4 * TINY_JOBS))
     );
     let drawn = folder.ends(0, "plot r").stdout;
-    assert_eq!(
-        drawn.lines().collect::<Vec<_>>(),
-        [
-            "phi-eta.svg",
-            "phi-eta.png",
-            "tau-T.svg",
-            "tau-T.png",
-            "overview.svg",
-            "overview.png"
-        ]
-        .map(|name| format!("r/figures/{name}"))
-    );
+    let drawn: BTreeSet<&str> = drawn.lines().collect();
+    let there = before.keys().filter(|path| path.starts_with("figures/"));
+    let there: Vec<String> = there.map(|path| format!("r/{}", path.display())).collect();
+    assert_eq!(drawn, there.iter().map(String::as_str).collect());
     assert!(folder.contents("r") == before);
 }
 
