@@ -417,20 +417,19 @@ fn by_statistic(cells: &[Measured], statistics: &[Statistic]) -> String {
 /// A line for each set: what it is, how much it is locked, and the coverage of its cells with many jobs.
 fn by_set(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
     let mut lines = vec![
-        "| N | N_s | V0 (m/s) | Δ (µm) | f (Hz) | η | n | R | locking index | least | median | by the rule: least |"
+        "| N | N_s | V0 (m/s) | Δ (µm) | f (Hz) | η | n | R | locking index | least | median |"
             .to_owned(),
-        "|---|---|---|---|---|---|---|---|---|---|---|---|".to_owned(),
+        "|---|---|---|---|---|---|---|---|---|---|---|".to_owned(),
     ];
     for (set, (parameters, row)) in sets.iter().enumerate() {
         let number = |key: &str| {
             row.number(key)
                 .map_or("–".into(), |number| format!("{number:.2}"))
         };
-        let own = || cells.iter().filter(|cell| cell.set == set);
-        let many = Summary::of(own().filter(|cell| cell.is_of_many()));
-        let rule = Summary::of(own().filter(|cell| cell.is_by_rule()));
+        let own = cells.iter().filter(|cell| cell.set == set);
+        let many = Summary::of(own.filter(|cell| cell.is_of_many()));
         lines.push(format!(
-            "| {} | {} | {:e} | {:.2} | {:.1} | {:.2} | {} | {} | {} | {:.1} | {:.1} | {:.1} |",
+            "| {} | {} | {:e} | {:.2} | {:.1} | {:.2} | {} | {} | {} | {:.1} | {:.1} |",
             parameters.blocks,
             parameters.contacts_per_block,
             parameters.drive_velocity,
@@ -442,7 +441,6 @@ fn by_set(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
             number("locking_index"),
             many.coverage[0],
             many.coverage[1],
-            rule.coverage[0],
         ));
     }
     lines.join("\n")

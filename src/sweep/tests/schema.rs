@@ -294,7 +294,7 @@ fn laid_out(json: &Json, indent: usize) -> String {
 }
 
 #[test]
-fn the_schema_follows_from_the_descriptions() {
+fn the_documented_schema_follows_from_the_descriptions() {
     let text = laid_out(&generated(), 0) + "\n";
     if std::env::var_os("UPDATE_DOCS").is_some() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/sweep.schema.json");
