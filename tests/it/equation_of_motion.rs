@@ -111,7 +111,7 @@ fn integrated(
 }
 
 #[test]
-fn both_solvers_follow_the_equation_of_motion_up_to_the_first_break() {
+fn every_method_follows_the_equation_of_motion_up_to_the_first_break() {
     for blocks in [1, 2, 9, 70] {
         // A fast modulation: the slider does not follow it quasi-statically.
         let parameters = Parameters {
