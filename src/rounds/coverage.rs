@@ -362,10 +362,6 @@ impl Measured {
     fn is_of_many(&self) -> bool {
         SIZES.get(self.column).is_none_or(|&(jobs, _)| jobs >= MANY)
     }
-
-    fn is_by_rule(&self) -> bool {
-        self.column >= SIZES.len()
-    }
 }
 
 /// Coverage and half-widths of some cells: least, middle and greatest.
