@@ -420,7 +420,7 @@ mod tests {
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{
-        All, DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, SlipRow,
+        DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, SlipRow, relabel,
     };
     use crate::results::workers::tests::open;
     use crate::solver::Summary;
@@ -532,14 +532,6 @@ mod tests {
                 let file = Disk.create(&path).unwrap();
                 let mut job_writer =
                     TableWriter::<JobRow>::new(&[], file, &Footer::default()).unwrap();
-                let relabel = |(names, selected, loading): &JobLabel<DriveAndSeed>| {
-                    let label: JobLabel<All> = (
-                        names.clone(),
-                        Selected::new(selected.parameters.clone()),
-                        *loading,
-                    );
-                    label
-                };
                 for (job, result) in labels.iter().zip(&measured) {
                     job_writer
                         .push(&(relabel(job), JobRecord::new(Ok(result))))

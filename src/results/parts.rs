@@ -9,7 +9,7 @@ use crate::results::commit::Commit;
 use crate::results::directory::Results;
 use crate::results::tables::{
     self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
-    label,
+    label, relabel,
 };
 use crate::results::workers::Member;
 use crate::sweep::{Outline, Part, PartName};
@@ -155,7 +155,7 @@ impl<'a> Results<'a> {
         }
         self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
-            writer.push(&(label(sweep, &job.1.parameters), record))
+            writer.push(&(relabel(job), record))
         })?;
         self.publish(commit)
     }

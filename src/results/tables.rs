@@ -117,6 +117,16 @@ pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> JobLabel<S> {
     )
 }
 
+/// The same label with other parameters; its ids, which are hashes, are not computed again.
+pub fn relabel<S, T>(label: &JobLabel<S>) -> JobLabel<T> {
+    let (names, selected, loading) = label;
+    (
+        names.clone(),
+        Selected::new(selected.parameters.clone()),
+        *loading,
+    )
+}
+
 pub type SlipRow<'a> = (Cow<'a, JobLabel<DriveAndSeed>>, Cow<'a, Slip>);
 pub type PrecursorRow<'a> = (Cow<'a, JobLabel<DriveAndSeed>>, Cow<'a, Precursor>);
 pub type JobRow = (JobLabel<All>, JobRecord);
