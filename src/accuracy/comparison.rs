@@ -169,7 +169,7 @@ impl Bias {
         Some(0.5 * (high - low))
     }
 
-    /// Half of the interval which so many biases together lie in as surely as one in its own (Bonferroni).
+    /// Half-width of the mean's interval after Bonferroni's correction for this number of comparisons.
     pub fn half_width_among(&self, comparisons: usize) -> Option<f64> {
         let freedom = self.freedom?;
         let together = 1.0 - (1.0 - CONFIDENCE) / comparisons as f64;

@@ -453,7 +453,8 @@ mod tests {
             before in 0_usize..60,
         ) {
             let before = &costs[..before.min(costs.len())];
-            let (mut all, mut loads) = (Vec::new(), Vec::new());
+            let mut all = Vec::new();
+            let mut loads = Vec::new();
             for shard in shards(count) {
                 let own: Vec<Outline> = shard.parts(plan(&costs)).collect();
                 let earlier: Vec<Outline> = shard.parts(plan(before)).collect();

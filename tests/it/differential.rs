@@ -521,7 +521,7 @@ fn check_fixed_step(
     })
 }
 
-/// Compares number, times and sizes of the slips that end before the last of the breaks compared. Observers may be told
+/// Compares number, times and sizes of the slips that end before the last of the breaks compared. Observers may hear
 /// of breaks `late` s after their time; displacements may be off by a part `size` of the contact reach.
 fn compare_slips(
     parameters: &Parameters,

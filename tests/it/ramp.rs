@@ -103,7 +103,8 @@ fn both_solvers_show_the_same_trace() {
         .unwrap();
         trace.rows
     };
-    let (exact, stepped) = (traced(EXACT), traced(Solver::fixed_step(1e-7)));
+    let exact = traced(EXACT);
+    let stepped = traced(Solver::fixed_step(1e-7));
     assert!(exact.len() >= 500 && stepped.len() >= 500);
     // A leap does not show the free motion that it carries over: 4e-4 N after the jolt of the start, the largest here.
     // A ramp that were not followed would be off by up to K_d (Δ - Δ_to) = 28 N.

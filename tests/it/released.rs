@@ -1,5 +1,5 @@
-//! Directories that released versions have written are read by all later ones. Each version adds one of its own, which
-//! stays as it is: tests/released/VERSION, by `run tests/released/sweep.toml`, without `run/lock` and `run/log`.
+//! Later versions read the directories that released versions wrote. Each version adds one, which never changes:
+//! tests/released/VERSION, made by `run tests/released/sweep.toml`, without `run/lock` and `run/log`.
 
 use crate::program::Folder;
 use std::fs;
