@@ -19,7 +19,7 @@ use super::taylor::StepInput;
 use super::{Integration, WORTHWHILE_GRID_LEAP};
 use crate::model::equation::largest_frequency;
 use crate::model::simd::Simd;
-use crate::model::{Change, ContactEvent, Parameters};
+use crate::model::{ContactEvent, Parameters};
 use crate::solver::segment::CubicStep;
 use crate::solver::{Observer, SimulationError};
 use crate::value::floored;
@@ -181,6 +181,7 @@ pub(super) fn advance<S: Simd, const R: usize>(
     let start_bend = grid.drive.bend_before();
     let start = time + (done - 1) as f64 * grid.step.length;
     grid.events.changes.clear();
+    grid.events.attachments.clear();
     (grid.events.breaks, grid.events.reattachments) = (0, 0);
     if !grid.step.reached.is_empty()
         || slider.interface.next_reattachment() <= start + grid.step.length
@@ -341,10 +342,16 @@ impl Integration<'_> {
     /// change after change to an observer that follows attachments; else up to the last break, and before to those at
     /// the leading edge, at which a slip's onset is known, and to the first if it may begin a rupture.
     fn report_changes(&mut self, start: f64, observer: &mut dyn Observer) {
+        if self.grid.events.changes.is_empty() {
+            for due in &self.grid.events.attachments {
+                self.slider.interface.count_attachment(*due);
+            }
+            return;
+        }
         let changes = std::mem::take(&mut self.grid.events.changes);
-        let mut attachments = std::mem::take(&mut self.grid.events.attachments);
-        let mut uncounted = attachments.drain(..).peekable();
-        if changes.iter().any(|change| change.change == Change::Break) {
+        let attachments = std::mem::take(&mut self.grid.events.attachments);
+        let mut uncounted = &attachments[..];
+        if self.grid.events.breaks > 0 {
             self.largest_force = f64::NEG_INFINITY;
         }
         let [mean, rise] = self.grid.events.mean;
@@ -363,8 +370,11 @@ impl Integration<'_> {
             let s = (until - start) * self.grid.step.inverse_length;
             self.report_force(s.clamp(0.0, 1.0), observer);
             for change in reported {
-                while let Some(due) = uncounted.next_if(|due| *due <= change.time) {
-                    self.slider.interface.count_attachment(due);
+                while let [due, later @ ..] = uncounted
+                    && *due <= change.time
+                {
+                    self.slider.interface.count_attachment(*due);
+                    uncounted = later;
                 }
                 let count = self.slider.interface.count(change);
                 let left = 1.0 - (change.time - start) * self.grid.step.inverse_length;
@@ -377,7 +387,9 @@ impl Integration<'_> {
             }
             rest = later;
         }
-        uncounted.for_each(|due| self.slider.interface.count_attachment(due));
+        for due in uncounted {
+            self.slider.interface.count_attachment(*due);
+        }
         if let Some(last) = changes.last() {
             self.grid.last_break = last.time;
         }
