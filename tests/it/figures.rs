@@ -394,8 +394,8 @@ fn the_sweeps_of_this_project_have_figures() {
             text.lines()
                 .any(|line| line.split([' ', '=']).next() == Some(key))
         };
-        let smaller = text.lines().map(|line| match line.split_once(" = ") {
-            Some(("seeds   " | "seeds", _)) => "seeds = { from = 2, to = 2 }",
+        let smaller = text.lines().map(|line| match line.split_once('=') {
+            Some((key, _)) if key.trim() == "seeds" => "seeds = { from = 2, to = 2 }",
             _ => line,
         });
         folder.write("sweep.toml", &smaller.collect::<Vec<_>>().join("\n"));

@@ -1,6 +1,7 @@
 """Cargo.toml has a reason for every crate, and for every one that is there twice; the lock file is always used."""
 
 import re
+import subprocess
 import tomllib
 from collections import Counter
 
@@ -45,3 +46,16 @@ def test_scripts_use_the_lock_file():
     ]
     assert len(calls) >= 5, calls
     assert [call for call in calls if "--locked" not in call[1]] == []
+
+
+def test_every_crate_is_built_once_for_program_tests_and_module():
+    def built(kinds, package):
+        command = ["cargo", "tree", "--locked", "--prefix=none", "--format={p} {f}", f"--edges={kinds}", f"--package={package}"]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+        return {line.removesuffix(" (*)") for line in done.stdout.splitlines()}
+
+    builds = [built("normal,build", "stickslip"), built("normal,build,dev", "stickslip"), built("normal,build", "stickslip-python")]
+    features = set.union(*builds)
+    crates = Counter(" ".join(line.split()[:2]) for line in features)
+    assert len(crates) > 100
+    assert [crate for crate, count in crates.items() if count > 1] == [], "each with several sets of features"
