@@ -20,6 +20,8 @@ mod sweep;
 mod verify;
 
 use crate::figure::BadOption;
+use crate::model::Symbol;
+use crate::observe::RecordingKey;
 use crate::reduce::NoJobs;
 use crate::results::layout::Layout;
 use crate::results::{ErrorKind, ResultsError};
@@ -29,6 +31,7 @@ use crate::sweep::SweepError;
 use crate::table::storage::Disk;
 use anyhow::{Context, Result};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::error::{ContextKind, ContextValue, ErrorKind as CliErrorKind};
 use clap::{Parser, Subcommand};
 use signal_hook::consts::signal::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
 use signal_hook::flag::{register, register_conditional_shutdown};
@@ -79,7 +82,10 @@ enum Command {
 /// Parses a command line, does what it asks, and returns the exit code. `program` is what starts this program again, by
 /// default the executable itself; the first of the arguments is its name.
 pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let command = Cli::parse_from(arguments).command;
+    let command = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli.command,
+        Err(error) => with_way_out(error).exit(),
+    };
     let ended = outlive_limit_of_files().and_then(|()| match command {
         Command::Init(arguments) => init::init(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
@@ -101,6 +107,23 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Exit::of(&error)
     });
     exit as u8
+}
+
+/// An error of the command line; a key of sweep files in place of a flag gets the flag that sets it.
+fn with_way_out(mut error: clap::Error) -> clap::Error {
+    let key = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(flag)) => flag.trim_start_matches('-').to_owned(),
+        _ => return error,
+    };
+    let is_key = Symbol::from_key(&key).is_some() || RecordingKey::from_key(&key).is_some();
+    if error.kind() == CliErrorKind::UnknownArgument && is_key {
+        let tip = format!("`--set {key}=VALUE` sets it");
+        error.insert(
+            ContextKind::Suggested,
+            ContextValue::StyledStrs(vec![tip.into()]),
+        );
+    }
+    error
 }
 
 /// Reads one of some values by its word; the help describes them.

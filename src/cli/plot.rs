@@ -148,6 +148,9 @@ struct CustomFlags {
     /// Column whose values get a panel each, up to nine
     #[arg(long, value_name = "COLUMN", requires = "x")]
     panels: Option<String>,
+    /// Only sets for which a condition on their columns, by name or heading, holds, in SI
+    #[arg(long = "where", value_name = "CONDITION", requires = "x")]
+    condition: Option<String>,
     /// Logarithmic axes [default: where it was swept so, or values lie decades apart]
     #[arg(long, value_name = "AXES", requires = "x", value_parser = ["x", "y", "xy", "none"])]
     log: Option<String>,
@@ -174,6 +177,7 @@ impl CustomFlags {
             y: flags.y?,
             colour: flags.colour,
             panels: flags.panels,
+            condition: flags.condition,
             log: flags.log,
             xlim: flags.xlim.unwrap_or_default(),
             ylim: flags.ylim.unwrap_or_default(),

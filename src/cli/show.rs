@@ -4,8 +4,8 @@ use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
 use crate::model::Symbol;
 use crate::reduce::{
-    EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing, read_reduced,
-    read_sets, renew, sets_where,
+    Condition, EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing,
+    read_reduced, read_sets, renew,
 };
 use crate::results::Results;
 use crate::sets::{Digits, label, with_decimals};
@@ -30,10 +30,10 @@ pub struct Arguments {
     /// A second one: what differs, seed by seed, between the sets of both that agree in all that either varies
     #[arg(value_name = "OTHER", conflicts_with_all = ["columns", "condition", "sort"])]
     other: Option<PathBuf>,
-    /// Columns of the sets, or formulas of such, separated by commas [default: what differs, and what was found]
+    /// Columns of the sets, or formulas of such, separated by commas, beside what was swept [default: what was found]
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     columns: Vec<String>,
-    /// Only sets for which a condition on their columns holds, in SI
+    /// Only sets for which a condition on their columns, by name or heading, holds, in SI
     #[arg(long = "where", value_name = "CONDITION")]
     condition: Option<String>,
     /// Column to sort by, least first; -COLUMN: largest first
@@ -53,7 +53,7 @@ Examples:
   stickslip show results/fig3 --where 'V0 > 1e-4 and resultant_length > 0.5' --sort -resultant_excess
   stickslip show results/sliding-velocity --where 'slip_share >= 0.95'   the sets that slide
   stickslip show results/soft results/stiff                   what another Kd changes, say
-  stickslip show results/fig3 --columns V0,eta,tau_mean,tau_sd/tau_mean --csv > fig3.csv
+  stickslip show results/fig3 --columns tau_mean,tau_sd/tau_mean --csv > fig3.csv
 
 Columns are those of stickslip plot --list.";
 
@@ -136,13 +136,13 @@ fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) 
 fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
     let mut rows = sets(results, usize::MAX)?;
     let usual = usual_names(&rows);
-    if let Some(condition) = &arguments.condition {
-        let count = rows.len();
-        rows = sets_where(rows, condition)
-            .map_err(|problem| UsageError(format!("--where {condition}: {problem}")))?;
-        if rows.is_empty() && arguments.is_text() {
-            return output::print(&format!("none of {count} sets matches\n"));
+    if let Some(text) = &arguments.condition {
+        let condition = Condition::read(text)
+            .map_err(|problem| UsageError(format!("--where {text}: {problem}")))?;
+        if arguments.is_text() && !rows.iter().any(|row| condition.holds(row)) {
+            return output::print(&(condition.unmatched(&rows) + "\n"));
         }
+        rows.retain(|row| condition.holds(row));
     }
     if let Some(column) = &arguments.sort {
         sort(&mut rows, column)?;
@@ -152,14 +152,11 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
         // The names of the columns are those of all sets.
         rows = sets(results, usize::MAX)?;
     }
-    let mut columns = Vec::new();
-    for name in &arguments.columns {
-        let values = Values::of(&rows, name);
-        columns.push(values.map_err(|problem| UsageError(format!("--columns {name}: {problem}")))?);
-    }
-    if columns.is_empty() {
-        columns = usual_columns(usual, &rows);
-    }
+    let columns = if arguments.columns.is_empty() {
+        usual_columns(usual, &rows)
+    } else {
+        chosen_columns(usual, &arguments.columns, &rows)?
+    };
     let edges = edges(results)?;
     if arguments.is_text() {
         if let Some(unfinished) = output::unfinished(results)? {
@@ -227,6 +224,26 @@ fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
     columns
         .filter(|values| values.numbers.iter().any(Option::is_some))
         .collect()
+}
+
+/// The parameters of these names, and columns by name, heading or formula, each once.
+fn chosen_columns(
+    parameters: Vec<&'static str>,
+    chosen: &[String],
+    rows: &[SetRow],
+) -> Result<Vec<Values>> {
+    let mut columns = Vec::new();
+    for name in chosen {
+        let values = Values::of(rows, name);
+        columns.push(values.map_err(|problem| UsageError(format!("--columns {name}: {problem}")))?);
+    }
+    let is_left_out = |name: &&str| columns.iter().all(|values| values.name() != *name);
+    let parameters = parameters.into_iter().filter(is_left_out);
+    let mut all: Vec<Values> = parameters
+        .filter_map(|name| Values::of(rows, name).ok())
+        .collect();
+    all.append(&mut columns);
+    Ok(all)
 }
 
 fn sort(rows: &mut Vec<SetRow>, column: &str) -> Result<()> {

@@ -430,12 +430,16 @@ impl<'a> Report<'a> {
             "{} breaks, {} reattachments",
             self.breaks, self.reattachments
         );
+        let outcome = match self.outcome {
+            "no slips" => "no slips: ended early, as none came within give_up_after".to_owned(),
+            other => other.to_owned(),
+        };
         let steps = format!("{}, of which {} leaps", self.steps, self.leaps);
         output::pairs(&[
             ("job", self.job_id.to_owned()),
             ("simulated time", format!("{:.6} s", self.simulated_seconds)),
             ("slips", self.slips.to_string()),
-            ("outcome", self.outcome.to_owned()),
+            ("outcome", outcome),
             ("regime", regime),
             ("mean interval", mean(self.mean_interval_seconds, "s")),
             ("mean friction", mean(self.mean_friction_newtons, "N")),

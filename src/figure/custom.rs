@@ -16,6 +16,8 @@ pub struct CustomFigure {
     pub colour: Option<String>,
     /// Column whose values get a panel each.
     pub panels: Option<String>,
+    /// Condition on the columns of the sets that are drawn.
+    pub condition: Option<String>,
     /// The letters of the logarithmic axes; else those that were swept so, or whose values lie decades apart.
     pub log: Option<String>,
     pub xlim: Limits,

@@ -39,7 +39,7 @@ pub use style::{INKS, Ink, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
 use crate::model::{Parameters, Symbol, Value};
-use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
+use crate::reduce::{Condition, EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
 use crate::results::ResultsError;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
@@ -116,7 +116,15 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 /// Draws a custom figure from the sets of a results directory; writes nothing.
 pub fn draw_custom(layout: &Layout<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
     let rows = read_sets(layout).collect::<Result<Vec<_>, _>>();
-    let rows = rows.map_err(advise(ADVICE))?;
+    let mut rows = rows.map_err(advise(ADVICE))?;
+    if let Some(text) = &figure.condition {
+        let bad = |problem: String| BadOption::new("where", text, &problem);
+        let condition = Condition::read(text).map_err(bad)?;
+        if !rows.iter().any(|row| condition.holds(row)) {
+            return Err(bad(condition.unmatched(&rows)).into());
+        }
+        rows.retain(|row| condition.holds(row));
+    }
     let look = &look.with_note(&common(rows.iter().map(|row| &*row.parameters)));
     let picture = custom::custom(&rows, figure, look)?;
     check_size(&picture, look)?;

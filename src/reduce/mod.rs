@@ -36,7 +36,7 @@ pub use reduction::{
 };
 pub use sequence::quantile;
 pub use values::{
-    Values, ascending, differing, has_even_steps, is_same, is_spread, sets_where, swept,
+    Condition, Values, ascending, differing, has_even_steps, is_same, is_spread, swept,
 };
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

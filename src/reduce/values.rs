@@ -5,11 +5,13 @@
 
 use crate::model::Symbol;
 use crate::sets::{Digits, FREQUENCY, Label, SetRow, label};
-use crate::sweep::{Expression, nearest};
+use crate::sweep::{Expression, nearest, synonym};
 use crate::table::columns::{Column, Kind, Row, Value};
-use crate::table::value::floored;
+use crate::table::value::{Shortest, floored};
 use std::collections::BTreeSet;
 
+/// Most names in a message.
+const MAX_NAMES: usize = 8;
 /// Numbers that differ by less than this share count as equal: they were computed from numbers with twelve digits.
 const SAME: f64 = 1e-10;
 
@@ -31,11 +33,11 @@ impl Values {
     /// The values of a column, or of a formula such as `tau_sd / tau_mean`. An error says what is wrong with the name.
     pub fn of(rows: &[SetRow], name: &str) -> Result<Self, String> {
         let columns = SetRow::columns();
-        let index = |name: &str| columns.iter().position(|column| column.name == name);
-        let Some(column) = index(name) else {
+        let Some(column) = place(name, &columns) else {
             return Self::of_formula(rows, name, &columns);
         };
-        let ends = index(&format!("{name}_low")).zip(index(&format!("{name}_high")));
+        let end = |end: &str| place(&format!("{}_{end}", columns[column].name), &columns);
+        let ends = end("low").zip(end("high"));
         let mut numbers = Vec::new();
         let mut intervals = Vec::new();
         let mut given = Vec::new();
@@ -77,7 +79,7 @@ impl Values {
 
     fn of_formula(rows: &[SetRow], text: &str, columns: &[Column]) -> Result<Self, String> {
         let mut letters = text.chars();
-        if letters.all(|letter| letter.is_alphanumeric() || letter == '_') {
+        if letters.all(|letter| letter.is_alphanumeric() || "_⟨⟩".contains(letter)) {
             return Err(unknown(text, columns));
         }
         let formula = Expression::formula(text, &|name| number_column(name, columns));
@@ -160,13 +162,35 @@ fn word(cell: Value<'_>) -> Option<String> {
     }
 }
 
-/// The sets for which a condition on their columns holds, such as `V0 < 1e-4 and resultant_length > 0.5`.
-pub fn sets_where(rows: Vec<SetRow>, condition: &str) -> Result<Vec<SetRow>, String> {
-    let columns = SetRow::columns();
-    let condition = Expression::condition(condition, &|name| number_column(name, &columns));
-    let condition = condition.map_err(|error| error.to_string())?;
-    let holds = |row: &SetRow| evaluate(&condition, row) == 1.0;
-    Ok(rows.into_iter().filter(holds).collect())
+/// A condition on the columns of sets, such as `V0 < 1e-4 and resultant_length > 0.5`.
+pub struct Condition(Expression<usize>);
+
+impl Condition {
+    pub fn read(text: &str) -> Result<Self, String> {
+        let columns = SetRow::columns();
+        let expression = Expression::condition(text, &|name| number_column(name, &columns));
+        expression.map(Self).map_err(|error| error.to_string())
+    }
+
+    pub fn holds(&self, row: &SetRow) -> bool {
+        evaluate(&self.0, row) == 1.0
+    }
+
+    /// That none of some sets fulfils it, with the values that are nearest to those that it compares with.
+    pub fn unmatched(&self, rows: &[SetRow]) -> String {
+        let columns = SetRow::columns();
+        let nearest = |(&place, wanted): (&usize, f64)| {
+            let Column { name, unit, .. } = &columns[place];
+            let values = rows.iter().filter_map(|row| row.number(name));
+            let distance = |value: &f64| (value - wanted).abs();
+            let nearest = values.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            let value = format!("{} {unit}", Shortest(nearest));
+            Some(format!("{name} nearest to {wanted}: {}", value.trim_end()))
+        };
+        let nearest: Vec<String> = self.0.compared().into_iter().filter_map(nearest).collect();
+        let none = format!("none of {} sets matches", rows.len());
+        [vec![none], nearest].concat().join("; ")
+    }
 }
 
 /// The value of an expression for a row; NaN stands for a missing value.
@@ -176,9 +200,15 @@ fn evaluate(expression: &Expression<usize>, row: &SetRow) -> f64 {
     expression.evaluate(&|&column| cells[column])
 }
 
+/// The place of a column by its name, or by its heading in printed tables.
+fn place(name: &str, columns: &[Column]) -> Option<usize> {
+    let place = |is_meant: &dyn Fn(&Column) -> bool| columns.iter().position(is_meant);
+    place(&|column| column.name == name)
+        .or_else(|| place(&|column| label(&column.name).symbol == name))
+}
+
 fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
-    let place = columns.iter().position(|column| column.name == name);
-    let place = place.ok_or_else(|| unknown(name, columns))?;
+    let place = place(name, columns).ok_or_else(|| unknown(name, columns))?;
     match columns[place].kind {
         Kind::Text | Kind::Flag => Err(format!(
             "{name} holds words; a number is needed here, such as slip_share, which is 0.95 or more where sets slide"
@@ -192,11 +222,11 @@ fn unknown(name: &str, columns: &[Column]) -> String {
     let is_longer = |known: &&str| {
         known.starts_with(name) && !known.ends_with("_low") && !known.ends_with("_high")
     };
-    let longer: Vec<&str> = names.iter().copied().filter(is_longer).collect();
-    let meant = if longer.is_empty() {
-        nearest(name, &names).map(str::to_owned)
-    } else {
-        Some(longer.join(", "))
+    let longer = names.iter().copied().filter(is_longer).take(MAX_NAMES);
+    let longer: Vec<&str> = longer.collect();
+    let meant = match synonym(name, &names) {
+        None if !longer.is_empty() => Some(longer.join(", ")),
+        synonym => synonym.or_else(|| nearest(name, &names)).map(str::to_owned),
     };
     let hint = meant.map_or_else(String::new, |meant| format!(" did you mean {meant}?"));
     format!("no such column;{hint} `stickslip plot --list` shows all")
@@ -361,14 +391,22 @@ mod tests {
             Values::of(&rows(), "1 / (tau_mean - 2)").unwrap().numbers,
             [None; 2]
         );
-        let left = |condition: &str| sets_where(rows(), condition).map(|rows| rows.len());
+        let left = |condition: &str| {
+            let condition = Condition::read(condition)?;
+            Ok::<_, String>(rows().iter().filter(|row| condition.holds(row)).count())
+        };
         assert_eq!(
             (
                 left("tau_mean > 1"),
                 left("mean_friction > 0"),
-                left("frequency != 50")
+                left("frequency != 50 or R > 0 or ⟨τ⟩ > 1e9")
             ),
             (Ok(2), Ok(1), Ok(0))
+        );
+        let unmatched = Condition::read("tau_mean > 90 and frequency == 49").unwrap();
+        assert_eq!(
+            unmatched.unmatched(&rows()),
+            "none of 2 sets matches; tau_mean nearest to 90: 2 s; frequency nearest to 49: 50 Hz"
         );
         for (condition, words) in [
             ("tau_men > 1", "did you mean tau_mean?"),
@@ -387,6 +425,8 @@ mod tests {
             error("resultant")
                 .contains("did you mean resultant_length, resultant_drive, resultant_excess?")
         );
+        assert!(error("tau").contains("did you mean tau_mean?"));
+        assert_eq!(error("tau_").matches("tau_").count(), MAX_NAMES);
         assert!(
             error("colour").contains("plot --list` shows all"),
             "{}",

@@ -9,10 +9,8 @@
 //! factor     = "-" factor | number | name | "(" sum ")"
 //! ```
 //!
-//! A comparison with something undefined, such as 0/0, does not hold. Names of the conditions of a sweep are the keys
+//! Numbers are equal if twelve digits of them are. A comparison with something undefined, such as 0/0, does not hold. Names of the conditions of a sweep are the keys
 //! of the parameters, `eta` and `frequency`, in SI. Read by operator precedence (V. R. Pratt, POPL 1973).
-
-use std::cmp::Ordering;
 
 /// Most words and signs of a condition: it is read and evaluated by recursion.
 const MAX_WORDS: usize = 500;
@@ -57,16 +55,28 @@ const OPERATORS: [Operator; 12] = [
     operator("<=", COMPARISON, |a, b| f64::from(a <= b)),
     operator(">", COMPARISON, |a, b| f64::from(a > b)),
     operator(">=", COMPARISON, |a, b| f64::from(a >= b)),
-    operator("==", COMPARISON, |a, b| f64::from(a == b)),
-    // Not `a != b`, which holds for what is no number.
+    operator("==", COMPARISON, |a, b| f64::from(is_equal(a, b))),
+    // Undefined numbers neither equal others nor differ from them.
     operator("!=", COMPARISON, |a, b| {
-        f64::from(a.partial_cmp(&b).is_some_and(Ordering::is_ne))
+        f64::from(a.partial_cmp(&b).is_some() && !is_equal(a, b))
     }),
     operator("+", SUM, |a, b| a + b),
     operator("-", SUM, |a, b| a - b),
     operator("*", PRODUCT, |a, b| a * b),
     operator("/", PRODUCT, |a, b| a / b),
 ];
+
+/// Half of the twelfth digit, relative to a number that begins with 1.
+const TWELVE_DIGITS: f64 = 5e-12;
+
+fn is_equal(a: f64, b: f64) -> bool {
+    a == b || (a - b).abs() <= TWELVE_DIGITS * a.abs().max(b.abs())
+}
+
+/// Names are keys, or headings such as ⟨τ⟩ and V₀.
+fn is_of_name(letter: char) -> bool {
+    letter.is_alphanumeric() || "_.⟨⟩".contains(letter)
+}
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("at character {position}: {problem}")]
@@ -127,6 +137,23 @@ impl<N> Expression<N> {
         }
     }
 
+    /// The names that are compared with a number, and these numbers.
+    pub fn compared(&self) -> Vec<(&N, f64)> {
+        let Self::Combined(combined) = self else {
+            return Vec::new();
+        };
+        let (left, operator, right) = &**combined;
+        match (left, right) {
+            _ if operator.precedence < COMPARISON => [left.compared(), right.compared()].concat(),
+            (Self::Name(name), number) | (number, Self::Name(name))
+                if number.names().is_empty() =>
+            {
+                vec![(name, number.evaluate(&|_| f64::NAN))]
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// This expression, which starts at `position`, where a condition or a number is needed.
     fn demanded(self, condition: bool, position: usize) -> Result<Self, ExpressionError> {
         let is_condition =
@@ -161,8 +188,7 @@ impl<'a, N> Reader<'a, N> {
 
     /// What is wrong with the next word or sign, unless it means nothing anywhere.
     fn error(&self, problem: impl Into<String>) -> ExpressionError {
-        let has_meaning =
-            |letter: char| letter.is_ascii_alphanumeric() || "_.<>=!+-*/()".contains(letter);
+        let has_meaning = |letter: char| is_of_name(letter) || "<>=!+-*/()".contains(letter);
         let problem = match self.peek() {
             other if other.chars().all(has_meaning) => problem.into(),
             other => format!(
@@ -183,7 +209,7 @@ impl<'a, N> Reader<'a, N> {
         let ends = |letter: char| {
             let is_of_exponent = is_number && "+-".contains(letter) && "eE".contains(before);
             before = letter;
-            !(letter.is_ascii_alphanumeric() || "_.".contains(letter) || is_of_exponent)
+            !(is_of_name(letter) || is_of_exponent)
         };
         let mut letters = rest.chars();
         let length = match (
@@ -271,7 +297,7 @@ impl<'a, N> Reader<'a, N> {
                 Ok(constant) if f64::is_finite(constant) => Expression::Constant(constant),
                 _ => return Err(self.error(format!("\"{text}\" is not a number"))),
             },
-            Some('a'..='z' | 'A'..='Z' | '_') => {
+            Some(first) if is_of_name(first) => {
                 Expression::Name((self.names)(text).map_err(|problem| self.error(problem))?)
             }
             Some(_) => {
@@ -342,6 +368,13 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_equal_if_twelve_digits_are() {
+        assert!(holds("Delta == 1.000000000004e-6 and 0 == 0"));
+        assert!(holds("Delta != 1.00000000001e-6 and 1e-320 != 0"));
+        assert!(!holds("Delta != 1.000000000004e-6"));
+    }
+
+    #[test]
     fn without_modulation_eta_and_the_frequency_are_zero() {
         for text in ["eta == 0", "frequency == 0", "T > 1e300"] {
             assert!(holds_at(text, 0.0, (Quantity::Eta, 3.0)), "{text}");
@@ -366,7 +399,8 @@ mod tests {
             ("(T < 1) + 1 > 2", 1, "a number is needed"),
             ("T < 1 and 3", 11, "comparison is needed"),
             ("T < 1e999", 5, "not a number"),
-            ("\u{3c4} < 1", 1, "no meaning"),
+            ("\u{a7} < 1", 1, "no meaning"),
+            ("\u{3c4} < 1", 1, "not a known quantity"),
         ] {
             let error = parse(text).expect_err(text);
             assert_eq!(error.position, position, "{text}: {error}");

@@ -175,6 +175,15 @@ impl Point {
     }
 }
 
+/// What papers and other programs call some keys and columns.
+const SYNONYMS: &[(&str, &str)] = &[
+    ("k", "ki"),
+    ("interval", "tau_mean"),
+    ("tau", "tau_mean"),
+    ("friction", "mean_friction"),
+    ("stress_drop", "drop_mean"),
+];
+
 /// The hint for an unknown word: the nearest known one, or all.
 pub(super) fn hint(word: &str, known: &[&str]) -> String {
     match nearest(word, known) {
@@ -189,7 +198,13 @@ pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
         |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
     // Half of a short word, two letters of a long one.
     let max = (word.chars().count() / 2).min(2);
-    let known = known.iter().copied();
-    let near = known.filter(|candidate| distance(candidate) <= max);
-    near.min_by_key(|candidate| distance(candidate))
+    let near = known.iter().copied();
+    let near = near.filter(|candidate| distance(candidate) <= max);
+    synonym(word, known).or_else(|| near.min_by_key(|candidate| distance(candidate)))
+}
+
+/// The known word that means the same.
+pub fn synonym<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
+    let meant = |candidate: &&str| SYNONYMS.contains(&(word, *candidate));
+    known.iter().copied().find(meant)
 }

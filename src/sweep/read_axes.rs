@@ -216,7 +216,12 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
         whole: quantity.is_count(),
     };
     if range.low >= range.high {
-        return Err(entry.must_be("[low, high] with low < high"));
+        let written = |end: &Entry<'_>| entry.source.text[end.node.span()].to_owned();
+        let other = match range.low > range.high {
+            true => format!(": [{}, {}]", written(high), written(low)),
+            false => String::new(),
+        };
+        return Err(entry.must_be(&format!("[low, high] with low < high{other}")));
     }
     if logarithmic && range.low <= 0.0 {
         return Err(entry.must_be(

@@ -62,6 +62,10 @@ impl Change {
             }
             ["count", count] => format!("{{ count = {} }}", scalar(count)),
             ["count", ..] => return Err("count:N, with the number of values"),
+            [_, _, ..] => return Err("log:LOW:HIGH:POINTS, linear:LOW:HIGH:POINTS or a list"),
+            [one] if key == "seed" && one.parse::<u64>().is_ok() => {
+                return Err("count:N for N seeds, or [SEED] for a single one");
+            }
             _ => {
                 let list: Vec<String> = values.split(',').map(str::trim).map(scalar).collect();
                 format!("[{}]", list.join(", "))

@@ -440,6 +440,19 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
             "simulate --set Delta=1e-6 --set eta=3 --set T=1",
             &["T: fixes the period, as does eta; keep one"],
         ),
+        (
+            "simulate --set k=3",
+            &["k = 3: unknown key; did you mean ki?"],
+        ),
+        ("run good.toml --slips 10", &["`--set slips=VALUE` sets it"]),
+        (
+            "plan good.toml --axis seed=8",
+            &["must be seed=count:N for N seeds, or [SEED] for a single one"],
+        ),
+        (
+            "plan good.toml --axis V0=1e-5:1e-4",
+            &["must be V0=log:LOW:HIGH:POINTS, linear:LOW:HIGH:POINTS or a list"],
+        ),
         ("simulate --set =3", &["--set =3: must be KEY=VALUE"]),
         (
             "simulate --set V0=fast",

@@ -219,6 +219,10 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
             &["none of 12 sets lies within --xlim and --ylim"],
         ),
         (
+            "--x V0 --y tau_mean --where V0==1",
+            &["--where V0==1: none of 16 sets matches; V0 nearest to 1: "],
+        ),
+        (
             "--x V0 --y tau_mean --xlim 2:1",
             &["--xlim 2:1", "less than the upper"],
         ),

@@ -63,7 +63,7 @@ fn run_ends_with_the_result_and_show_prints_it_again() {
         .ends(0, "show out --columns frequency,tau_mean --csv")
         .stdout;
     assert!(
-        csv.starts_with("frequency,tau_mean,tau_mean_low,tau_mean_high\n"),
+        csv.starts_with("Delta,eta,frequency,tau_mean,tau_mean_low,tau_mean_high\n"),
         "{csv}"
     );
     let of_table = folder.file("out/reduced/sets.parquet").reals("tau_mean");
@@ -90,7 +90,7 @@ fn run_ends_with_the_result_and_show_prints_it_again() {
         folder
             .ends(0, ends)
             .stdout
-            .starts_with("tau_sd_high,tau_sd,tau_sd_low\n")
+            .starts_with("Delta,frequency,eta,tau_sd_high,tau_sd,tau_sd_low\n")
     );
 }
 
@@ -100,7 +100,7 @@ fn sets_are_chosen_sorted_and_computed_with() {
     folder.write("small.toml", SWEEP);
     folder.ends(0, "run small.toml --out out");
     let found = folder
-        .run("show out --json --where frequency>30 --columns frequency,1e3*tau_mean")
+        .run("show out --json --where 1/T>30 --columns frequency,1e3*tau_mean")
         .stdout;
     let sets = json(&found)["sets"].as_array().unwrap().clone();
     assert_eq!(
@@ -126,6 +126,21 @@ fn sets_are_chosen_sorted_and_computed_with() {
     assert!(
         up.is_sorted() && down.iter().rev().eq(&up),
         "{up:?} {down:?}"
+    );
+    // By heading, too; what was swept comes first.
+    let by_heading = folder
+        .ends(0, "show out --csv --columns R,⟨τ⟩ --where η>0")
+        .stdout;
+    assert!(
+        by_heading.starts_with("Delta,frequency,eta,resultant_length,"),
+        "{by_heading}"
+    );
+    assert!(by_heading.contains(",tau_mean,") && by_heading.lines().count() == 3);
+    let none = folder.ends(0, "show out --where ⟨τ⟩>90").stdout;
+    assert!(
+        none.starts_with("none of 3 sets matches; tau_mean nearest to 90: 0.")
+            && none.ends_with(" s\n"),
+        "{none}"
     );
     for (arguments, problem) in [
         (
@@ -303,23 +318,18 @@ fn jobs_without_slips_are_reported_with_a_command_that_shows_one() {
         )
         .stdout;
     let (head, of_set) = shown.split_once('\n').unwrap();
-    let unit = head
-        .strip_prefix("⟨τ⟩ (")
-        .and_then(|head| head.split_once(')'))
-        .unwrap()
-        .0;
-    assert_eq!(head, format!("⟨τ⟩ ({unit})  ⟨τ⟩, at least ({unit})"));
-    let bounds = of_set
-        .lines()
-        .next()
-        .unwrap()
-        .trim_start()
-        .strip_prefix("> ")
-        .unwrap();
-    let bounds: Vec<f64> = bounds
-        .split_whitespace()
-        .map(|bound| bound.parse().unwrap())
-        .collect();
+    let units: Vec<&str> = head.split('(').skip(2).collect();
+    assert!(
+        head.trim_start().starts_with("V₀ (m/s)  ⟨τ⟩ (") && units.len() == 2,
+        "{head}"
+    );
+    assert_eq!(
+        units[0].split_once(')').map(|unit| unit.0),
+        units[1].strip_suffix(')')
+    );
+    let (_, bounds) = of_set.split_once("> ").unwrap();
+    let bounds = bounds.lines().next().unwrap().split_whitespace();
+    let bounds: Vec<f64> = bounds.map(|bound| bound.parse().unwrap()).collect();
     assert!(
         bounds[0] == bounds[1] && (1.0..1000.0).contains(&bounds[0]),
         "{shown}"

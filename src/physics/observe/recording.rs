@@ -21,7 +21,7 @@ fields! {
         MaxEvents("max_events") max_events: u64 = 1_000_000_000, "", COUNT,
             "Contact events after which a job counts as failed; may be raised for `--retry-failed` in the same directory";
         PrecursorSize("precursor_size") precursor_size: Option<u64> = None, "", COUNT,
-            "Minimum number of breaks of a precursor; none: `Ns` of the job";
+            "Minimum number of breaks of a precursor; none: `Ns` of the job, another for each along an axis of Ns";
         Precursors("precursors") precursors: bool = false, "", FLAG,
             "Whether each precursor becomes a row of its own; their number before each slip is always recorded";
         DropSize("drop_size") drop_size: Option<f64> = None, "N", POSITIVE,

@@ -4,6 +4,7 @@ use super::fault::{Fault, Operation};
 use super::faulty_disk::{FaultyDisk, MOUNT};
 use super::*;
 use crate::reduce::reduce;
+use rayon::prelude::*;
 
 /// Few jobs a part, by the predicted cost: 8 jobs in two parts with the first two seeds.
 pub fn small_sweep(seeds: u64) -> Sweep {
@@ -303,33 +304,24 @@ impl Trial {
     }
 }
 
-/// How often each fault befell each operation.
-fn try_all(scenario: Scenario) -> BTreeMap<(Operation, Fault), usize> {
-    let trial = Trial::new(scenario);
-    let mut tried = BTreeMap::new();
-    for operation in Operation::ALL {
-        for fault in Fault::ALL
-            .into_iter()
-            .filter(|fault| fault.befalls(operation))
-        {
-            let mut n = 0;
-            while trial.befalls(operation, n, fault) {
-                n += 1;
-            }
-            tried.insert((operation, fault), n);
-        }
-    }
-    tried
-}
-
 #[test]
 fn every_fault_at_every_operation_leaves_whole_files_and_the_next_run_ends_with_the_same_bytes() {
-    let each = std::thread::scope(|scope| {
-        let threads = SCENARIOS.map(|scenario| scope.spawn(move || try_all(scenario)));
-        threads.map(|thread| thread.join().unwrap())
-    });
+    let trials: Vec<Trial> = SCENARIOS.into_par_iter().map(Trial::new).collect();
+    let mut threats = Vec::new();
+    for trial in &trials {
+        for operation in Operation::ALL {
+            let faults = Fault::ALL.into_iter();
+            let faults = faults.filter(|fault| fault.befalls(operation));
+            threats.extend(faults.map(|fault| (trial, operation, fault)));
+        }
+    }
+    let count = |&(trial, operation, fault): &(&Trial, Operation, Fault)| {
+        let times = (0..).take_while(|n| trial.befalls(operation, *n, fault));
+        ((operation, fault), times.count())
+    };
+    let counts: Vec<_> = threats.par_iter().map(count).collect();
     let mut tried = BTreeMap::new();
-    for (pair, count) in each.into_iter().flatten() {
+    for (pair, count) in counts {
         *tried.entry(pair).or_default() += count;
     }
     assert!(

@@ -249,7 +249,7 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
         (
             "name = \"a\"\n[axes]\nV0 = { linear = [2, 1], points = 3 }",
             3,
-            &["linear = [2, 1]", "low < high"],
+            &["linear = [2, 1]", "low < high: [1, 2]"],
         ),
         (
             "name = \"a\"\n[axes]\nV0 = { linear = [2], points = 3 }",
