@@ -36,18 +36,31 @@ impl Values {
         let Some(column) = place(name, &columns) else {
             return Self::of_formula(rows, name, &columns);
         };
-        let end = |end: &str| place(&format!("{}_{end}", columns[column].name), &columns);
+        let end = |end: &str| {
+            let name = format!("{}_{end}", columns[column].name);
+            columns.iter().position(|column| column.name == name)
+        };
         let ends = end("low").zip(end("high"));
         let mut numbers = Vec::new();
         let mut intervals = Vec::new();
         let mut given = Vec::new();
         for row in rows {
-            let mut cells = Vec::new();
-            row.cells(&mut |cell| cells.push((cell.number(), word(cell))));
-            let (number, word) = cells[column].clone();
-            numbers.push(number.filter(|number| number.is_finite()));
-            intervals.push(ends.and_then(|(low, high)| cells[low].0.zip(cells[high].0)));
-            given.push(word);
+            let mut at = 0;
+            let mut interval = (None, None);
+            row.cells(&mut |cell| {
+                if at == column {
+                    numbers.push(cell.number().filter(|number| number.is_finite()));
+                    given.push(word(cell));
+                }
+                if ends.is_some_and(|(low, _)| at == low) {
+                    interval.0 = cell.number();
+                }
+                if ends.is_some_and(|(_, high)| at == high) {
+                    interval.1 = cell.number();
+                }
+                at += 1;
+            });
+            intervals.push(interval.0.zip(interval.1));
         }
         let words: BTreeSet<String> = given.iter().flatten().cloned().collect();
         let words: Vec<String> = words.into_iter().collect();
