@@ -67,7 +67,7 @@ struct JobFlags {
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
     #[arg(long, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
-    /// Step of the fixed-step solver, in s [default: 1e-6]
+    /// Step of a fixed-step solver, in s [default: 1e-6]
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
 }

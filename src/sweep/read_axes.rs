@@ -217,9 +217,10 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
     };
     if range.low >= range.high {
         let written = |end: &Entry<'_>| entry.source.text[end.node.span()].to_owned();
-        let other = match range.low > range.high {
-            true => format!(": [{}, {}]", written(high), written(low)),
-            false => String::new(),
+        let other = if range.low > range.high {
+            format!(": [{}, {}]", written(high), written(low))
+        } else {
+            String::new()
         };
         return Err(entry.must_be(&format!("[low, high] with low < high{other}")));
     }
