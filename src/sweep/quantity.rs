@@ -181,7 +181,7 @@ const SYNONYMS: &[(&str, &str)] = &[
     ("interval", "tau_mean"),
     ("tau", "tau_mean"),
     ("friction", "mean_friction"),
-    ("stress_drop", "drop_mean"),
+    ("stress drop", "drop_mean"),
 ];
 
 /// The hint for an unknown word: the nearest known one, or all.
@@ -205,6 +205,7 @@ pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
 
 /// The known word that means the same.
 pub fn synonym<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
-    let meant = |candidate: &&str| SYNONYMS.contains(&(word, *candidate));
+    let word = word.replace('_', " ");
+    let meant = |candidate: &&str| SYNONYMS.contains(&(&word, *candidate));
     known.iter().copied().find(meant)
 }
