@@ -431,7 +431,9 @@ impl<'a> Report<'a> {
             self.breaks, self.reattachments
         );
         let outcome = match self.outcome {
-            "no slips" => "no slips: ended early, as none came within give_up_after".to_owned(),
+            word if word == JobOutcome::NoSlips.word() => {
+                format!("{word}: ended early, as no further slip came within give_up_after")
+            }
             other => other.to_owned(),
         };
         let steps = format!("{}, of which {} leaps", self.steps, self.leaps);
