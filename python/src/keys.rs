@@ -39,10 +39,7 @@ pub fn section(key: &str) -> Option<&'static str> {
 /// The known key that is nearest to an unknown key, or all.
 pub fn hint(key: &str) -> String {
     let known: Vec<&str> = sections().map(|(key, _)| key).collect();
-    match stickslip::sweep::nearest(key, &known) {
-        Some(near) => format!("did you mean {near}?"),
-        None => format!("allowed are {}", known.join(", ")),
-    }
+    stickslip::sweep::hint(key, &known)
 }
 
 /// Every key of a simulation: its meaning, what is allowed, and its default (`None`: not set).

@@ -3,12 +3,13 @@
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
-    CustomFigure, Format, Limits, Look, Size, Style, draw_all, draw_custom, write_custom,
+    CustomFigure, Dots, Format, Limits, Look, PlottedSlip, Size, Style, draw_all, draw_custom,
+    write_custom,
 };
 use crate::reduce::{SetRow, renew};
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
-use crate::table::columns::Row as _;
+use crate::table::columns::{Column, Row as _};
 use crate::table::shown::shown;
 use anyhow::Result;
 use clap::Args;
@@ -88,7 +89,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let layout = results.layout();
     let look = arguments.look(&results);
     let files = if let Some(figure) = arguments.custom.figure() {
-        let picture = draw_custom(layout, &figure, &look)?;
+        let picture = draw_custom(&results, &figure, &look)?;
         if look.style == Style::Print {
             output::report(&format!("for the caption: {}", picture.note()));
         }
@@ -121,13 +122,18 @@ pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
     }
 }
 
-/// The columns of the table of sets.
+/// The columns of sets and of slips.
 fn list() -> String {
-    let described = SetRow::columns();
+    let sets = described(&SetRow::columns());
+    let slips = described(&PlottedSlip::columns());
+    format!("{sets}\nwith --of slips:\n{slips}")
+}
+
+fn described(described: &[Column]) -> String {
     let mut columns = TextTable::default();
-    columns.words("", &described, |column| column.name.to_string());
-    columns.words("", &described, |column| column.unit.to_owned());
-    columns.words("", &described, |column| column.meaning.to_owned());
+    columns.words("", described, |column| column.name.to_string());
+    columns.words("", described, |column| column.unit.to_owned());
+    columns.words("", described, |column| column.meaning.to_owned());
     columns.to_string()
 }
 
@@ -136,6 +142,15 @@ const CUSTOM_FIGURE: &str = "Custom figure";
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = CUSTOM_FIGURE)]
 struct CustomFlags {
+    /// What has a dot each; of more than 20,000 slips, a sample
+    #[arg(
+        long,
+        value_name = "ROWS",
+        default_value = "sets",
+        requires = "x",
+        value_parser = choice(&Dots::ALL, Dots::word, |_| None)
+    )]
+    of: Dots,
     /// Column, or formula of columns such as 'Kd*Delta', on the x axis of a custom figure
     #[arg(long, value_name = "COLUMN", requires = "y")]
     x: Option<String>,
@@ -173,6 +188,7 @@ impl CustomFlags {
     fn figure(&self) -> Option<CustomFigure> {
         let flags = self.clone();
         Some(CustomFigure {
+            of: flags.of,
             x: flags.x?,
             y: flags.y?,
             colour: flags.colour,

@@ -140,7 +140,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
         let condition = Condition::read(text)
             .map_err(|problem| UsageError(format!("--where {text}: {problem}")))?;
         if arguments.is_text() && !rows.iter().any(|row| condition.holds(row)) {
-            return output::print(&(condition.unmatched(&rows) + "\n"));
+            return output::print(&(condition.unmatched("sets", &rows) + "\n"));
         }
         rows.retain(|row| condition.holds(row));
     }
@@ -157,12 +157,15 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
     } else {
         chosen_columns(usual, &arguments.columns, &rows)?
     };
-    let edges = edges(results)?;
+    let mut edges = edges(results)?;
+    if arguments.condition.is_some() {
+        edges.retain(|edge| rows.iter().any(|row| is_on_line(row, edge)));
+    }
     if arguments.is_text() {
         if let Some(unfinished) = output::unfinished(results)? {
             output::print(&format!("so far: {unfinished}\n\n"))?;
         }
-        output::print(&table_of_edges(&edges))?;
+        output::print(&table_of_edges(&edges, &rows))?;
     }
     arguments.print(&columns, matching, &rows, &edges)?;
     if arguments.is_text() {
@@ -182,7 +185,7 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     } else {
         FIRST
     };
-    let mut text = table_of_edges(&edges(results)?) + &aligned(&columns, &rows, first);
+    let mut text = table_of_edges(&edges(results)?, &rows) + &aligned(&columns, &rows, first);
     if let Some(more @ 1..) = count.checked_sub(first as u64) {
         let root = output::quoted_path(results.layout().root());
         text = format!("{text}… {more} more: stickslip show {root}\n");
@@ -343,8 +346,32 @@ fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
     Ok(read_reduced(results.layout())?)
 }
 
+/// Whether a set differs from those of an edge in nothing but the refined axis.
+fn is_on_line(row: &SetRow, edge: &EdgeRow) -> bool {
+    let axis = Symbol::from_key(&edge.axis).unwrap_or(Symbol::T);
+    let parameters = &row.parameters.parameters;
+    let mut others = Symbol::ALL
+        .into_iter()
+        .filter(|symbol| ![axis, Symbol::Seed].contains(symbol));
+    others.all(|symbol| parameters.get(symbol) == edge.parameters.get(symbol))
+}
+
+/// On which side of the threshold all sets lie, where nothing crosses it.
+fn side(edge: &EdgeRow, rows: &[SetRow]) -> &'static str {
+    let of_edge = rows.iter().filter(|row| is_on_line(row, edge));
+    let values: Vec<f64> = of_edge
+        .filter_map(|row| row.number(&edge.statistic))
+        .collect();
+    match &values[..] {
+        [] => "none",
+        values if values.iter().all(|value| *value > edge.threshold) => "none: all above",
+        values if values.iter().all(|value| *value < edge.threshold) => "none: all below",
+        _ => "none is clear",
+    }
+}
+
 /// Edges for people, and a blank line; empty if there are none.
-fn table_of_edges(edges: &[EdgeRow]) -> String {
+fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
     let Some(first) = edges.first() else {
         return String::new();
     };
@@ -378,7 +405,8 @@ fn table_of_edges(edges: &[EdgeRow]) -> String {
     let number = |value: f64| digits.number(factor * value);
     columns.words("edge of", edges, EdgeRow::crossed);
     columns.words(label.short(unit), edges, |edge| {
-        edge.edge.map_or_else(|| "none".to_owned(), number)
+        edge.edge
+            .map_or_else(|| side(edge, sets).to_owned(), number)
     });
     columns.words("95 %", edges, |edge| {
         let (from, low, high) = match edge.edge_interval {
@@ -439,6 +467,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         note_on_sliding(sweep, rows),
         note_on_cut_jobs(rows),
         note_on_few_cycles(rows),
+        note_on_model(rows),
         failed,
         note_on_removed_sets(sweep, rows),
     ];
@@ -492,6 +521,27 @@ fn note_on_few_cycles(rows: &[SetRow]) -> Option<String> {
             "{sets} without a phase: the jobs hold less than two cycles of the modulation; more slips give one"
         )
     })
+}
+
+/// What swept parameters change beside what their names say.
+const SIDE_EFFECTS: [(Symbol, &str); 2] = [
+    (
+        Symbol::M,
+        "M: a heavier slider also has more drag, as gamma is a rate per mass",
+    ),
+    (
+        Symbol::TauR,
+        "tau_r: contacts do not age; a longer hold does not strengthen them",
+    ),
+];
+
+fn note_on_model(rows: &[SetRow]) -> Option<String> {
+    let differing = differing(&rows.iter());
+    let notes = SIDE_EFFECTS
+        .iter()
+        .filter(|(symbol, _)| differing.contains(symbol));
+    let notes: Vec<&str> = notes.map(|(_, note)| *note).collect();
+    (!notes.is_empty()).then(|| notes.join("\n"))
 }
 
 fn note_on_removed_sets(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {

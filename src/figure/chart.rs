@@ -41,7 +41,11 @@ const HOLE: f64 = 1.6;
 
 /// Sets against a column: a panel for each quantity and each value of another column.
 pub(super) struct Chart<'a> {
-    pub(super) rows: &'a [SetRow],
+    /// What has a dot each, in the plural.
+    pub(super) of: &'static str,
+    /// The sets, if each has a dot.
+    pub(super) sets: &'a [SetRow],
+    /// What joins and tells apart sets.
     pub(super) swept: &'a [Values],
     pub(super) x: Quantity<'a>,
     pub(super) ys: Vec<Quantity<'a>>,
@@ -63,7 +67,7 @@ struct Dots {
 impl<'a> Chart<'a> {
     pub(super) fn draw(&self, name: &str, look: &Look) -> Result<Picture, BadOption> {
         let Self { x, ys, .. } = self;
-        let sets: Vec<usize> = (0..self.rows.len())
+        let sets: Vec<usize> = (0..self.count())
             .filter(|&set| x.has(set) && ys.iter().any(|y| y.has(set)))
             .collect();
         if sets.is_empty() {
@@ -86,10 +90,12 @@ impl<'a> Chart<'a> {
         };
         let inside: Vec<usize> = sets.iter().copied().filter(is_inside).collect();
         if inside.is_empty() {
-            let count = sets.len();
-            return Err(x.refuse(&format!(
-                "none of {count} sets lies within --xlim and --ylim; give wider ones"
-            )));
+            let problem = format!(
+                "none of {} {} lies within --xlim and --ylim; give wider ones",
+                sets.len(),
+                self.of
+            );
+            return Err(x.refuse(&problem));
         }
         let has_many = inside.len() > FEW_SETS;
         let dots = Dots {
@@ -123,17 +129,21 @@ impl<'a> Chart<'a> {
         Ok(panel::draw(name, &look, layout, &legend, panels))
     }
 
+    fn count(&self) -> usize {
+        self.x.column.numbers.len()
+    }
+
     fn refuse_empty(&self) -> BadOption {
         let Self { x, ys, .. } = self;
         let is_log = x.is_log && x.column.distinct.first().is_none_or(|least| *least <= 0.0);
-        let kind = if is_log || ys.iter().any(|y| y.is_log) {
-            "no set has a value > 0"
-        } else {
-            "no set has a value"
-        };
+        let is_log = is_log || ys.iter().any(|y| y.is_log);
+        let kind = if is_log { "a value > 0" } else { "a value" };
         let names: Vec<&str> = std::iter::once(x).chain(ys).map(Quantity::name).collect();
         let names = names.join(" and ");
-        let problem = format!("{kind} of both {names}; nothing can be drawn");
+        let problem = format!(
+            "none of the {} has {kind} of both {names}; nothing can be drawn",
+            self.of
+        );
         ys.first().unwrap_or(x).refuse(&problem)
     }
 
@@ -141,10 +151,10 @@ impl<'a> Chart<'a> {
     fn free(&self) -> Vec<usize> {
         let is_free = |&set: &usize| {
             self.x.symbol == Some(Symbol::T)
-                && self.rows[set].parameters.modulation_period.is_none()
+                && self.sets[set].parameters.modulation_period.is_none()
                 && !self.x.has(set)
         };
-        let free: Vec<usize> = (0..self.rows.len()).filter(is_free).collect();
+        let free: Vec<usize> = (0..self.sets.len()).filter(is_free).collect();
         if free.len() > INKS.len() {
             Vec::new()
         } else {
@@ -154,7 +164,11 @@ impl<'a> Chart<'a> {
 
     /// Sets that differ in the x axis alone, in its order.
     fn lines(&self, sets: &[usize]) -> Vec<Vec<usize>> {
-        let Some(symbol) = self.x.symbol else {
+        let along = self.x.parameters();
+        let mut swept = self.swept.iter();
+        let axis =
+            swept.find_map(|swept| parameter(swept.name()).filter(|symbol| along.contains(symbol)));
+        let Some(symbol) = axis else {
             return Vec::new();
         };
         // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.
@@ -279,7 +293,8 @@ impl<'a> Chart<'a> {
     }
 
     fn slides(&self, set: usize) -> bool {
-        self.rows[set].regime == Some(Regime::Sliding)
+        let set = self.sets.get(set);
+        set.is_some_and(|set| set.regime == Some(Regime::Sliding))
     }
 
     /// Amplitudes at which the paper finds a significant reduction of the friction to begin, on the x axis.
@@ -289,8 +304,8 @@ impl<'a> Chart<'a> {
             swept.all(|swept| parameter(swept.name()) != Some(symbol))
         };
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
-        let mut rows = self.rows.iter();
-        let free = rows.find(|row| row.parameters.modulation_period.is_none());
+        let mut sets = self.sets.iter();
+        let free = sets.find(|row| row.parameters.modulation_period.is_none());
         let free = free.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
         Some((REDUCTION.0 * unit, REDUCTION.1 * unit))
@@ -342,11 +357,9 @@ impl Chart<'_> {
             .into_iter()
             .flatten()
             .chain(&self.ys)
-            .map(Quantity::name);
-        let names = asked.chain(self.panels.as_ref().map(|panels| &*panels.column.name));
-        let words = names
-            .flat_map(|name| name.split(|letter: char| !letter.is_alphanumeric() && letter != '_'));
-        let shown: Vec<Option<Symbol>> = words.map(parameter).collect();
+            .map(|quantity| &quantity.column);
+        let sources = asked.chain(&self.panels).flat_map(|values| &values.sources);
+        let shown: Vec<Option<Symbol>> = sources.map(|source| parameter(source)).collect();
         let pooled = self
             .swept
             .iter()
@@ -363,10 +376,10 @@ impl Chart<'_> {
         if self.ys.iter().any(has_bars) {
             notes.push("bars: 95 %".to_owned());
         }
-        let count = self.rows.len();
+        let count = self.count();
         let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));
         let is_still = |set: &usize| {
-            shows_intervals && self.slides(*set) && self.rows[*set].tau_mean.is_none()
+            shows_intervals && self.slides(*set) && self.sets[*set].tau_mean.is_none()
         };
         let still: Vec<usize> = (0..count).filter(is_still).collect();
         if !still.is_empty() {
@@ -377,7 +390,8 @@ impl Chart<'_> {
         let left_out = count - inside.len() - levels - still_outside;
         if left_out > 0 {
             notes.push(format!(
-                "not shown: {left_out} of {count} sets, without a value or outside the axes"
+                "not shown: {left_out} of {count} {}, without a value or outside the axes",
+                self.of
             ));
         }
         notes.extend(self.pooled());
@@ -448,7 +462,8 @@ mod tests {
             let x = Quantity::of(rows, "x", name).unwrap();
             let sets: Vec<usize> = (0..rows.len()).collect();
             Chart {
-                rows,
+                of: "sets",
+                sets: rows,
                 swept: &swept,
                 x,
                 ys: Vec::new(),
@@ -459,6 +474,8 @@ mod tests {
         };
         let rows = rows(8);
         assert_eq!(lines(&rows, "V0"), [vec![1, 3, 5, 7], vec![0, 2, 4, 6]]);
+        assert_eq!(lines(&rows, "V0*V0"), lines(&rows, "V0"));
+        assert!(lines(&rows, "V0*tau_mean").is_empty());
         assert!(lines(&rows, "tau_mean").is_empty() && lines(&rows, "Delta").is_empty());
         let mut periods = vec![rows[0].clone(); 3];
         for (row, period) in periods.iter_mut().zip([0.02, 0.01, 0.04]) {

@@ -1,13 +1,27 @@
-//! Custom figures: any column of the table of sets, or a formula of columns, against any other.
+//! Custom figures: any column of the table of sets, or of slips, or a formula of columns, against any other.
 
 use super::chart::Chart;
 use super::quantity::{Limits, Quantity, parameter};
+use super::slips::PlottedSlip;
 use super::{BadOption, Look, Picture};
 use crate::reduce::{SetRow, Values, swept};
+use crate::table::columns::Row;
+use crate::table::value::words;
+
+words! {
+    /// What has a dot each in a custom figure.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Dots {
+        #[default]
+        Sets = "sets",
+        Slips = "slips",
+    }
+}
 
 /// What a custom figure shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CustomFigure {
+    pub of: Dots,
     /// Column, or formula of columns such as `Kd*Delta`, on the x axis.
     pub x: String,
     /// Column on the y axis, with error bars if it has an interval; or a formula, without.
@@ -16,7 +30,7 @@ pub struct CustomFigure {
     pub colour: Option<String>,
     /// Column whose values get a panel each.
     pub panels: Option<String>,
-    /// Condition on the columns of the sets that are drawn.
+    /// Condition on the columns of what is drawn.
     pub condition: Option<String>,
     /// The letters of the logarithmic axes; else those that were swept so, or whose values lie decades apart.
     pub log: Option<String>,
@@ -26,12 +40,38 @@ pub struct CustomFigure {
     pub ylabel: Option<String>,
 }
 
-/// Draws a dot for each set; sets that differ in the parameter on the x axis alone are joined.
+/// Draws a dot for each set; sets that differ in one parameter of the x axis alone are joined.
 pub(super) fn custom(
-    rows: &[SetRow],
+    sets: &[SetRow],
     figure: &CustomFigure,
     look: &Look,
 ) -> Result<Picture, BadOption> {
+    let swept = swept(sets);
+    let chart = Chart {
+        sets,
+        swept: &swept,
+        ..chart(sets, &swept, figure)?
+    };
+    chart.draw(&name(&chart), look)
+}
+
+/// Draws a dot for each slip of some sets.
+pub(super) fn custom_of_slips(
+    slips: &[PlottedSlip],
+    sets: &[SetRow],
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture, BadOption> {
+    let chart = chart(slips, &swept(sets), figure)?;
+    chart.draw(&name(&chart), look)
+}
+
+/// The chart of rows, with the next of the swept parameters as colours.
+fn chart<'a, R: Row>(
+    rows: &[R],
+    swept: &[Values],
+    figure: &'a CustomFigure,
+) -> Result<Chart<'a>, BadOption> {
     let mut x = Quantity::of(rows, "x", &figure.x)?;
     x.limits = figure.xlim;
     x.label = figure.xlabel.as_deref();
@@ -48,30 +88,33 @@ pub(super) fn custom(
             .transpose()
     };
     let panels = named("panels", &figure.panels)?;
-    let swept = swept(rows);
-    let is_free = |swept: &&Values| {
-        let symbol = parameter(swept.name());
-        x.symbol != symbol && panels.as_ref().is_none_or(|panels| panels.symbol != symbol)
-    };
+    let mut shown = x.parameters();
+    shown.extend(panels.iter().flat_map(Quantity::parameters));
+    let is_free =
+        |swept: &&Values| parameter(swept.name()).is_some_and(|symbol| !shown.contains(&symbol));
     let next = || {
         swept
             .iter()
             .find(is_free)
             .map(|next| next.name().to_owned())
     };
-    let colour = named("colour", &figure.colour.clone().or_else(next))?;
-    // Formulas have letters that no file name should have.
-    let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';
-    let name = format!("{}-{}", y.name(), x.name()).replace(|letter| !is_plain(letter), "-");
-    Chart {
-        rows,
-        swept: &swept,
+    Ok(Chart {
+        of: figure.of.word(),
+        sets: &[],
+        swept: &[],
+        colour: named("colour", &figure.colour.clone().or_else(next))?,
+        panels: panels.map(|panels| panels.column),
         x,
         ys: vec![y],
-        colour,
-        panels: panels.map(|panels| panels.column),
-    }
-    .draw(&name, look)
+    })
+}
+
+fn name(chart: &Chart<'_>) -> String {
+    // Formulas have letters that no file name should have.
+    let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let ys = chart.ys.iter().map(Quantity::name);
+    let names: Vec<&str> = ys.chain([chart.x.name()]).collect();
+    names.join("-").replace(|letter| !is_plain(letter), "-")
 }
 
 #[cfg(test)]
@@ -226,7 +269,7 @@ pub(super) mod tests {
                     y: "drop_mean".into(),
                     ..figure()
                 },
-                "no set has a value of both V0 and drop_mean",
+                "none of the sets has a value of both V0 and drop_mean",
             ),
             (
                 CustomFigure {
@@ -235,7 +278,7 @@ pub(super) mod tests {
                     log: Some("y".into()),
                     ..figure()
                 },
-                "no set has a value > 0",
+                "none of the sets has a value > 0",
             ),
             (
                 CustomFigure {

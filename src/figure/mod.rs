@@ -3,6 +3,7 @@
 //! ```text
 //! a file for each standing figure: its data, its panels; `None` where the data do not fit
 //! overview.rs, custom.rs -> sets against a column (chart.rs, quantity.rs): an overview, and any column against another
+//! slips.rs               -> slips for custom figures
 //! map.rs                 -> sets over two parameters
 //!     panel.rs            panels as data: axes, layers between them
 //!     frame.rs, axis.rs   frames on a sheet, axes; legend.rs, hues.rs explain marks and colours
@@ -28,21 +29,23 @@ mod phase_eta;
 mod picture;
 mod quantity;
 mod simulation;
+mod slips;
 mod style;
 mod work_precision;
 
-pub use custom::CustomFigure;
+pub use custom::{CustomFigure, Dots};
 pub use picture::{Format, Picture};
 pub use quantity::Limits;
 pub use simulation::simulation;
+pub use slips::PlottedSlip;
 pub use style::{INKS, Ink, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{Condition, EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
-use crate::results::ResultsError;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
+use crate::results::{Results, ResultsError};
 use crate::sets::{Digits, label, symbol_of};
 use crate::table::Table;
 use anyhow::Result;
@@ -114,19 +117,28 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 }
 
 /// Draws a custom figure from the sets of a results directory; writes nothing.
-pub fn draw_custom(layout: &Layout<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
-    let rows = read_sets(layout).collect::<Result<Vec<_>, _>>();
-    let mut rows = rows.map_err(advise(ADVICE))?;
-    if let Some(text) = &figure.condition {
-        let bad = |problem: String| BadOption::new("where", text, &problem);
-        let condition = Condition::read(text).map_err(bad)?;
-        if !rows.iter().any(|row| condition.holds(row)) {
-            return Err(bad(condition.unmatched(&rows)).into());
+pub fn draw_custom(results: &Results<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
+    let sets = read_sets(results.layout()).collect::<Result<Vec<_>, _>>();
+    let mut sets = sets.map_err(advise(ADVICE))?;
+    let picture = match figure.of {
+        Dots::Sets => {
+            if let Some(text) = &figure.condition {
+                let bad = |problem: String| BadOption::new("where", text, &problem);
+                let condition = Condition::read(text).map_err(bad)?;
+                if !sets.iter().any(|set| condition.holds(set)) {
+                    return Err(bad(condition.unmatched("sets", &sets)).into());
+                }
+                sets.retain(|set| condition.holds(set));
+            }
+            let look = look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
+            custom::custom(&sets, figure, &look)?
         }
-        rows.retain(|row| condition.holds(row));
-    }
-    let look = &look.with_note(&common(rows.iter().map(|row| &*row.parameters)));
-    let picture = custom::custom(&rows, figure, look)?;
+        Dots::Slips => {
+            let sample = slips::read(results, &sets, figure)?;
+            let look = look.with_note(&sample.note());
+            custom::custom_of_slips(&sample.slips, &sets, figure, &look)?
+        }
+    };
     check_size(&picture, look)?;
     Ok(picture)
 }

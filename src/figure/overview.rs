@@ -59,7 +59,8 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     let colour = quantity(if panels == Some(1) { 2 } else { 1 }, "colour");
     let panels = panels.map(|place| swept[place].clone());
     Chart {
-        rows,
+        of: "sets",
+        sets: rows,
         swept: &swept,
         x,
         ys,

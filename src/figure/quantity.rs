@@ -6,8 +6,9 @@ use super::frame::Ends;
 use super::hues::Hues;
 use super::style::INKS;
 use crate::model::Symbol;
-use crate::reduce::{FREQUENCY, SetRow, Values, has_even_steps, is_spread};
+use crate::reduce::{FREQUENCY, Values, has_even_steps, is_spread};
 use crate::sets::{Label, label};
+use crate::table::columns::Row;
 
 /// Values of a parameter up to which each has its tick.
 pub(super) const MAX_TICKS: usize = 6;
@@ -44,17 +45,21 @@ pub(super) fn parameter(column: &str) -> Option<Symbol> {
 }
 
 impl Quantity<'_> {
-    pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, BadOption> {
+    pub(super) fn of<R: Row>(
+        rows: &[R],
+        option: &'static str,
+        name: &str,
+    ) -> Result<Self, BadOption> {
         let column =
             Values::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
-        let drive = match name {
+        let drive = match column.name() {
             "resultant_length" => Values::of(rows, "resultant_drive").ok(),
             "locking_index" => Values::of(rows, "locking_index_drive").ok(),
             _ => None,
         };
         let drive = drive.filter(|drive| drive.numbers.iter().any(Option::is_some));
         let (factor, unit) = column.scale();
-        let symbol = parameter(name);
+        let symbol = parameter(column.name());
         let is_log = if symbol.is_some() {
             column.is_logarithmic()
         } else {
@@ -75,6 +80,13 @@ impl Quantity<'_> {
 
     pub(super) fn name(&self) -> &str {
         self.column.name()
+    }
+
+    /// The parameters that it is made of; none if anything else enters.
+    pub(super) fn parameters(&self) -> Vec<Symbol> {
+        let sources = self.column.sources.iter();
+        let symbols: Option<Vec<Symbol>> = sources.map(|source| parameter(source)).collect();
+        symbols.unwrap_or_default()
     }
 
     pub(super) fn typeset(&self) -> Label {
@@ -345,6 +357,7 @@ pub(super) mod tests {
     use crate::model::Selected;
     use crate::observe::Regime;
     use crate::reduce::Interval;
+    use crate::reduce::SetRow;
 
     /// A set at Δ in m and T in s that locks to `periods` of T.
     pub(in crate::figure) fn set(amplitude: f64, period: f64, periods: f64) -> SetRow {

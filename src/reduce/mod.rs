@@ -5,6 +5,7 @@ mod backbone;
 mod compare;
 mod confidence;
 mod crossings;
+mod dimension;
 mod drive_alone;
 mod gather;
 #[cfg(test)]

@@ -3,23 +3,26 @@
 //! What was swept is inferred from the sets: the columns in which they differ. The first makes the axis of a figure,
 //! the second its colours, the third its panels.
 
+use super::dimension::unit_of_formula;
 use crate::model::Symbol;
+use crate::observe::Slip;
 use crate::sets::{Digits, FREQUENCY, Label, SetRow, label};
-use crate::sweep::{Expression, nearest, synonym};
+use crate::sweep::{Expression, MAX_NAMES, nearest, synonym};
 use crate::table::columns::{Column, Kind, Row, Value};
 use crate::table::value::{Shortest, floored};
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
-/// Most names in a message.
-const MAX_NAMES: usize = 8;
 /// Numbers that differ by less than this share count as equal: they were computed from numbers with twelve digits.
 const SAME: f64 = 1e-10;
 
-/// A column of the sets, or a formula of such.
+/// A column of the sets, or of other rows, or a formula of such.
 #[derive(Clone, Debug)]
 pub struct Values {
     pub column: Column,
-    /// A number for each set, in SI units; for a word, its place among the words.
+    /// The columns that it is made of: itself, or those that the formula names.
+    pub sources: Vec<Cow<'static, str>>,
+    /// A number for each row, in SI units; for a word, its place among the words.
     pub numbers: Vec<Option<f64>>,
     /// Ends of the confidence intervals, where there are any.
     pub intervals: Vec<Option<(f64, f64)>>,
@@ -31,8 +34,8 @@ pub struct Values {
 
 impl Values {
     /// The values of a column, or of a formula such as `tau_sd / tau_mean`. An error says what is wrong with the name.
-    pub fn of(rows: &[SetRow], name: &str) -> Result<Self, String> {
-        let columns = SetRow::columns();
+    pub fn of<R: Row>(rows: &[R], name: &str) -> Result<Self, String> {
+        let columns = R::columns();
         let Some(column) = place(name, &columns) else {
             return Self::of_formula(rows, name, &columns);
         };
@@ -82,6 +85,7 @@ impl Values {
         words: Vec<String>,
     ) -> Self {
         Self {
+            sources: vec![column.name.clone()],
             column,
             distinct: ascending(numbers.iter().copied().flatten()),
             numbers,
@@ -90,7 +94,7 @@ impl Values {
         }
     }
 
-    fn of_formula(rows: &[SetRow], text: &str, columns: &[Column]) -> Result<Self, String> {
+    fn of_formula<R: Row>(rows: &[R], text: &str, columns: &[Column]) -> Result<Self, String> {
         let mut letters = text.chars();
         if letters.all(|letter| letter.is_alphanumeric() || "_⟨⟩".contains(letter)) {
             return Err(unknown(text, columns));
@@ -99,7 +103,11 @@ impl Values {
         let formula = formula.map_err(|error| error.to_string())?;
         let numbers = rows.iter().map(|row| evaluate(&formula, row));
         let found = numbers.map(|number| (number.is_finite().then_some(number), None));
-        Ok(Self::computed(text, Kind::Real, found))
+        let mut values = Self::computed(text, Kind::Real, found);
+        let names = formula.names().into_iter();
+        values.sources = names.map(|&place| columns[place].name.clone()).collect();
+        values.column.unit = unit_of_formula(&formula, columns);
+        Ok(values)
     }
 
     /// A column of computed values and the ends of their intervals.
@@ -135,7 +143,11 @@ impl Values {
     }
 
     pub fn label(&self) -> Label {
-        label(self.name())
+        let mut label = label(self.name());
+        if !self.column.unit.is_empty() {
+            label.unit = self.column.unit;
+        }
+        label
     }
 
     /// The factor to the unit in which they are read best, and that unit.
@@ -180,34 +192,40 @@ pub struct Condition(Expression<usize>);
 
 impl Condition {
     pub fn read(text: &str) -> Result<Self, String> {
-        let columns = SetRow::columns();
-        let expression = Expression::condition(text, &|name| number_column(name, &columns));
+        Self::read_on(text, &SetRow::columns())
+    }
+
+    /// Reads one on other columns.
+    pub fn read_on(text: &str, columns: &[Column]) -> Result<Self, String> {
+        let expression = Expression::condition(text, &|name| number_column(name, columns));
         expression.map(Self).map_err(|error| error.to_string())
     }
 
-    pub fn holds(&self, row: &SetRow) -> bool {
+    pub fn holds(&self, row: &impl Row) -> bool {
         evaluate(&self.0, row) == 1.0
     }
 
-    /// That none of some sets fulfils it, with the values that are nearest to those that it compares with.
-    pub fn unmatched(&self, rows: &[SetRow]) -> String {
-        let columns = SetRow::columns();
+    /// That none of some rows, which are called `of`, fulfils it, with the values that are nearest to those that it compares with.
+    pub fn unmatched<R: Row>(&self, of: &str, rows: &[R]) -> String {
+        let columns = R::columns();
         let nearest = |(&place, wanted): (&usize, f64)| {
             let Column { name, unit, .. } = &columns[place];
-            let values = rows.iter().filter_map(|row| row.number(name));
+            let name_alone = Expression::Name(place);
+            let values = rows.iter().map(|row| evaluate(&name_alone, row));
+            let values = values.filter(|value| value.is_finite());
             let distance = |value: &f64| (value - wanted).abs();
             let nearest = values.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
             let value = format!("{} {unit}", Shortest(nearest));
             Some(format!("{name} nearest to {wanted}: {}", value.trim_end()))
         };
         let nearest: Vec<String> = self.0.compared().into_iter().filter_map(nearest).collect();
-        let none = format!("none of {} sets matches", rows.len());
+        let none = format!("none of {} {of} matches", rows.len());
         [vec![none], nearest].concat().join("; ")
     }
 }
 
 /// The value of an expression for a row; NaN stands for a missing value.
-fn evaluate(expression: &Expression<usize>, row: &SetRow) -> f64 {
+fn evaluate(expression: &Expression<usize>, row: &impl Row) -> f64 {
     let mut cells = Vec::new();
     row.cells(&mut |cell| cells.push(cell.number().unwrap_or(f64::NAN)));
     expression.evaluate(&|&column| cells[column])
@@ -232,17 +250,26 @@ fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
 
 fn unknown(name: &str, columns: &[Column]) -> String {
     let names: Vec<&str> = columns.iter().map(|column| &*column.name).collect();
-    let is_longer = |known: &&str| {
-        known.starts_with(name) && !known.ends_with("_low") && !known.ends_with("_high")
+    let is_longer = |known: &str| {
+        let is_part = known.starts_with(name) || known.ends_with(&format!("_{name}"));
+        is_part && !known.ends_with("_low") && !known.ends_with("_high")
     };
-    let longer = names.iter().copied().filter(is_longer).take(MAX_NAMES);
-    let longer: Vec<&str> = longer.collect();
+    let longer = names.iter().copied().filter(|known| is_longer(known));
+    let longer: Vec<&str> = longer.take(MAX_NAMES).collect();
     let meant = match synonym(name, &names) {
         None if !longer.is_empty() => Some(longer.join(", ")),
         synonym => synonym.or_else(|| nearest(name, &names)).map(str::to_owned),
     };
-    let hint = meant.map_or_else(String::new, |meant| format!(" did you mean {meant}?"));
-    format!("no such column;{hint} `stickslip plot --list` shows all")
+    let mut problem = "no such column;".to_owned();
+    if let Some(meant) = meant {
+        problem += &format!(" did you mean {meant}?");
+    }
+    let of_slips = Slip::columns().into_iter();
+    let mut of_slips = of_slips.filter(|slip| slip.name == name || is_longer(&slip.name));
+    if let Some(Column { name, .. }) = of_slips.find(|slip| !names.contains(&&*slip.name)) {
+        problem += &format!(" {name} is a column of slips: plot --of slips.");
+    }
+    problem + " `stickslip plot --list` shows all"
 }
 
 /// Each value once, in their order.
@@ -406,7 +433,7 @@ mod tests {
         );
         let left = |condition: &str| {
             let condition = Condition::read(condition)?;
-            Ok::<_, String>(rows().iter().filter(|row| condition.holds(row)).count())
+            Ok::<_, String>(rows().iter().filter(|&row| condition.holds(row)).count())
         };
         assert_eq!(
             (
@@ -418,7 +445,7 @@ mod tests {
         );
         let unmatched = Condition::read("tau_mean > 90 and frequency == 49").unwrap();
         assert_eq!(
-            unmatched.unmatched(&rows()),
+            unmatched.unmatched("sets", &rows()),
             "none of 2 sets matches; tau_mean nearest to 90: 2 s; frequency nearest to 49: 50 Hz"
         );
         for (condition, words) in [
@@ -432,7 +459,7 @@ mod tests {
 
     #[test]
     fn an_unknown_column_is_named_with_the_nearest() {
-        let error = |name: &str| Values::of(&[], name).unwrap_err();
+        let error = |name: &str| Values::of::<SetRow>(&[], name).unwrap_err();
         assert!(error("tau_men").contains("did you mean tau_mean?"));
         assert!(
             error("resultant")
@@ -440,6 +467,9 @@ mod tests {
         );
         assert!(error("tau").contains("did you mean tau_mean?"));
         assert_eq!(error("tau_").matches("tau_").count(), MAX_NAMES);
+        assert!(error("block").contains("nucleation_block is a column of slips"));
+        let both = error("interval");
+        assert!(both.contains("tau_mean?") && both.contains("interval is a column of slips"));
         assert!(
             error("colour").contains("plot --list` shows all"),
             "{}",

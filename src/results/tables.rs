@@ -194,8 +194,8 @@ impl JobRecord {
 columns! {
     #[derive(PartialEq)]
     pub struct JobOfSlip {
-        set_id: String;
-        seed: u64;
+        set_id: String = "", "hash of all that defines the job but the seed";
+        seed: u64 = "", "seed of the job";
     }
 }
 

@@ -202,6 +202,8 @@ pub struct Tally {
     pub jobs_done: u64,
     /// Of those done, jobs of other workers.
     pub jobs_of_others: u64,
+    /// Of these, jobs of earlier rounds.
+    others_before: u64,
     predicted: f64,
     predicted_own: f64,
     predicted_others: f64,
@@ -214,12 +216,21 @@ impl Tally {
                 jobs,
                 predicted_cost,
                 ..
+            } => {
+                self.jobs += jobs;
+                self.predicted += predicted_cost;
             }
-            | RunEvent::RoundBegun {
+            RunEvent::RoundBegun {
                 jobs,
                 predicted_cost,
                 ..
             } => {
+                // All earlier jobs are done, and those of others are counted from 0 again.
+                self.jobs_of_others += self.jobs.saturating_sub(self.jobs_done);
+                self.jobs_done = self.jobs;
+                self.others_before = self.jobs_of_others;
+                self.predicted_own = self.predicted;
+                self.predicted_others = 0.0;
                 self.jobs += jobs;
                 self.predicted += predicted_cost;
             }
@@ -232,9 +243,11 @@ impl Tally {
                 jobs,
                 predicted_cost,
             } => {
-                self.jobs_done = self.jobs_done + jobs - self.jobs_of_others;
-                self.jobs_of_others = *jobs;
-                self.predicted_others = *predicted_cost;
+                // Fewer than before if this worker ran a part of theirs again, or a network's listing is old.
+                let more = (self.others_before + jobs).saturating_sub(self.jobs_of_others);
+                self.jobs_done += more;
+                self.jobs_of_others += more;
+                self.predicted_others = self.predicted_others.max(*predicted_cost);
             }
             _ => {}
         }
@@ -254,6 +267,41 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_tally_of_two_workers_over_two_rounds_never_falls() {
+        let others_done = |jobs: u64| RunEvent::OthersDone {
+            jobs,
+            predicted_cost: jobs as f64,
+        };
+        let mut tally = Tally {
+            jobs: 6,
+            predicted: 6.0,
+            ..Tally::default()
+        };
+        let next_round = RunEvent::RoundBegun {
+            jobs: 4,
+            predicted_cost: 4.0,
+            rounds: RoundsSoFar::default(),
+        };
+        let mut before = 0;
+        for (event, done) in [
+            (others_done(2), 2),
+            (others_done(1), 2),
+            (others_done(3), 3),
+            (next_round, 6),
+            (others_done(0), 6),
+            (others_done(4), 10),
+        ] {
+            tally.note(&event);
+            assert!(
+                tally.jobs_done >= before && tally.jobs_done == done,
+                "{event:?}"
+            );
+            before = tally.jobs_done;
+        }
+        assert_eq!((tally.jobs_of_others, tally.share()), (10, 1.0));
+    }
 
     #[test]
     fn jobs_are_counted_by_reason_without_its_numbers_and_the_most_frequent_comes_first() {

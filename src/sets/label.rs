@@ -46,7 +46,10 @@ pub fn label(column: &str) -> Label {
             let name = part.trim_end_matches(is_of_formula);
             label(name).symbol + &part[name.len()..]
         });
-        let symbol: String = words.collect();
+        let symbol = words
+            .collect::<String>()
+            .replace('*', "·")
+            .replace("sqrt", "√");
         return Label {
             what: symbol.clone(),
             symbol,
@@ -259,7 +262,7 @@ mod tests {
             (scaled("Delta", 1e-6), scaled("V0", 1e-6)),
             ((1e6, "µm"), (1.0, "m/s"))
         );
-        assert_eq!(label("tau_sd / (2 * tau_mean)").symbol, "σ(τ) / (2 * ⟨τ⟩)");
+        assert_eq!(label("tau_sd / (2 * tau_mean)").symbol, "σ(τ) / (2 · ⟨τ⟩)");
         let settings = [
             ("Delta", 1e-6),
             ("Delta", 0.0),

@@ -6,11 +6,12 @@
 //! comparison = sum ( "<" | "<=" | ">" | ">=" | "==" | "!=" ) sum | "(" condition ")"
 //! sum        = product { ( "+" | "-" ) product }
 //! product    = factor { ( "*" | "/" ) factor }
-//! factor     = "-" factor | number | name | "(" sum ")"
+//! factor     = "-" factor | number | name | [ "sqrt" ] "(" sum ")"
 //! ```
 //!
-//! Numbers are equal if twelve digits of them are. A comparison with something undefined, such as 0/0, does not hold. Names of the conditions of a sweep are the keys
-//! of the parameters, `eta` and `frequency`, in SI. Read by operator precedence (V. R. Pratt, POPL 1973).
+//! Numbers are equal if twelve digits of them are. A comparison with something undefined, such as 0/0, does not hold.
+//! Names of the conditions of a sweep are the keys of the parameters, `eta` and `frequency`, in SI. Read by operator
+//! precedence (V. R. Pratt, POPL 1973).
 
 /// Most words and signs of a condition: it is read and evaluated by recursion.
 const MAX_WORDS: usize = 500;
@@ -21,6 +22,7 @@ pub enum Expression<N> {
     Constant(f64),
     Name(N),
     Negative(Box<Self>),
+    Root(Box<Self>),
     Combined(Box<(Self, Operator, Self)>),
 }
 
@@ -121,6 +123,7 @@ impl<N> Expression<N> {
             Self::Constant(constant) => *constant,
             Self::Name(name) => value(name),
             Self::Negative(number) => -number.evaluate(value),
+            Self::Root(number) => number.evaluate(value).sqrt(),
             Self::Combined(combined) => {
                 let (left, operator, right) = &**combined;
                 (operator.combine)(left.evaluate(value), right.evaluate(value))
@@ -132,7 +135,7 @@ impl<N> Expression<N> {
         match self {
             Self::Constant(_) => Vec::new(),
             Self::Name(name) => vec![name],
-            Self::Negative(number) => number.names(),
+            Self::Negative(number) | Self::Root(number) => number.names(),
             Self::Combined(combined) => [combined.0.names(), combined.2.names()].concat(),
         }
     }
@@ -192,7 +195,7 @@ impl<'a, N> Reader<'a, N> {
         let problem = match self.peek() {
             other if other.chars().all(has_meaning) => problem.into(),
             other => format!(
-                "\"{other}\" has no meaning here; allowed are keys, numbers, + - * / ( ), < <= > >= == !=, and, or"
+                "\"{other}\" has no meaning here; allowed are keys, numbers, + - * / ( ) sqrt, < <= > >= == !=, and, or"
             ),
         };
         ExpressionError {
@@ -280,13 +283,13 @@ impl<'a, N> Reader<'a, N> {
             let number = self.factor()?.demanded(false, start)?;
             return Ok(Expression::Negative(Box::new(number)));
         }
-        if self.accept("(") {
-            let inside = self.expression(OR)?;
-            return if self.accept(")") {
-                Ok(inside)
-            } else {
-                Err(self.error("a closing ) is missing"))
-            };
+        if self.peek() == "(" {
+            return self.parenthesis();
+        }
+        if self.accept("sqrt") {
+            let start = self.position();
+            let number = self.parenthesis()?.demanded(false, start)?;
+            return Ok(Expression::Root(Box::new(number)));
         }
         let text = self.peek();
         let expression = match text.chars().next() {
@@ -308,6 +311,18 @@ impl<'a, N> Reader<'a, N> {
         };
         self.advance();
         Ok(expression)
+    }
+
+    fn parenthesis(&mut self) -> Result<Expression<N>, ExpressionError> {
+        if !self.accept("(") {
+            return Err(self.error("an opening ( is missing"));
+        }
+        let inside = self.expression(OR)?;
+        if self.accept(")") {
+            Ok(inside)
+        } else {
+            Err(self.error("a closing ) is missing"))
+        }
     }
 }
 
@@ -355,6 +370,8 @@ mod tests {
             ("N >= 70 and N <= 70 and Ns != 19", true),
             ("Kd * Delta < 50 and Kd*Delta>39.9", true),
             ("0 / 0 != 1", false),
+            ("sqrt(Kd * 4e7) == Kd and -sqrt( 9 )*2 == -6", true),
+            ("sqrt(-1) < 1 or sqrt(-1) >= 1", false),
         ] {
             assert_eq!(holds(text), expected, "{text}");
         }
@@ -390,6 +407,8 @@ mod tests {
             ("T = 1", 3, "=="),
             ("1 < T < 2", 7, "a < b and b < c"),
             ("(T < 1", 7, "closing )"),
+            ("sqrt T < 1", 6, "opening ("),
+            ("sqrt(T < 1) > 1", 5, "a number is needed"),
             ("T < 1)", 6, "not expected"),
             ("T < 1 T > 0", 7, "and, or"),
             ("T <", 4, "too early"),

@@ -178,29 +178,47 @@ impl Point {
 /// What papers and other programs call some keys and columns.
 const SYNONYMS: &[(&str, &str)] = &[
     ("k", "ki"),
+    ("mass", "M"),
+    ("velocity", "V0"),
+    ("amplitude", "Delta"),
+    ("damping", "gamma"),
     ("interval", "tau_mean"),
     ("tau", "tau_mean"),
     ("friction", "mean_friction"),
     ("stress drop", "drop_mean"),
 ];
 
-/// The hint for an unknown word: the nearest known one, or all.
-pub(super) fn hint(word: &str, known: &[&str]) -> String {
-    match nearest(word, known) {
-        Some(candidate) => format!("did you mean {candidate}?"),
-        None => format!("allowed are {}", known.join(", ")),
+/// Most names in a message.
+pub const MAX_NAMES: usize = 8;
+
+/// The hint for an unknown word: the known one that was probably meant, or the nearest ones; of a word without letters,
+/// which is no guess, all.
+pub fn hint(word: &str, known: &[&str]) -> String {
+    if let Some(candidate) = nearest(word, known) {
+        return format!("did you mean {candidate}?");
     }
+    let is_guess = word.contains(char::is_alphabetic);
+    if known.len() <= MAX_NAMES || !is_guess {
+        return format!("allowed are {}", known.join(", "));
+    }
+    let mut sorted = known.to_vec();
+    sorted.sort_by_key(|candidate| distance(word, candidate));
+    let more = known.len() - MAX_NAMES;
+    let names = sorted[..MAX_NAMES].join(", ");
+    format!("allowed are {names} and {more} more (docs/sweeps.md)")
+}
+
+fn distance(word: &str, candidate: &str) -> usize {
+    strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase())
 }
 
 /// The known word that was probably meant by an unknown one.
 pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
-    let distance =
-        |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
     // Half of a short word, two letters of a long one.
     let max = (word.chars().count() / 2).min(2);
     let near = known.iter().copied();
-    let near = near.filter(|candidate| distance(candidate) <= max);
-    synonym(word, known).or_else(|| near.min_by_key(|candidate| distance(candidate)))
+    let near = near.filter(|candidate| distance(word, candidate) <= max);
+    synonym(word, known).or_else(|| near.min_by_key(|candidate| distance(word, candidate)))
 }
 
 /// The known word that means the same.

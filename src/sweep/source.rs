@@ -327,6 +327,8 @@ impl<'a> Entry<'a> {
             }
             DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
             DeValue::Boolean(flag) => Some(Value::Flag(*flag)),
+            // As `plan` and the template show what is not set; TOML has no null.
+            DeValue::String(word) if word == "none" => Some(Value::Null),
             DeValue::String(word) => Some(Value::Text(word)),
             _ => None,
         }

@@ -89,6 +89,49 @@ fn own() -> Folder {
 }
 
 #[test]
+fn each_slip_is_a_dot_with_the_unit_of_its_column_or_formula() {
+    let folder = own();
+    let svg = |options: &str| {
+        folder.ends(0, &format!("plot r --of slips -o own.svg {options}"));
+        fs::read_to_string(folder.path("own.svg")).unwrap()
+    };
+    let plain = svg("--x interval --y drop");
+    let slips = folder.table("r", "slips").reals("drop").len();
+    // The legend has dots, too.
+    assert!(plain.matches("<circle").count() >= slips);
+    for text in ["Interval (ms)", "Drop (N)", &format!("{slips} slips")] {
+        assert!(plain.contains(text), "{text}");
+    }
+    let chosen = svg("--x V0*interval --y sqrt(drop/peak_force) --where slip==2 --panels Delta");
+    for text in [
+        "V₀·interval (µm)",
+        ">√(drop/peak force)<",
+        ">(b)<",
+        "32 slips",
+    ] {
+        assert!(chosen.contains(text), "{text}");
+    }
+    for (options, words) in [
+        (
+            "--of slips --x block --y drop",
+            "did you mean nucleation_block?",
+        ),
+        (
+            "--x drop --y tau_mean",
+            "drop is a column of slips: plot --of slips",
+        ),
+        (
+            "--of slips --x V0 --y drop --where V0==1",
+            "none of 128 slips matches; V0 nearest to 1:",
+        ),
+        ("--of slips", "--x"),
+    ] {
+        let error = folder.ends(2, &format!("plot r {options}")).stderr;
+        assert!(error.contains(words), "{options}: {error}");
+    }
+}
+
+#[test]
 fn each_option_of_a_figure_changes_what_it_says() {
     let folder = own();
     let svg = |options: &str| {

@@ -29,7 +29,7 @@ fn keys(table: &Json) -> BTreeSet<String> {
 
 /// The keys that the parser allows in place of `???`.
 fn allowed(text: &str) -> BTreeSet<String> {
-    let text = format!("name = \"a\"\n{}", text.replace("???", "xxxxxxxxxxxx = 1"));
+    let text = format!("name = \"a\"\n{}", text.replace("???", "\"?\" = 1"));
     let error = Sweep::parse(&text, Path::new("a.toml"))
         .unwrap_err()
         .to_string();
@@ -162,6 +162,9 @@ fn name(value: &Json) -> String {
 /// What a parameter can be, in words and by itself.
 fn described(field: &Description, default: Value) -> Json {
     let mut described = value(field.kind, field.range.ends, field.choices);
+    if default == Value::Null {
+        described = json!({ "anyOf": [described, { "const": "none" }] });
+    }
     described["description"] = json!(format!("{}: {}", field.meaning, field.requirement()));
     match default {
         Value::Null => {}
