@@ -2,9 +2,8 @@
 
 use super::chart::Chart;
 use super::quantity::{Limits, Quantity, parameter};
-use super::slips::PlottedSlip;
 use super::{BadOption, Look, Picture};
-use crate::reduce::{SetRow, Values, swept};
+use crate::reduce::{SetRow, Values};
 use crate::table::columns::Row;
 use crate::table::value::words;
 
@@ -40,38 +39,15 @@ pub struct CustomFigure {
     pub ylabel: Option<String>,
 }
 
-/// Draws a dot for each set; sets that differ in one parameter of the x axis alone are joined.
-pub(super) fn custom(
-    sets: &[SetRow],
-    figure: &CustomFigure,
-    look: &Look,
-) -> Result<Picture, BadOption> {
-    let swept = swept(sets);
-    let chart = Chart {
-        sets,
-        swept: &swept,
-        ..chart(sets, &swept, figure)?
-    };
-    chart.draw(&name(&chart), look)
-}
-
-/// Draws a dot for each slip of some sets.
-pub(super) fn custom_of_slips(
-    slips: &[PlottedSlip],
-    sets: &[SetRow],
-    figure: &CustomFigure,
-    look: &Look,
-) -> Result<Picture, BadOption> {
-    let chart = chart(slips, &swept(sets), figure)?;
-    chart.draw(&name(&chart), look)
-}
-
-/// The chart of rows, with the next of the swept parameters as colours.
-fn chart<'a, R: Row>(
+/// Draws a dot for each row, with the next of the swept parameters as colours. If the rows are `sets`, those that differ
+/// in one parameter of the x axis alone are joined; if they are slips, there are none.
+pub(super) fn custom<R: Row>(
     rows: &[R],
+    sets: &[SetRow],
     swept: &[Values],
-    figure: &'a CustomFigure,
-) -> Result<Chart<'a>, BadOption> {
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture, BadOption> {
     let mut x = Quantity::of(rows, "x", &figure.x)?;
     x.limits = figure.xlim;
     x.label = figure.xlabel.as_deref();
@@ -98,23 +74,19 @@ fn chart<'a, R: Row>(
             .find(is_free)
             .map(|next| next.name().to_owned())
     };
-    Ok(Chart {
+    // Formulas have letters that no file name should have.
+    let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let name = format!("{}-{}", y.name(), x.name()).replace(|letter| !is_plain(letter), "-");
+    Chart {
         of: figure.of.word(),
-        sets: &[],
-        swept: &[],
+        sets,
+        swept: if sets.is_empty() { &[] } else { swept },
         colour: named("colour", &figure.colour.clone().or_else(next))?,
         panels: panels.map(|panels| panels.column),
         x,
         ys: vec![y],
-    })
-}
-
-fn name(chart: &Chart<'_>) -> String {
-    // Formulas have letters that no file name should have.
-    let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';
-    let ys = chart.ys.iter().map(Quantity::name);
-    let names: Vec<&str> = ys.chain([chart.x.name()]).collect();
-    names.join("-").replace(|letter| !is_plain(letter), "-")
+    }
+    .draw(&name, look)
 }
 
 #[cfg(test)]
@@ -124,7 +96,7 @@ pub(super) mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
-    use crate::reduce::Interval;
+    use crate::reduce::{Interval, swept};
 
     /// Sets at rising V0, and two amplitudes.
     pub(in crate::figure) fn rows(count: u32) -> Vec<SetRow> {
@@ -158,12 +130,17 @@ pub(super) mod tests {
         }
     }
 
+    fn drawn(count: u32, figure: &CustomFigure, look: &Look) -> Result<Picture, BadOption> {
+        let rows = rows(count);
+        custom(&rows, &rows, &swept(&rows), figure, look)
+    }
+
     fn svg(figure: &CustomFigure) -> String {
-        custom(&rows(8), figure, &Look::default()).unwrap().svg()
+        drawn(8, figure, &Look::default()).unwrap().svg()
     }
 
     fn problem(figure: &CustomFigure) -> String {
-        custom(&rows(8), figure, &Look::default())
+        drawn(8, figure, &Look::default())
             .err()
             .unwrap()
             .to_string()
@@ -317,7 +294,7 @@ pub(super) mod tests {
             panels: Some("V0".into()),
             ..figure()
         };
-        let error = custom(&rows(12), &many, &Look::default())
+        let error = drawn(12, &many, &Look::default())
             .err()
             .unwrap()
             .to_string();
@@ -359,7 +336,7 @@ pub(super) mod tests {
                 style,
                 ..Look::default()
             };
-            custom(&rows(8), &figure(), &look)
+            drawn(8, &figure(), &look)
                 .unwrap()
                 .svg()
                 .matches("<circle")

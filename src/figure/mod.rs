@@ -131,12 +131,12 @@ pub fn draw_custom(results: &Results<'_>, figure: &CustomFigure, look: &Look) ->
                 sets.retain(|set| condition.holds(set));
             }
             let look = look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
-            custom::custom(&sets, figure, &look)?
+            custom::custom(&sets, &sets, &swept(&sets), figure, &look)?
         }
         Dots::Slips => {
             let sample = slips::read(results, &sets, figure)?;
             let look = look.with_note(&sample.note());
-            custom::custom_of_slips(&sample.slips, &sets, figure, &look)?
+            custom::custom(&sample.slips, &[], &swept(&sets), figure, &look)?
         }
     };
     check_size(&picture, look)?;

@@ -7,10 +7,9 @@ use crate::table::columns::Column;
 /// Base units. Energies, rates and masses are powers of these.
 const BASE: [&str; 3] = ["N", "m", "s"];
 
-type Powers = [f64; BASE.len()];
-
 /// Units of columns as powers of the base units.
-const UNITS: [(&str, Powers); 8] = [
+const UNITS: [(&str, [f64; BASE.len()]); 9] = [
+    ("", [0.0, 0.0, 0.0]),
     ("1", [0.0, 0.0, 0.0]),
     ("rad", [0.0, 0.0, 0.0]),
     ("N", [1.0, 0.0, 0.0]),
@@ -28,79 +27,57 @@ const ROUNDING: f64 = 1e-9;
 
 /// The unit of a formula of numbers from these columns; empty for a pure number, or if there is none.
 pub(super) fn unit_of_formula(formula: &Expression<usize>, columns: &[Column]) -> &'static str {
-    let powers = powers_of_formula(formula, columns);
-    let unit = powers.map_or_else(String::new, written);
-    // A few bytes for each formula that somebody types.
-    unit.leak()
-}
-
-fn powers_of_formula(formula: &Expression<usize>, columns: &[Column]) -> Option<Powers> {
-    let names = formula.names();
-    let units: Option<Vec<Powers>> = names
-        .iter()
-        .map(|&&place| powers_of_unit(columns[place].unit))
-        .collect();
-    let units = units?;
-    let value = |scales: [f64; BASE.len()]| {
-        formula.evaluate(&|place| {
+    let value = |scaled: Option<usize>| {
+        formula.evaluate(&|&place| {
             // Values that nothing but a common unit makes alike.
-            let index = names.iter().position(|known| *known == place).unwrap_or(0);
-            let plain = 1.0 + libm::sqrt(2.0 + *place as f64);
-            let powers = units[index].iter().zip(scales);
-            powers.fold(plain, |value, (power, scale)| {
-                value * libm::pow(scale, *power)
-            })
+            let plain = 1.0 + libm::sqrt(2.0 + place as f64);
+            let power = scaled.map_or(0.0, |base| power(columns[place].unit, base));
+            plain * libm::pow(FACTOR, power)
         })
     };
-    let plain = value([1.0; BASE.len()]);
-    let mut powers = [0.0; BASE.len()];
-    for (base, power) in powers.iter_mut().enumerate() {
-        let mut scales = [1.0; BASE.len()];
-        scales[base] = FACTOR;
-        let halves = 2.0 * libm::log(value(scales) / plain) / libm::log(FACTOR);
-        if (halves - halves.round()).abs() > ROUNDING || halves.is_nan() {
-            return None;
-        }
-        *power = 0.5 * halves.round();
-    }
-    Some(powers)
+    let power = |base: usize| {
+        let halves = 2.0 * libm::log(value(Some(base)) / value(None)) / libm::log(FACTOR);
+        let is_power = (halves - halves.round()).abs() < ROUNDING;
+        is_power.then(|| 0.5 * halves.round())
+    };
+    let powers: Option<Vec<f64>> = (0..BASE.len()).map(power).collect();
+    // A few bytes for each formula that somebody types.
+    powers.map_or("", |powers| written(&powers).leak())
 }
 
-/// Of a unit such as `N/m`.
-fn powers_of_unit(unit: &str) -> Option<Powers> {
-    let mut powers = [0.0; BASE.len()];
-    for (place, part) in unit.split('/').filter(|part| !part.is_empty()).enumerate() {
-        let known = UNITS.iter().find(|known| known.0 == part)?.1;
-        let sign = if place == 0 { 1.0 } else { -1.0 };
-        for (power, part) in powers.iter_mut().zip(known) {
-            *power += sign * part;
-        }
-    }
-    Some(powers)
+/// The power of a base unit in a unit such as `N/m`; NaN for an unknown one.
+fn power(unit: &str, base: usize) -> f64 {
+    let power = |part: &str| {
+        UNITS
+            .iter()
+            .find(|known| known.0 == part)
+            .map(|known| known.1[base])
+    };
+    let mut powers = unit.split('/').map(|part| power(part).unwrap_or(f64::NAN));
+    let above = powers.next().unwrap_or(0.0);
+    above - powers.sum::<f64>()
 }
 
 /// As a fraction of products.
-fn written(powers: Powers) -> String {
+fn written(powers: &[f64]) -> String {
     let product = |sign: f64| {
-        let powers = powers.map(|power| sign * power);
-        let present = BASE.iter().zip(powers).filter(|(_, power)| *power > 0.0);
-        let factors: Vec<String> = present
-            .map(|(base, power)| match power {
-                1.0 => (*base).to_owned(),
-                2.0 => format!("{base}²"),
-                3.0 => format!("{base}³"),
-                power => format!("{base}^{power}"),
-            })
-            .collect();
-        factors
+        let powers = BASE
+            .iter()
+            .zip(powers)
+            .filter(|(_, power)| sign * *power > 0.0);
+        let factors = powers.map(|(base, power)| match power.abs() {
+            1.0 => (*base).to_owned(),
+            2.0 => format!("{base}²"),
+            power => format!("{base}^{power}"),
+        });
+        factors.collect::<Vec<_>>()
     };
-    let above = product(1.0).join(" ");
-    let below = product(-1.0);
-    match &below[..] {
-        [] => above,
-        _ if above.is_empty() => format!("1/{}", below.join("/")),
-        _ => format!("{above}/{}", below.join("/")),
+    let mut parts = vec![product(1.0).join(" ")];
+    parts.extend(product(-1.0));
+    if parts[0].is_empty() && parts.len() > 1 {
+        "1".clone_into(&mut parts[0]);
     }
+    parts.join("/")
 }
 
 #[cfg(test)]
