@@ -134,9 +134,9 @@ pub fn draw_custom(results: &Results<'_>, figure: &CustomFigure, look: &Look) ->
             custom::custom(&sets, &sets, &swept(&sets), figure, &look)?
         }
         Dots::Slips => {
-            let sample = slips::read(results, &sets, figure)?;
-            let look = look.with_note(&sample.note());
-            custom::custom(&sample.slips, &[], &swept(&sets), figure, &look)?
+            let (slips, note) = slips::read(results, &sets, figure.condition.as_deref())?;
+            let look = look.with_note(&note);
+            custom::custom(&slips, &[], &swept(&sets), figure, &look)?
         }
     };
     check_size(&picture, look)?;

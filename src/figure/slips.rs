@@ -2,7 +2,6 @@
 
 use super::BadOption;
 use super::common;
-use super::custom::CustomFigure;
 use crate::model::Selected;
 use crate::observe::Slip;
 use crate::reduce::{Condition, SetRow};
@@ -19,88 +18,54 @@ const MAX_SLIPS: usize = 20_000;
 /// A slip, and what it is a slip of.
 pub type PlottedSlip = ((JobOfSlip, Selected<AllButSeed>), (Loading, Slip));
 
-/// Every k-th of the slips that fulfil a condition.
-pub(super) struct Sample {
-    pub(super) slips: Vec<PlottedSlip>,
-    every: usize,
-    matching: usize,
-}
-
-impl Sample {
-    fn push(&mut self, slip: PlottedSlip) {
-        if self.matching.is_multiple_of(self.every) {
-            self.slips.push(slip);
-        }
-        self.matching += 1;
-        if self.slips.len() > MAX_SLIPS {
-            self.every *= 2;
-            let mut places = 0..;
-            self.slips.retain(|_| {
-                places
-                    .next()
-                    .is_some_and(|place: usize| place.is_multiple_of(2))
-            });
-        }
-    }
-
-    /// What the slips have in common, and which are shown.
-    pub(super) fn note(&self) -> String {
-        let common = common(self.slips.iter().map(|slip| &*slip.0.1));
-        let Self {
-            every, matching, ..
-        } = self;
-        if *every == 1 {
-            format!("{common}; {matching} slips")
-        } else {
-            format!("{common}; one in {every} of {matching} slips")
-        }
-    }
-}
-
-/// Reads the slips of these sets that fulfil the condition of a figure.
+/// The slips of these sets that fulfil a condition, of many every k-th; and a note on them.
 pub(super) fn read(
     results: &Results<'_>,
     sets: &[SetRow],
-    figure: &CustomFigure,
-) -> Result<Sample> {
-    let Some(text) = &figure.condition else {
-        return sample(results, sets, |_| true);
-    };
-    let bad = |problem: String| BadOption::new("where", text, &problem);
-    let condition = Condition::read_on(text, &PlottedSlip::columns()).map_err(bad)?;
-    let matching = sample(results, sets, |slip| condition.holds(slip))?;
-    if matching.slips.is_empty() {
-        let all = sample(results, sets, |_| true)?;
-        return Err(bad(condition.unmatched("slips", &all.slips)).into());
-    }
-    Ok(matching)
-}
-
-fn sample(
-    results: &Results<'_>,
-    sets: &[SetRow],
-    matches: impl Fn(&PlottedSlip) -> bool,
-) -> Result<Sample> {
-    let parameters: HashMap<&str, _> = sets
+    condition: Option<&str>,
+) -> Result<(Vec<PlottedSlip>, String)> {
+    let bad = |problem: String| BadOption::new("where", condition.unwrap_or_default(), &problem);
+    let parsed = condition.map(|text| Condition::read_on(text, &PlottedSlip::columns()));
+    let holds = parsed.transpose().map_err(bad)?;
+    let of_id: HashMap<&str, _> = sets
         .iter()
         .map(|set| (&*set.set_id, &set.parameters))
         .collect();
-    let mut sample = Sample {
-        slips: Vec::new(),
-        every: 1,
-        matching: 0,
-    };
+    let mut slips: Vec<PlottedSlip> = Vec::new();
+    let mut every = 1;
+    let mut matching = 0_usize;
     let files = results.committed_files(SLIPS, &results.dataset(JOBS)?)?;
     for batch in files.rows::<(JobOfSlip, Slip)>() {
         for (job, slip) in batch? {
-            let Some(&of_set) = parameters.get(&*job.set_id) else {
+            let Some(&of_set) = of_id.get(&*job.set_id) else {
                 continue;
             };
             let slip = ((job, of_set.clone()), (Loading::of(of_set), slip));
-            if matches(&slip) {
-                sample.push(slip);
+            if holds
+                .as_ref()
+                .is_none_or(|condition| condition.holds(&slip))
+            {
+                if matching.is_multiple_of(every) {
+                    slips.push(slip);
+                }
+                matching += 1;
             }
         }
+        while slips.len() > MAX_SLIPS {
+            every *= 2;
+            let mut is_kept = [true, false].into_iter().cycle();
+            slips.retain(|_| is_kept.next() == Some(true));
+        }
     }
-    Ok(sample)
+    if let Some(condition) = holds.filter(|_| slips.is_empty()) {
+        let (all, _) = read(results, sets, None)?;
+        return Err(bad(condition.unmatched("slips", &all)).into());
+    }
+    let common = common(slips.iter().map(|slip| &*slip.0.1));
+    let note = if every == 1 {
+        format!("{common}; {matching} slips")
+    } else {
+        format!("{common}; one in {every} of {matching} slips")
+    };
+    Ok((slips, note))
 }
