@@ -467,6 +467,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         note_on_sliding(sweep, rows),
         note_on_cut_jobs(rows),
         note_on_few_cycles(rows),
+        note_on_drive(rows),
         note_on_model(rows),
         failed,
         note_on_removed_sets(sweep, rows),
@@ -521,6 +522,23 @@ fn note_on_few_cycles(rows: &[SetRow]) -> Option<String> {
             "{sets} without a phase: the jobs hold less than two cycles of the modulation; more slips give one"
         )
     })
+}
+
+/// How much of R the drive alone makes, where that is not seen at a glance.
+fn note_on_drive(rows: &[SetRow]) -> Option<String> {
+    let phased = rows.iter().filter(|row| row.resultant_length.is_some());
+    if phased.clone().any(|row| row.resultant_drive.is_none()) {
+        let note = "R without control = true: the load alone makes some of it (docs/statistics.md)";
+        return Some(note.to_owned());
+    }
+    let is_explained = |row: &&SetRow| {
+        let excess = row.resultant_excess_interval;
+        excess.is_some_and(|excess| excess.low <= 0.0 && excess.high >= 0.0)
+    };
+    let explained = phased.filter(is_explained).count() as u64;
+    let sets = output::count(explained, "set");
+    let note = "is what the drive alone makes, within its interval (docs/statistics.md)";
+    (explained > 0).then(|| format!("R of {sets} {note}"))
 }
 
 /// What swept parameters change beside what their names say.
