@@ -1,12 +1,12 @@
 //! Edges with their intervals against the one other quantity in which rows differ, a colour for each statistic.
 
 use super::axis::Axis;
-use super::frame::Layout;
+use super::frame::{Ends, Layout};
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{MAX_TICKS, axis_of, distinct};
-use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, Stroke, dot};
+use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, REFERENCE, Stroke, dot};
 use crate::model::Symbol;
 use crate::reduce::{EdgeRow, FREQUENCY, Interval, ascending};
 
@@ -48,7 +48,15 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
         .iter()
         .filter_map(bar)
         .flat_map(|(_, ends)| [ends.0, ends.1]);
-    let known = ascending(places().map(|place| place.0));
+    // Rows without an edge are seen over all that was searched.
+    let without = edges.iter().filter(|edge| edge.edge.is_none());
+    let searched = without.filter_map(|edge| {
+        let ends = (y_factor * edge.bracket_low, y_factor * edge.bracket_high);
+        Some((x_factor * value(key, edge)?, ends))
+    });
+    let searched: Vec<(f64, Ends)> = searched.collect();
+    let known = places().chain(searched.iter().map(|row| (row.0, 0.0)));
+    let known = ascending(known.map(|place| place.0));
     let x = Axis::of_data(&x_label, known.iter().copied())?;
     let x = if known.len() > MAX_TICKS {
         x
@@ -59,6 +67,10 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let statistics = distinct(edges.iter().map(|edge| &*edge.statistic));
     let mut legend = Vec::new();
     let mut layers = Vec::new();
+    if !searched.is_empty() {
+        legend.push(entry(Mark::Line(REFERENCE), "no crossing"));
+        layers.push(Layer::Inside(vec![Layer::Bars(searched, REFERENCE)]));
+    }
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
         let text = format!("{}, 95 %", of_it().next()?.crossed());
@@ -108,6 +120,7 @@ mod tests {
         ];
         let svg = edges(&rows, &Look::default()).unwrap().svg();
         assert!(svg.contains("Drive velocity") && svg.contains("Amplitude Δ"));
+        assert!(svg.contains(">no crossing<"));
         assert!(svg.contains(">R = 0.5, 95 %<") && svg.contains(">R, drive = 0.5, 95 %<"));
         assert!(
             [INKS[0], INKS[1]]
