@@ -87,7 +87,7 @@ pub fn label(column: &str) -> Label {
 }
 
 /// What a meaning says before it goes into details.
-pub fn first_clause(meaning: &str) -> &str {
+fn first_clause(meaning: &str) -> &str {
     meaning.split([',', ';']).next().unwrap_or_default()
 }
 
@@ -159,7 +159,7 @@ pub fn symbol_of(symbol: Symbol) -> String {
     }
 }
 
-pub fn capitalised(text: &str) -> String {
+fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| {
         first.to_uppercase().chain(letters).collect()

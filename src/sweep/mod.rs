@@ -40,7 +40,7 @@ pub use job::{Identity, Job};
 pub use plan::{
     Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, PartName, Plan, Totals,
 };
-pub use quantity::{nearest, synonym};
+pub use quantity::{SYNONYMS, nearest, synonym};
 pub use rounds::{
     Bounds, Goal, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
 };
