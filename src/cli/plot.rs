@@ -164,7 +164,12 @@ struct CustomFlags {
     #[arg(long, value_name = "COLUMN", requires = "x")]
     panels: Option<String>,
     /// Only sets for which a condition on their columns, by name or heading, holds, in SI
-    #[arg(long = "where", value_name = "CONDITION", requires = "x")]
+    #[arg(
+        long = "where",
+        value_name = "CONDITION",
+        requires = "x",
+        allow_hyphen_values = true
+    )]
     condition: Option<String>,
     /// Logarithmic axes [default: where it was swept so, or values lie decades apart]
     #[arg(long, value_name = "AXES", requires = "x", value_parser = ["x", "y", "xy", "none"])]

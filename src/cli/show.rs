@@ -8,7 +8,7 @@ use crate::reduce::{
     read_reduced, read_sets, renew,
 };
 use crate::results::Results;
-use crate::sets::{Digits, label, with_decimals};
+use crate::sets::{Digits, FOUND, label, with_decimals};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::Kind;
@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     columns: Vec<String>,
     /// Only sets for which a condition on their columns, by name or heading, holds, in SI
-    #[arg(long = "where", value_name = "CONDITION")]
+    #[arg(long = "where", value_name = "CONDITION", allow_hyphen_values = true)]
     condition: Option<String>,
     /// Column to sort by, least first; -COLUMN: largest first
     #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
@@ -64,19 +64,6 @@ const FIRST: usize = 12;
 const MAX_READ: usize = 10_000;
 /// Sets that a note names.
 const MAX_NAMED: usize = 4;
-
-/// What is found of a set, where there is anything.
-const FOUND: &[&str] = &[
-    "regime",
-    "slips",
-    "tau_mean",
-    "tau_sd",
-    "mean_friction",
-    "friction_coefficient",
-    "resultant_length",
-    "resultant_drive",
-    "resultant_excess",
-];
 
 pub fn show(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&layout(&arguments.directory))?;

@@ -165,6 +165,7 @@ impl Values {
             name if Symbol::from_key(name).is_some() => {
                 Digits::THREE.distinguishing(&numbers.collect::<Vec<_>>())
             }
+            _ if self.column.kind == Kind::Count => Digits::ALL,
             _ => Digits::THREE,
         }
     }

@@ -279,17 +279,16 @@ class Chart {
     }
   }
 
-  /** `{x, y, low, high, colour}`: vertical bars of intervals. */
+  /** `{x, low, high, colour}`: vertical bars of intervals, with caps. */
   intervals(ctx, { x, low, high, group, colour }) {
     ctx.strokeStyle = colour;
     ctx.lineWidth = 1;
     for (let k = 0; k < x.length; k++) {
       if ((group && group[k] === HIDDEN) || [x[k], low[k], high[k]].includes(null)) continue;
       const below = this.y.log && low[k] <= 0 ? this.frame.top + this.frame.height : this.py(low[k]);
-      stroke(ctx, [
-        [this.px(x[k]), below],
-        [this.px(x[k]), this.py(high[k])],
-      ]);
+      const [at, above] = [this.px(x[k]), this.py(high[k])];
+      stroke(ctx, [[at, below], [at, above]]);
+      for (const up of [below, above]) stroke(ctx, [[at - 3, up], [at + 3, up]]);
     }
   }
 

@@ -48,14 +48,26 @@ function distinguishing(values, least) {
 }
 
 /** A value of a column in the unit of its label, without that unit. */
-function shownValue({ values, factor = 1, kind, digits = 4 }, place, least = 4) {
+function shownValue({ values, factor = 1, kind, digits = 3 }, place, least = 4) {
   const value = values[place];
   if (kind === "flag") return value ? "yes" : "no";
+  if (kind === "count") return number(value, 16);
   return typeof value === "number" ? number(factor * value, Math.max(digits, least)) : number(value);
 }
 
-const withUnit = (column, place) => `${shownValue(column, place)} ${column.unit}`.trim();
-const setting = (column, place) => `${column.symbol} = ${withUnit(column, place)}`;
+/** A value and half of its interval, or the ends of that, with the digits that it leaves, as `show` prints them. */
+function withInterval(value, low, high) {
+  const half = (high - low) / 2;
+  if (!(half > 0)) return number(value, 3);
+  const crosses = (low >= 0 && value < half) || (high <= 0 && value > -half);
+  const isLopsided = crosses || Math.abs(value - low - half) > 0.2 * half;
+  const exponent = Math.floor(Math.log10(half));
+  const decimals = Math.min(18, Math.max(0, (isLopsided || half / 10 ** exponent < 1.95 ? 1 : 0) - exponent));
+  const fixed = (end) => (Number(end.toFixed(decimals)) + 0).toFixed(decimals);
+  return isLopsided ? `${fixed(value)} (${fixed(low)} to ${fixed(high)})` : `${fixed(value)} ± ${fixed(half)}`;
+}
+
+const setting = (column, place) => `${column.symbol} = ${shownValue(column, place)} ${column.unit}`.trim();
 
 /** The values of a column in the unit of its label. */
 const scaled = ({ values, factor }) =>
@@ -68,6 +80,11 @@ function save(name, blob) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 const isNumeric = (column) => column.kind === "real" || column.kind === "count";
+/** Whether a menu offers it: it has values, and is no end of an interval, which is shown with its value. */
+const isOffered = ({ name, values }) =>
+  !/^set_id$|_(low|high)$/.test(name) && values.some((value) => value !== null && !Number.isNaN(value));
+/** What the drive alone explains of other columns. */
+const DRIVE_ALONE = { resultant_length: "resultant_drive", locking_index: "locking_index_drive" };
 
 /** The columns of a table by name, each with its values. */
 const byName = ({ columns, values }) =>
@@ -93,12 +110,16 @@ class Report {
     useInks(content);
     const parameters = this.parameters.map((key) => this.columns.get(key));
     for (const column of [...parameters, this.columns.get("eta"), this.columns.get("frequency")]) {
-      if (column && isNumeric(column)) column.digits = distinguishing(column.values, 4);
+      if (column && isNumeric(column)) column.digits = distinguishing(column.values, 3);
     }
+    for (const [name, alone] of Object.entries(DRIVE_ALONE)) {
+      const column = this.columns.get(alone);
+      column.meaning = column.meaning.replace("the same", this.columns.get(name).meaning.split(":")[0]);
+    }
+    this.offered = [...this.columns.values()].filter(isOffered);
     const isSwept = ({ values }) => new Set(values).size > 1;
     this.swept = parameters.filter(isSwept);
     this.fixed = parameters.filter((parameter) => !isSwept(parameter));
-    this.hasControls = this.values("resultant_drive").some((value) => value !== null);
     this.isModulated = this.slip.get("phase").values.some((phase) => !Number.isNaN(phase));
   }
 
@@ -122,6 +143,14 @@ class Report {
       Number.isNaN(period[slip]) ? 0 : (2 * Math.PI * amplitude[slip]) / (period[slip] * velocity[set]),
     );
     derive("tau / T", "τ / T", "τ / T", "interval in periods at the onset", (_, slip) => interval[slip] / period[slip]);
+  }
+
+  /** A value of a set with its 95 % interval, or its bound, in the unit of its label, without that unit. */
+  estimate(name, set) {
+    const column = this.columns.get(name);
+    const end = (of) => column.factor * (this.columns.get(name + of)?.values[set] ?? NaN);
+    if (end("_bound") > 0) return `> ${number(end("_bound"), 3)}`;
+    return Number.isNaN(end("_low")) ? shownValue(column, set, 3) : withInterval(end(""), end("_low"), end("_high"));
   }
 
   /** The command that runs one job of a set alone. */
@@ -149,6 +178,7 @@ class Report {
 const state = {
   set: "",
   filter: "",
+  kind: "",
   colour: "",
   sort: "",
   page: "0",

@@ -1,15 +1,12 @@
 // Charts of all sets, and what is said of their points.
 
-/** Columns of what the drive alone explains of others. */
-const DRIVE_ALONE = { resultant_length: "resultant_drive", locking_index: "locking_index_drive" };
-
 class Explorer {
   constructor(report, select) {
     this.report = report;
     this.select = select;
     this.selected = -1;
     const modulated = report.isModulated;
-    element("phi-eta").hidden = element("tau-T").hidden = !modulated;
+    element("slips").hidden = document.querySelector("nav a[href='#slips']").hidden = !modulated;
     if (modulated) {
       this.phase = new Chart(element("phi-eta"), "φ against η");
       this.ratio = new Chart(element("tau-T"), "τ / T");
@@ -56,9 +53,7 @@ class Explorer {
     const { report } = this;
     const option = (value, words, chosen) => make("option", { value, selected: value === chosen }, words);
     const colour = element("colour");
-    const names = [...report.columns.values()].filter(
-      ({ name, values }) => name !== "set_id" && new Set(values).size > 1,
-    );
+    const names = report.offered.filter(({ values }) => new Set(values).size > 1);
     colour.replaceChildren(
       option("-", "one colour", this.chosen("colour")),
       ...names.map((column) => option(column.name, column.label, this.chosen("colour"))),
@@ -91,7 +86,7 @@ class Explorer {
       );
       return make("label", {}, label, select);
     };
-    const columns = [...this.table().values()].filter(isNumeric).map((column) => [column.name, column.label]);
+    const columns = [...this.table().values()].filter(isNumeric).filter(isOffered).map((column) => [column.name, column.label]);
     const log = (key) => {
       const box = make("input", {
         type: "checkbox",
@@ -346,7 +341,7 @@ class Explorer {
       tip,
       pick,
     };
-    const drive = report.hasControls && report.columns.get(DRIVE_ALONE[y.name]);
+    const drive = report.offered.find(({ name }) => name === DRIVE_ALONE[y.name]);
     const alone = drive
       ? [
           {
@@ -369,7 +364,7 @@ class Explorer {
             low: up(ends[0]),
             high: up(ends[1]),
             group: this.setGroup,
-            colour: cssColour("muted"),
+            colour: cssColour("ink"),
           },
         ]
       : [];

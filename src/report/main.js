@@ -48,31 +48,35 @@ async function start() {
     keep({ set: set < 0 ? "" : report.setIds[set] });
     explorer.selected = set;
     explorer.draw();
-    table.draw();
+    table.mark();
   };
   const explorer = new Explorer(report, select);
   const table = new SetTable(report, select);
   const apply = () => {
-    const { shown, problems } = filtered(report, state.filter);
+    const { shown, problem } = filtered(report);
     const left = shown.reduce((sum, isShown) => sum + isShown, 0);
     const hint =
-      "Examples, in SI units: V0>1e-5, regime=sliding, has_phase=true, or the first characters of a set. All conditions must hold.";
-    element("filter-note").textContent =
-      problems.join(" ") || (state.filter ? `${counted(left, "set")} of ${many(report.setCount)} fit.` : hint);
-    element("filter-note").classList.toggle("bad", problems.length > 0);
-    filter.setAttribute("aria-invalid", String(problems.length > 0));
+      "A condition as of stickslip show --where, in SI units, such as V0 > 1e-5 and (R > 0.5 or tau_sd / tau_mean < 0.1). Names are those of columns, or headings of the table.";
+    const isFiltered = state.filter.trim() || state.kind;
+    const fitting = `${counted(left, "set")} of ${many(report.setCount)} fit.`;
+    element("filter-note").textContent = problem ? `The filter does not apply: ${problem}.` : isFiltered ? fitting : hint;
+    element("filter-note").classList.toggle("bad", problem !== "");
+    filter.setAttribute("aria-invalid", String(problem !== ""));
     table.draw(shown);
     explorer.filter(shown);
   };
-  const filterBy = (text) => {
-    filter.value = text;
-    keep({ filter: text, page: "0" });
+  const kind = element("kind");
+  const choose = () => {
+    keep({ filter: filter.value, kind: kind.value, page: "0" });
     apply();
   };
-  filter.value = state.filter;
-  filter.addEventListener("input", () => filterBy(filter.value));
+  [filter.value, kind.value] = [state.filter, state.kind];
+  element("tools").addEventListener("input", choose);
   element("tools").addEventListener("submit", (event) => event.preventDefault());
-  element("clear").addEventListener("click", () => filterBy(""));
+  element("clear").addEventListener("click", () => {
+    filter.value = kind.value = "";
+    choose();
+  });
   document.querySelector("nav").addEventListener("click", (event) => {
     const link = event.target.closest("a");
     if (!link) return;
@@ -86,12 +90,12 @@ async function start() {
   writeFigures(report);
   writeProvenance(report);
   const redraw = () => {
-    writeRegimes(report, filterBy);
+    writeRegimes(report);
     writeCost(report);
     explorer.draw();
   };
   explorer.selected = report.placeOf.get(state.set) ?? -1;
-  writeRegimes(report, filterBy);
+  writeRegimes(report);
   writeCost(report);
   apply();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);

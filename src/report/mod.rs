@@ -20,7 +20,8 @@ use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::run::{RunEvent, status};
-use crate::sweep::{PLAN_VERSION, Rounds, Sweep};
+use crate::sets::FOUND;
+use crate::sweep::{PLAN_VERSION, Rounds, SYNONYMS, Sweep};
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
@@ -95,6 +96,8 @@ fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<Json> {
         "live": refresh.map(|refresh| json!({ "refresh": refresh.as_secs_f64(), "written": written })),
         "status": status(results, MAX_FAILURES)?,
         "asked": asked(sweep),
+        "found": FOUND,
+        "synonyms": SYNONYMS,
         // Keys that each axis moves, and its number of values.
         "axes": sweep.axes().collect::<Vec<_>>(),
         "sweeps": results.extensions().iter().map(|extension| extension.sweep.text()).collect::<Vec<_>>(),
@@ -184,11 +187,12 @@ fn logs(results: &Results<'_>) -> Result<(Json, Vec<Json>), StorageError> {
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");
 /// Each script needs only those before it.
-const SCRIPTS: [&str; 9] = [
+const SCRIPTS: [&str; 10] = [
     include_str!("data.js"),
     include_str!("axis.js"),
     include_str!("chart.js"),
     include_str!("colours.js"),
+    include_str!("filter.js"),
     include_str!("table.js"),
     include_str!("set.js"),
     include_str!("explore.js"),

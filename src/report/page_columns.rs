@@ -5,7 +5,7 @@ use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, read_sets, 
 use crate::results::layout::Layout;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
-use crate::sets::{Label, capitalised, first_clause, label};
+use crate::sets::{Label, label};
 use crate::sweep::Sweep;
 use crate::table::Table;
 use crate::table::columns::{Column, Row, Value, columns};
@@ -15,7 +15,7 @@ use serde::Serialize;
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
 
-/// Sets up to which all are shown; of more, every k-th. Each takes some 300 bytes of the page.
+/// Sets up to which all are shown; of more, every k-th. Each takes some 700 bytes of the page.
 const MAX_SETS: u64 = 5_000;
 /// Decimals of a mantissa: five digits are more than any interval of confidence leaves.
 const DECIMALS: usize = 4;
@@ -54,13 +54,15 @@ impl Columns {
         columns
     }
 
-    /// Gives each column its label in the unit in which its values are read best, and the factor to that.
+    /// Gives each column its label in the unit in which its values are read best, and the factor to that; no unit to one
+    /// without values.
     fn label(&mut self, label: impl Fn(&Column) -> Label) {
         let shown = self.all.iter().filter(|column| column.1);
         let labels = shown.map(|column| label(&column.0));
         for ((column, values), label) in self.described.iter_mut().zip(&self.values).zip(labels) {
             let sizes = values.iter().filter_map(Json::as_f64).map(f64::abs);
-            let (factor, unit) = label.scale(sizes.fold(0.0, f64::max));
+            let largest = sizes.reduce(f64::max);
+            let (factor, unit) = largest.map_or((1.0, ""), |largest| label.scale(largest));
             column["label"] = label.axis(unit).into();
             column["symbol"] = label.symbol.into();
             column["unit"] = unit.into();
@@ -68,7 +70,7 @@ impl Columns {
         }
     }
 
-    fn push<R: Row>(&mut self, row: &R) {
+    fn push<R: Row>(&mut self, row: &R, json: impl Fn(Value<'_>) -> Json) {
         let mut all = self.all.iter();
         let mut values = self.values.iter_mut();
         row.cells(&mut |cell| {
@@ -81,16 +83,16 @@ impl Columns {
     }
 }
 
-fn json(cell: Value<'_>) -> Json {
-    match cell {
-        // What is not finite becomes null.
-        Value::Real(real) => rounded(real).into(),
-        other => json!(other),
-    }
+/// With all digits, so that a condition holds for the same sets as on the command line. What is not finite becomes null.
+fn exact(cell: Value<'_>) -> Json {
+    json!(cell)
 }
 
-fn rounded(real: f64) -> f64 {
-    format!("{real:.DECIMALS$e}").parse().unwrap_or(real)
+fn rounded(cell: Value<'_>) -> Json {
+    match cell {
+        Value::Real(real) => json!(format!("{real:.DECIMALS$e}").parse().unwrap_or(real)),
+        other => exact(other),
+    }
 }
 
 /// How many sets of which kind there are.
@@ -204,7 +206,7 @@ impl Sets {
         let parameters = &row.parameters.parameters;
         self.commands.push(sweep.command_of_set(parameters));
         self.histograms.push(Vec::new());
-        self.columns.push(row);
+        self.columns.push(row, exact);
         self.places.insert(row.set_id.clone(), self.places.len());
     }
 }
@@ -212,29 +214,29 @@ impl Sets {
 pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
     let mut columns = Columns::of::<BackboneBin>(|_| true);
     for bin in read_reduced::<BackboneBin>(layout)? {
-        columns.push(&bin);
+        columns.push(&bin, rounded);
     }
     Ok(columns)
 }
 
 /// Slips up to which all are shown; of more, every k-th in table order. Each takes some 30 bytes of the page.
 const MAX_SLIPS: u64 = 100_000;
-/// Their columns that are shown, with their symbols. All of them would be twice as many bytes.
-const SLIP_COLUMNS: [(&str, &str); 14] = [
-    ("slip", "slip"),
-    ("onset", "t"),
-    ("interval", "τ"),
-    ("T_onset", "T"),
-    ("Delta_onset", "Δ"),
-    ("periods", "n"),
-    ("phase", "φ"),
-    ("peak_force", "F"),
-    ("drop", "ΔF"),
-    ("duration", "duration"),
-    ("size", "size"),
-    ("slip_distance", "distance"),
-    ("front_speed", "speed"),
-    ("precursors", "precursors"),
+/// Their columns that are shown, with their symbols and words. All of them would be twice as many bytes.
+const SLIP_COLUMNS: [(&str, &str, &str); 14] = [
+    ("slip", "slip", "Number of the slip within its job"),
+    ("onset", "t", "Time of the onset"),
+    ("interval", "τ", "Interval"),
+    ("T_onset", "T", "Period at the onset"),
+    ("Delta_onset", "Δ", "Amplitude at the onset"),
+    ("periods", "n", "Interval in periods"),
+    ("phase", "φ", "Phase of the onset"),
+    ("peak_force", "F", "Shear force at the onset"),
+    ("drop", "ΔF", "Stress drop"),
+    ("duration", "duration", "Duration of the slip"),
+    ("size", "size", "Breaks in the slip"),
+    ("slip_distance", "distance", "Slip distance"),
+    ("front_speed", "speed", "Speed of the rupture front"),
+    ("precursors", "precursors", "Precursors before the slip"),
 ];
 
 /// What the page says of its slips.
@@ -257,13 +259,10 @@ impl Slips {
         places: &HashMap<String, usize>,
         total: u64,
     ) -> Result<Self, ResultsError> {
-        let symbol = |name: &str| {
-            let found = SLIP_COLUMNS.iter().find(|(known, _)| *known == name);
-            found.map(|found| found.1)
-        };
+        let shown = |name: &str| SLIP_COLUMNS.iter().find(|column| column.0 == name);
         let mut slips = Self {
             every: total.div_ceil(MAX_SLIPS).max(1),
-            columns: Columns::of::<Slip>(|name| symbol(name).is_some()),
+            columns: Columns::of::<Slip>(|name| shown(name).is_some()),
             job: Vec::new(),
             jobs: Vec::new(),
         };
@@ -284,13 +283,16 @@ impl Slips {
                     last = Some(job);
                 }
                 slips.job.push(slips.jobs.len() - 1);
-                slips.columns.push(&slip);
+                slips.columns.push(&slip, rounded);
             }
         }
-        slips.columns.label(|column| Label {
-            symbol: symbol(&column.name).unwrap_or_default().to_owned(),
-            what: capitalised(first_clause(column.meaning)),
-            unit: column.unit,
+        slips.columns.label(|column| {
+            let (_, symbol, what) = shown(&column.name).copied().unwrap_or_default();
+            Label {
+                symbol: symbol.to_owned(),
+                what: what.to_owned(),
+                unit: column.unit,
+            }
         });
         Ok(slips)
     }
@@ -301,11 +303,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_keeps_five_digits_and_a_value_that_is_none_is_null() {
-        assert_eq!(json(Value::Real(0.000_123_456_789)), 0.000_123_46);
-        assert_eq!(json(Value::Real(1e-300)), 1e-300);
-        assert_eq!(json(Value::Real(f64::INFINITY)), Json::Null);
-        assert_eq!(json(Value::Real(f64::NAN)), Json::Null);
+    fn a_rounded_number_has_five_digits_and_a_value_that_is_none_is_null() {
+        assert_eq!(exact(Value::Real(0.000_123_456_789)), 0.000_123_456_789);
+        assert_eq!(rounded(Value::Real(0.000_123_456_789)), 0.000_123_46);
+        assert_eq!(rounded(Value::Real(1e-300)), 1e-300);
+        assert_eq!(rounded(Value::Real(f64::INFINITY)), Json::Null);
+        assert_eq!(exact(Value::Real(f64::NAN)), Json::Null);
     }
 
     #[test]
@@ -325,7 +328,7 @@ mod tests {
         assert!(
             SLIP_COLUMNS
                 .iter()
-                .all(|(name, _)| described.iter().any(|column| column.name == *name))
+                .all(|(name, ..)| described.iter().any(|column| column.name == *name))
         );
     }
 }

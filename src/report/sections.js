@@ -48,8 +48,8 @@ function writeSweep(report) {
   );
 }
 
-/** How many sets are in which regime; a click filters them. */
-function writeRegimes(report, filterBy) {
+/** How many sets are in which regime. */
+function writeRegimes(report) {
   const { regimes } = report.census;
   const given = Object.entries(regimes).filter(([, count]) => count > 0);
   const order = [...REGIMES, ""];
@@ -62,33 +62,11 @@ function writeRegimes(report, filterBy) {
     bar.append(part);
     const swatch = make("span", { class: "swatch" });
     swatch.style.background = part.style.background;
-    const choose = () => filterBy(`regime=${regime || "null"}`);
-    return make(
-      "li",
-      {},
-      swatch,
-      `${regime || "no finished job"}: ${counted(count, "set")} `,
-      make(
-        "button",
-        { type: "button", onclick: choose, "aria-label": `Filter: ${regime || "no finished job"}` },
-        "Filter",
-      ),
-    );
+    return make("li", {}, swatch, `${regime || "without a finished job"}: ${counted(count, "set")}`);
   });
   if (report.isModulated) {
     const phased = report.values("has_phase").filter(Boolean);
-    words.push(
-      make(
-        "li",
-        {},
-        `with a phase: ${counted(phased.length, "set")} of ${many(report.setCount)} `,
-        make(
-          "button",
-          { type: "button", onclick: () => filterBy("has_phase=true"), "aria-label": "Filter: with a phase" },
-          "Filter",
-        ),
-      ),
-    );
+    words.push(make("li", {}, `with a phase: ${counted(phased.length, "set")} of ${many(report.setCount)}`));
   }
   element("regimes").replaceChildren(make("h3", {}, "Regimes"), bar, make("ul", { class: "legend" }, ...words));
 }

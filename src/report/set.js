@@ -96,46 +96,21 @@ class SetView {
   facts() {
     const { report } = this;
     const { selected } = this.explorer;
-    const facts = element("set-facts");
+    const place = element("set-facts");
+    document.querySelector("nav a[href='#set']").textContent = `Selected ${selected < 0 ? "set" : report.name(selected)}`;
     if (selected < 0) {
-      facts.replaceChildren(make("p", {}, "None is selected. Click a point of a chart, or a row of the table."));
+      place.replaceChildren(make("p", {}, "None is selected. Click a point of a chart, or a row of the table."));
       return;
     }
-    const value = (name) => withUnit(report.columns.get(name), selected);
-    const interval = (name) => {
-      const [low, high] = ["low", "high"].map((end) => report.columns.get(`${name}_${end}`));
-      const { factor } = report.columns.get(name);
-      const ends = [low, high].map((end) => number(factor * end.values[selected]));
-      return low.values[selected] === null ? value(name) : `${value(name)} (95 %: ${ends[0]} to ${ends[1]})`;
-    };
-    const swept = report.swept.map(({ name, symbol, meaning }) => [`${symbol}, ${meaning}`, value(name)]);
-    const modulated = report.isModulated
-      ? [
-          ["η", value("eta")],
-          ["locking index", interval("locking_index")],
-          ["mean phase", value("has_phase") === "yes" ? interval("phase_mean") : "none"],
-          ["resultant length", interval("resultant_length")],
-        ]
-      : [];
-    const controlled = report.hasControls
-      ? [
-          ["locking index by the drive alone", value("locking_index_drive")],
-          ["its excess", interval("locking_index_excess")],
-          ["resultant length by the drive alone", value("resultant_drive")],
-          ["its excess", interval("resultant_excess")],
-        ]
-      : [];
-    const rows = [
-      ["regime", value("regime")],
-      ["jobs, failed", `${value("jobs")}, ${value("failed_jobs")}`],
-      ["slips", value("slips")],
-      [
-        "mean interval",
-        report.values("tau_mean_bound")[selected] === null ? interval("tau_mean") : `> ${value("tau_mean_bound")}`,
-      ],
-      ["mean stress drop", interval("drop_mean")],
-      ["mean friction", interval("mean_friction")],
+    const names = [
+      ...report.swept.map(({ name }) => name),
+      ...["regime", "jobs", "failed_jobs", "slips", "tau_mean", "tau_mean_bound", "drop_mean", "mean_friction"],
+      ...(report.isModulated ? ["eta", "locking_index", "has_phase", "phase_mean", "resultant_length"] : []),
+      ...["locking_index_drive", "locking_index_excess", "resultant_drive", "resultant_excess"],
     ];
+    const offered = report.offered.filter(({ name }) => names.includes(name));
+    const facts = offered.map(({ name, label }) => [label, report.estimate(name, selected)]);
+    const half = Math.ceil(facts.length / 2);
     const list = (pairs) =>
       make("dl", {}, ...pairs.flatMap(([term, words]) => [make("dt", {}, term), make("dd", {}, words)]));
     const seeds = report.seeds(selected);
@@ -144,7 +119,7 @@ class SetView {
     const show = () => (code.textContent = report.command(selected, input.value || 0));
     input.addEventListener("input", show);
     show();
-    facts.replaceChildren(
+    place.replaceChildren(
       make(
         "p",
         {},
@@ -153,7 +128,7 @@ class SetView {
         " ",
         make("button", { type: "button", onclick: () => this.explorer.select(-1) }, "Deselect"),
       ),
-      make("div", { class: "facts" }, list([...swept, ...rows.slice(0, 3)]), list([...rows.slice(3), ...modulated, ...controlled])),
+      make("div", { class: "facts" }, list(facts.slice(0, half)), list(facts.slice(half))),
       make("label", {}, "One of its jobs alone, with seed ", input),
       make("datalist", { id: "seeds" }, ...seeds.map((seed) => make("option", { value: seed }))),
       code,

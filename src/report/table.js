@@ -1,77 +1,33 @@
-// The filter of sets, and their table: sorted, page by page, with a choice of columns.
+// The table of sets: sorted, page by page, with a choice of columns, and with the intervals that `stickslip show` prints.
 
 const ROWS = 50;
-const COMPARISON = /^([A-Za-z]\w*)(<=|>=|!=|==|=|<|>)(.+)$/;
-
-const same = (one, other) => Math.abs(one - other) <= 1e-4 * Math.max(Math.abs(one), Math.abs(other));
-const COMPARE = {
-  "<": (a, b) => a < b,
-  ">": (a, b) => a > b,
-  "<=": (a, b) => a <= b || same(a, b),
-  ">=": (a, b) => a >= b || same(a, b),
-  "=": same,
-  "!=": (a, b) => !same(a, b),
-};
-
-/** What a word of the filter asks of a set, or a text that says what is wrong with it. */
-function condition(report, word) {
-  const found = COMPARISON.exec(word);
-  if (!found) {
-    const texts = [...report.columns.values()].filter(({ kind }) => kind === "text");
-    return (set) => texts.some(({ values }) => values[set]?.toLowerCase().includes(word));
-  }
-  const [, name, sign, wanted] = found;
-  const column = [...report.columns.values()].find((other) => other.name.toLowerCase() === name);
-  if (!column) return `There is no column ${name}.`;
-  const { values, kind } = column;
-  const operator = sign === "==" ? "=" : sign;
-  if (isNumeric(column)) {
-    const bound = Number(wanted);
-    if (Number.isNaN(bound)) return `${column.name} is compared with a number, not with ${wanted}.`;
-    return (set) => values[set] !== null && COMPARE[operator](values[set], bound);
-  }
-  if (operator !== "=" && operator !== "!=") return `${column.name} holds ${kind}s: compare it by = or !=.`;
-  return (set) => (String(values[set]).toLowerCase() === wanted) === (operator === "=");
-}
-
-/** Which sets fulfil all words of a filter, and what is wrong with it. */
-function filtered(report, text) {
-  const words = text
-    .toLowerCase()
-    .replace(/\s*(<=|>=|!=|==|=|<|>)\s*/g, "$1")
-    .split(/\s+/)
-    .filter(Boolean);
-  const conditions = words.map((word) => condition(report, word));
-  const problems = conditions.filter((one) => typeof one === "string");
-  const tests = conditions.filter((one) => typeof one !== "string");
-  const shown = Uint8Array.from({ length: report.setCount }, (_, set) => (tests.every((test) => test(set)) ? 1 : 0));
-  return { shown, problems };
-}
 
 class SetTable {
   constructor(report, select) {
     this.report = report;
     this.select = select;
     this.table = element("sets-table");
-    const names = [...report.columns.keys()];
+    const names = report.offered.map(({ name }) => name);
+    const swept = report.swept.map(({ name }) => name);
     const usual = [
-      ...report.swept.map(({ name }) => name),
-      ...(report.isModulated ? ["eta"] : []),
-      "jobs",
+      ...swept.filter((name) => name !== "T"),
+      ...(swept.includes("T") ? ["frequency", "eta"] : []),
       ...(report.status.jobs_failed ? ["failed_jobs"] : []),
-      ...["regime", "slips", "tau_mean", "tau_sd"],
-      ...(report.isModulated ? ["locking_index", "phase_mean", "has_phase", "resultant_length"] : []),
-      ...(report.hasControls ? ["resultant_drive", "resultant_excess", "locking_index_excess"] : []),
-      ...["drop_mean", "mean_friction"],
+      ...report.found,
     ];
-    this.usual = names.filter((name) => usual.includes(name) && name !== "set_id");
+    this.usual = names.filter((name) => usual.includes(name));
     const chosen = state.columns.split(" ").filter((name) => report.columns.has(name));
     this.chosen = new Set(chosen.length ? chosen : this.usual);
-    element("column-list").replaceChildren(...names.filter((name) => name !== "set_id").map((name) => this.box(name)));
+    element("column-list").replaceChildren(...names.map((name) => this.box(name)));
     element("earlier").addEventListener("click", () => this.turn(-1));
     element("later").addEventListener("click", () => this.turn(1));
     element("save-table").addEventListener("click", () => this.save());
     this.table.addEventListener("keydown", (event) => this.key(event));
+    this.table.addEventListener("click", ({ target }) => {
+      const row = target.closest("tbody tr");
+      // A drag or a double click selects text.
+      if (row && getSelection().isCollapsed) this.select(Number(row.dataset.set));
+    });
   }
 
   box(name) {
@@ -84,7 +40,7 @@ class SetTable {
     };
     const { label, meaning } = this.report.columns.get(name);
     const input = make("input", { type: "checkbox", checked: this.chosen.has(name), onchange: toggle });
-    return make("label", { title: `${name}: ${meaning}` }, input, ` ${label}`);
+    return make("label", { title: meaning }, input, ` ${label} `, make("small", {}, name));
   }
 
   turn(step) {
@@ -92,23 +48,28 @@ class SetTable {
     this.draw();
   }
 
-  /** Saves the sets that are shown as CSV, in SI. */
+  /** Saves the sets that are shown as CSV, in SI, with the ends of intervals. */
   save() {
-    const columns = [...this.report.columns.values()].filter(({ name }) => name === "set_id" || this.chosen.has(name));
+    const isSaved = (name) => name === "set_id" || this.chosen.has(name.replace(/_(low|high)$/, ""));
+    const columns = [...this.report.columns.values()].filter(({ name }) => isSaved(name));
     const lines = this.order().map((set) => columns.map(({ values }) => values[set] ?? "").join());
     save("sets.csv", new Blob([[columns.map(({ name }) => name).join(), ...lines, ""].join("\n")], { type: "text/csv" }));
   }
 
-  /** Up and down go from set to set. */
+  /** Up and down go from row to row; Enter selects its set. */
   key(event) {
-    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-    if (!step || !event.target.closest("tbody")) return;
-    const buttons = [...this.table.querySelectorAll("tbody button")];
-    const next = buttons[buttons.indexOf(event.target) + step];
+    const row = event.target.closest("tbody tr");
+    const next = { ArrowDown: row?.nextSibling, ArrowUp: row?.previousSibling }[event.key];
     if (next) {
       event.preventDefault();
       next.focus();
-    }
+    } else if (event.key === "Enter" && row) this.select(Number(row.dataset.set));
+  }
+
+  /** Marks the row of the selected set. */
+  mark() {
+    const isSelected = ({ dataset }) => this.report.setIds[dataset.set] === state.set;
+    for (const row of this.table.tBodies[0].rows) row.setAttribute("aria-selected", isSelected(row));
   }
 
   /** The sets that are shown, in order. */
@@ -154,11 +115,9 @@ class SetTable {
   }
 
   row(set, names) {
-    const choose = () => this.select(set);
-    const cells = names.map((name) => cell(this.report.columns.get(name), set));
-    const button = make("button", { type: "button", onclick: choose }, this.report.setIds[set].slice(0, 8));
-    const isSelected = this.report.setIds[set] === state.set;
-    return make("tr", { "aria-selected": String(isSelected), "data-set": set }, make("td", {}, button), ...cells);
+    const cells = names.map((name) => cell(this.report, name, set));
+    const id = make("td", {}, make("code", {}, this.report.setIds[set].slice(0, 8)));
+    return make("tr", { tabindex: "0", "data-set": set }, id, ...cells);
   }
 
   draw(shown = this.shown) {
@@ -171,8 +130,9 @@ class SetTable {
     const head = make("thead", {}, make("tr", {}, first, ...names.map((name) => this.head(name))));
     const rows = order.slice(page * ROWS, (page + 1) * ROWS).map((set) => this.row(set, names));
     this.table.replaceChildren(head, make("tbody", {}, ...rows));
+    this.mark();
     element("sets-note").textContent =
-      `${counted(order.length, "set")} of ${many(this.report.setCount)}; all seeds of a set together. Hover over a heading for the name used in filters and CSV, which are in SI units.`;
+      `${counted(order.length, "set")} of ${many(this.report.setCount)}; all seeds of a set together, with 95 % intervals. The list of columns has the names used in filters and CSV, which are in SI units.`;
     element("page").textContent = `Page ${page + 1} of ${pages}`;
     element("earlier").disabled = page === 0;
     element("later").disabled = page === pages - 1;
@@ -180,8 +140,8 @@ class SetTable {
   }
 }
 
-function cell(column, place) {
-  const kind = isNumeric(column) ? "number" : "text";
-  if (column.values[place] === null) return make("td", { class: `${kind} missing` }, "–");
-  return make("td", { class: kind }, shownValue(column, place, 5));
+function cell(report, name, set) {
+  const kind = isNumeric(report.columns.get(name)) ? "number" : "text";
+  const words = report.estimate(name, set);
+  return make("td", { class: words === "–" ? `${kind} missing` : kind }, words);
 }

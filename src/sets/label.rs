@@ -90,7 +90,7 @@ pub fn label(column: &str) -> Label {
 }
 
 /// What a meaning says before it goes into details.
-pub fn first_clause(meaning: &str) -> &str {
+fn first_clause(meaning: &str) -> &str {
     meaning.split([',', ';']).next().unwrap_or_default()
 }
 
@@ -162,7 +162,7 @@ pub fn symbol_of(symbol: Symbol) -> String {
     }
 }
 
-pub fn capitalised(text: &str) -> String {
+fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| {
         first.to_uppercase().chain(letters).collect()
@@ -176,6 +176,7 @@ pub struct Digits(usize);
 impl Digits {
     pub const THREE: Self = Self(3);
     pub const FOUR: Self = Self(4);
+    pub const ALL: Self = Self(MAX_DIGITS);
 
     /// At least as many, and enough that no two of these values look alike unless they are the same.
     pub fn distinguishing(self, values: &[f64]) -> Self {

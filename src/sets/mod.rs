@@ -3,9 +3,7 @@
 
 mod label;
 
-pub use label::{
-    Digits, Label, capitalised, first_clause, label, power_of_ten, symbol_of, with_decimals,
-};
+pub use label::{Digits, Label, label, power_of_ten, symbol_of, with_decimals};
 
 use crate::model::Symbol;
 use crate::model::{Selected, Selection};
@@ -17,6 +15,19 @@ use std::sync::LazyLock;
 
 /// The column of 1/T, as which a swept period is shown.
 pub const FREQUENCY: &str = "frequency";
+
+/// What tables show of a set, where there is anything.
+pub const FOUND: &[&str] = &[
+    "regime",
+    "slips",
+    "tau_mean",
+    "tau_sd",
+    "mean_friction",
+    "friction_coefficient",
+    "resultant_length",
+    "resultant_drive",
+    "resultant_excess",
+];
 
 /// All parameters of a set: a set has no seed.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,7 +60,7 @@ columns! {
         tau_bound as "tau_mean_bound": Option<f64> = "s",
             "lower bound of tau_mean, if it is null as a job gave up", "⟨τ⟩, at least" "Least mean interval";
         tau_off as "tau_mean_off": Option<f64> = "",
-            "relative bias of tau_mean where `max_time` cut intervals; null if it cut none", "tau mean off";
+            "relative bias of tau_mean where `max_time` cut intervals; null if it cut none", "tau mean off" "Relative bias of the mean interval";
         tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals", "σ(τ)" "S.d. of the intervals";
         tau_deviation_interval as "tau_sd": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_05: Option<f64> = "s", "5 % quantile of the intervals", "τ(5 %)";

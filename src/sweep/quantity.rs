@@ -176,7 +176,7 @@ impl Point {
 }
 
 /// What papers and other programs call some keys and columns.
-const SYNONYMS: &[(&str, &str)] = &[
+pub const SYNONYMS: &[(&str, &str)] = &[
     ("k", "ki"),
     ("mass", "M"),
     ("velocity", "V0"),
