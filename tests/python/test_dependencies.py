@@ -37,6 +37,16 @@ def test_every_crate_that_is_there_twice_has_a_reason():
     assert named == {name for name, count in counts.items() if count > 1}
 
 
+def test_users_get_ranges_of_python_packages_and_tests_one_version_each():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    pins = [re.fullmatch(r"([\w-]+)==[\d.]+", package) for package in extras["test"]]
+    packages = [package for package in extras["analysis"] + extras["examples"] if package != "stickslip[analysis]"]
+    ranges = [re.fullmatch(r"([\w-]+)>=[\d.]+", package) for package in packages]
+    assert all(pins) and all(ranges), extras
+    # The test of the notebook needs no page to open it in.
+    assert {package[1] for package in ranges} - {package[1] for package in pins} == {"jupyterlab"}
+
+
 def test_scripts_use_the_lock_file():
     calls = [
         (script.name, line.strip())
