@@ -47,6 +47,13 @@ def test_users_get_ranges_of_python_packages_and_tests_one_version_each():
     assert {package[1] for package in ranges} - {package[1] for package in pins} == {"jupyterlab"}
 
 
+def test_tests_do_not_move_the_module_of_a_pip_install_at_the_same_time():
+    """maturin moves what it has built from release to maturin, in the folder of Cargo's, and back."""
+    script = (ROOT / "scripts" / "python-packages").read_text()
+    setting, command = "export CARGO_BUILD_BUILD_DIR CARGO_TARGET_DIR", "maturin develop"
+    assert "CARGO_TARGET_DIR=$CARGO_BUILD_BUILD_DIR/module" in script and -1 < script.find(setting) < script.find(command)
+
+
 def test_scripts_use_the_lock_file():
     calls = [
         (script.name, line.strip())
