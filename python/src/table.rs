@@ -7,6 +7,7 @@ use arrow_array::{RecordBatch, RecordBatchIterator};
 use arrow_ipc::reader::StreamReader;
 use arrow_ipc::writer::StreamWriter;
 use arrow_schema::{DataType, Field, SchemaRef};
+use pyo3::exceptions::PyAttributeError;
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule, PyDict, PyTuple};
@@ -18,7 +19,8 @@ use stickslip::table::arrow::{DESCRIPTION, RowBuffer, UNIT};
 ///
 /// pandas, polars, DuckDB and pyarrow take it without a copy: `pyarrow.table(slips)`,
 /// `polars.DataFrame(slips)`, `duckdb.sql("from slips")`. All quantities are in SI units.
-#[pyclass(frozen, module = "stickslip")]
+/// `slips["interval"]` is a column as a `pandas.Series`.
+#[pyclass(frozen, mapping, module = "stickslip")]
 pub struct Table {
     name: String,
     schema: SchemaRef,
@@ -102,6 +104,17 @@ impl Table {
     #[getter]
     fn meaning<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.described(py, DESCRIPTION)
+    }
+
+    fn __getitem__<'py>(slf: &Bound<'py, Self>, column: &str) -> PyResult<Bound<'py, PyAny>> {
+        Self::to_pandas(slf)?.get_item(column)
+    }
+
+    fn __getattr__(&self, name: &str) -> PyResult<()> {
+        let table = &self.name;
+        Err(PyAttributeError::new_err(format!(
+            "Table has no {name}: columns are {table}[NAME], and to_pandas() gives a table with more methods"
+        )))
     }
 
     /// Number of rows.

@@ -13,7 +13,7 @@ All quantities are in SI units, which tables name (`results.slips().units`). Key
 `help(stickslip.simulate)` lists them with units and defaults.
 
 Further modules: `statistics` (circular statistics, estimates with confidence intervals) and `tables` (pandas frames). They
-need what `pip install "stickslip[analysis]"` installs.
+need numpy, pandas, pyarrow and scipy.
 """
 
 from ._stickslip import VERSION as __version__

@@ -49,6 +49,7 @@ class Table:
 
     pandas, polars, DuckDB and pyarrow take it without a copy: `pyarrow.table(slips)`,
     `polars.DataFrame(slips)`, `duckdb.sql("from slips")`. All quantities are in SI units.
+    `slips["interval"]` is a column as a `pandas.Series`.
     """
 
     @property
@@ -67,6 +68,7 @@ class Table:
     def meaning(self) -> dict[str, str]:
         """Meaning of each column."""
 
+    def __getitem__(self, key: str, /) -> "pandas.Series[Any]": ...
     def __len__(self) -> int: ...
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> Any: ...
     def __arrow_c_schema__(self) -> Any: ...

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ._stickslip import ResultsError, Table, minimum_phase
+from .guesses import Guessed
 
 if TYPE_CHECKING:
     import numpy
@@ -74,11 +75,15 @@ def _new_axes() -> "Axes":
     return pyplot.subplots(figsize=SIZE)[1]
 
 
-class Plot:
+class Plot(Guessed):
     """The figures of a results directory. `axes` are matplotlib's to draw on; new ones if they are not given."""
 
     def __init__(self, results: Tables) -> None:
         self._results = results
+
+    def __call__(self, figure: str, **options: Any) -> Any:
+        """A figure by name: `results.plot("intervals")`."""
+        return getattr(self, figure.replace("-", "_"))(**options)
 
     @_styled()
     def phase_eta(self, axes: "Axes | None" = None) -> "Axes":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from . import _stickslip, arguments
 from ._stickslip import Table
+from .guesses import Guessed
 
 if TYPE_CHECKING:
     from .figures import Plot
@@ -24,7 +25,7 @@ def open(directory: str | PathLike[str]) -> "Results":
     return Results(directory)
 
 
-class Results:
+class Results(Guessed):
     """The results directory of a sweep, finished or not. Each call reads its table again; reduced data that are out of date
     are made again first.
 

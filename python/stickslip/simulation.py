@@ -9,13 +9,14 @@ from typing import Any
 
 from . import _stickslip, arguments, toml
 from ._stickslip import SimulationError, Table
+from .guesses import Guessed
 
 _KEYS = _stickslip.keys()
 # What a simulation takes where a sweep has another default.
 _DEFAULTS = {"slips": 20}
 
 
-class Simulation:
+class Simulation(Guessed):
     """What one job did: `outcome`, its row among the jobs, and its tables (`stickslip.Table`)."""
 
     def __init__(self, job: dict[str, Any], sweep: str, tables: dict[str, Table]) -> None:

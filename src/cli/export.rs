@@ -1,7 +1,9 @@
 //! `stickslip export`: the tables of a results directory as a few large files, for other tools.
 
 use super::{Exit, catch_signals, choice, layout, output};
+use crate::reduce::renew;
 use crate::results::Results;
+use crate::results::destination::NewFolder;
 use crate::table::formats::Format;
 use crate::table::shown::shown;
 use anyhow::Result;
@@ -9,16 +11,17 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
-/// Write the tables of a results directory to a folder: one file each, every row with all swept parameters
+/// Write slips, jobs, sets and edges of a results directory to a folder: one file each, with all swept parameters
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   stickslip export results/fig3 -o fig3-tables
   stickslip export results/fig3 -o fig3-csv --format csv     for spreadsheets
 
-Rows are in the order of the plan, extensions one after another. Whatever threads, shards and interruptions came
-before, the bytes are the same; equal jobs after other extensions are the same rows in another order. The directory
-is not changed. If the export fails or is stopped, FOLDER is as before.")]
+Rows are in the order of the plan, extensions one after another; sets in that of their parameters. Whatever threads,
+shards and interruptions came before, the bytes are the same; equal jobs after other extensions are the same rows in
+another order. Beside CSV lies columns.csv with units and meanings. Reduced data that are out of date are made again;
+nothing else in the directory is changed. If the export fails or is stopped, FOLDER is as before.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
@@ -41,15 +44,15 @@ pub struct Arguments {
 const JSON_FORMAT: u32 = 2;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
-    let results = Results::read(&layout(&arguments.directory))?;
+    let folder = NewFolder::new(&arguments.out)?;
+    let results = renew(&Results::read(&layout(&arguments.directory))?)?;
     // Shown on a terminal only.
     let bar = ProgressBar::new(0);
     bar.set_style(ProgressStyle::with_template(
         "{wide_bar} {percent} % of the parts, {eta} left",
     )?);
     let stop = catch_signals()?;
-    let out = &arguments.out;
-    let exported = results.export(out, arguments.format, stop, &mut |done, total| {
+    let exported = results.export(folder, arguments.format, stop, &mut |done, total| {
         bar.set_length(total);
         bar.set_position(done);
     })?;
@@ -59,7 +62,7 @@ pub fn export(arguments: &Arguments) -> Result<Exit> {
         return Ok(Exit::Done);
     }
     output::lines(exported.files.iter().map(|file| {
-        let path = out.join(&file.name);
+        let path = arguments.out.join(&file.name);
         let rows = output::count(file.rows, "row");
         let megabytes = file.bytes as f64 / 1e6;
         format!("{}  {rows}, {megabytes:.1} MB", shown(&path))

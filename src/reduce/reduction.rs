@@ -343,10 +343,12 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
         let file = DataFile::with_footer(layout.reduced_file(table), source.clone());
         file.check(layout.storage).is_ok()
     };
+    let edges = results.sweep().refinement().map(|_| EdgeRow::NAME);
     if is_current(SetRow::NAME)
         && is_current(HistogramBin::NAME)
         && is_current(BackboneBin::NAME)
         && is_current(Point::NAME)
+        && edges.is_none_or(is_current)
     {
         return Ok(renewed);
     }

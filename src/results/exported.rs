@@ -1,8 +1,8 @@
 //! Export: the tables of a directory as one file each, elsewhere, for other tools.
 //!
 //! Rows stand in the order of the plan, extensions one after another, so the bytes depend on what is done alone and not
-//! on how it came to that. Every row has all swept parameters, so that no table need be joined. Nothing of the
-//! directory is changed. Memory: one part, and one row group.
+//! on how it came to that. Every row has all swept parameters, so that no table need be joined; reduced tables have
+//! their own columns and order. Nothing of the directory is changed. Memory: one part, and one row group.
 //!
 //! Exports and the Python module read joined tables, part by part. They have columns that their files lack: those of
 //! the jobs of their rows, and whether a row belongs to a control.
@@ -13,7 +13,7 @@ use crate::results::directory::Results;
 use crate::results::parts::row_count;
 use crate::results::tables::{All, JOBS, JobRow, recorded_schema};
 use crate::sweep::PartName;
-use crate::table::arrow::{schema, schema_of};
+use crate::table::arrow::{DESCRIPTION, UNIT, schema, schema_of};
 use crate::table::columns::columns;
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, Dataset};
@@ -25,7 +25,7 @@ use arrow_select::concat::concat_batches;
 use arrow_select::take::take;
 use serde::Serialize;
 use std::collections::{BTreeSet, HashMap, HashSet};
-use std::path::Path;
+use std::iter;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -48,16 +48,15 @@ pub struct ExportedFile {
 }
 
 impl Results<'_> {
-    /// Writes the tables to a new folder, all or none. `progress` gets the number of finished parts of tables, and of
-    /// all.
+    /// Writes the tables, with reduced sets and edges, to a new folder, all or none. `progress` gets the number of
+    /// finished parts of tables, and of all.
     pub fn export(
         &self,
-        path: &Path,
+        folder: NewFolder,
         format: Format,
         stop: &AtomicBool,
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
-        let folder = NewFolder::new(path)?;
         let exported = self.write_all(&folder, format, stop, progress)?;
         refuse_stopped(stop, &folder.place)?;
         folder.publish(self.layout().storage)?;
@@ -83,21 +82,40 @@ impl Results<'_> {
         };
         let total = self.tables().count() as u64 * exported.parts;
         let mut done = 0;
-        for table in self.tables() {
+        let mut columns = vec!["table,column,unit,meaning\n".to_owned()];
+        let joined = |table| JoinedTable::new(self, table, &self.exported_columns(table));
+        let joined = self.tables().map(|table| (table, Some(joined(table))));
+        let edges = self.sweep().refinement().map(|_| "edges");
+        let reduced = iter::once("sets").chain(edges).map(|table| (table, None));
+        for (table, joined) in joined.chain(reduced) {
             let name = format!("{table}.{}", format.word());
             let path = to.draft.path().join(&name);
-            let joined = JoinedTable::new(self, table, &self.exported_columns(table));
+            let reduced = Dataset::new(storage, vec![self.layout().reduced_file(table)]);
+            let schema = match &joined {
+                Some(joined) => SchemaRef::clone(joined.schema()),
+                None => reduced.schema()?,
+            };
+            for field in schema.fields() {
+                let [unit, meaning] = [UNIT, DESCRIPTION].map(|key| &field.metadata()[key]);
+                columns.push(format!("{table},{},{unit},\"{meaning}\"\n", field.name()));
+            }
             let file = storage.create(&path)?;
-            let mut writer = RowWriter::new(file, format, joined.schema(), &self.footer_of_all())?;
+            let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
             let mut rows = 0;
-            for &part in &parts {
-                refuse_stopped(stop, &to.place)?;
-                progress(done, total);
-                joined.visit(part, |batch| {
-                    rows += batch.num_rows() as u64;
-                    writer.write(&batch)
-                })?;
-                done += 1;
+            let mut write = |batch: RecordBatch| {
+                rows += batch.num_rows() as u64;
+                writer.write(&batch)
+            };
+            match joined {
+                None => reduced.batches().try_for_each(|batch| write(batch?.rows))?,
+                Some(joined) => {
+                    for &part in &parts {
+                        refuse_stopped(stop, &to.place)?;
+                        progress(done, total);
+                        joined.visit(part, &mut write)?;
+                        done += 1;
+                    }
+                }
             }
             writer.finish()?;
             if table == JOBS {
@@ -105,6 +123,12 @@ impl Results<'_> {
             }
             let bytes = storage.length(&path)?;
             exported.files.push(ExportedFile { name, rows, bytes });
+        }
+        if format == Format::Csv {
+            // It has no place for units.
+            let mut file = storage.create(&to.draft.path().join("columns.csv"))?;
+            file.write(columns.concat().as_bytes())?;
+            file.sync()?;
         }
         progress(total, total);
         Ok(exported)

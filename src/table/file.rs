@@ -10,8 +10,8 @@ use crate::table::checksum;
 use crate::table::columns::Row;
 use crate::table::error::ResultsError;
 use crate::table::storage::{Storage, StoredFile};
-use arrow_array::RecordBatch;
-use arrow_schema::{ArrowError, DataType, Schema};
+use arrow_array::{RecordBatch, RecordBatchReader as _};
+use arrow_schema::{ArrowError, DataType, Schema, SchemaRef};
 use bytes::Bytes;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::{ArrowWriter, ProjectionMask};
@@ -291,6 +291,12 @@ impl<'a> Dataset<'a> {
 
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.files.iter().map(|file| &file.path)
+    }
+
+    /// The columns of the first file.
+    pub fn schema(&self) -> Result<SchemaRef, ResultsError> {
+        let reader = open(self.storage, &self.files[0], &[])?;
+        Ok(arrow::schema_of(reader.schema().fields().clone()))
     }
 
     /// Reads all rows, one batch after the other, holding one file; an error ends it.

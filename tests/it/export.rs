@@ -83,6 +83,22 @@ fn an_export_has_the_same_bytes_whatever_threads_shards_kills_and_retries_came_b
 }
 
 #[test]
+fn reduced_data_that_are_out_of_date_are_made_again() {
+    let folder = Folder::new();
+    folder.write("cheap.toml", &sweep(SEEDS));
+    folder.write("fewer.toml", &sweep(FEWER));
+    folder.ends(0, "run fewer.toml --out r --no-reduce");
+    folder.ends(0, "reduce r");
+    let before = folder.contents("r/reduced");
+    folder.ends(0, "run cheap.toml --out r --no-reduce");
+    let found = exported(&folder, "r", "parquet");
+    assert!(folder.contents("r/reduced") != before);
+    folder.ends(0, "run cheap.toml --out whole --no-reduce");
+    let sets = PathBuf::from("sets.parquet");
+    assert!(found[&sets] == exported(&folder, "whole", "parquet")[&sets]);
+}
+
+#[test]
 fn every_row_of_an_export_has_all_swept_parameters_and_the_frequency_in_the_order_of_the_plan() {
     let folder = Folder::new();
     folder.write("cheap.toml", &sweep(SEEDS));
@@ -177,8 +193,8 @@ fn what_is_there_is_kept_and_a_place_in_a_results_directory_is_refused() {
     for free in ["r/../beside/new", "empty"] {
         folder.ends(0, &format!("export r -o {free}"));
     }
-    assert_eq!(folder.contents("beside/new").len(), 2);
-    assert_eq!(folder.contents("empty").len(), 2);
+    assert_eq!(folder.contents("beside/new").len(), 3);
+    assert_eq!(folder.contents("empty").len(), 3);
 }
 
 #[test]
@@ -192,13 +208,14 @@ fn what_is_missing_is_said_and_what_a_killed_export_left_is_no_export() {
     let ended = folder.ends(0, "export r -o out");
     let words = "jobs missing; stickslip run r continues with them";
     assert!(ended.stderr.contains(words), "{}", ended.stderr);
-    assert_eq!(folder.contents("out").len(), 2);
+    assert_eq!(folder.contents("out").len(), 3);
     assert_eq!(folder.contents(left).len(), 1);
 }
 
 #[test]
 fn a_part_without_its_slips_ends_an_export_with_damage_and_nothing_is_written() {
     let folder = folder_with_results();
+    folder.ends(0, "reduce r");
     let slips = folder.parts("r", "slips");
     fs::remove_file(slips.last().unwrap()).unwrap();
     let before = folder.contents("");

@@ -37,6 +37,23 @@ def test_every_crate_that_is_there_twice_has_a_reason():
     assert named == {name for name, count in counts.items() if count > 1}
 
 
+def test_users_get_ranges_of_python_packages_and_tests_one_version_each():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    pins = [re.fullmatch(r"([\w-]+)==[\d.]+", package) for package in extras["test"]]
+    packages = [package for package in extras["analysis"] + extras["examples"] if package != "stickslip[analysis]"]
+    ranges = [re.fullmatch(r"([\w-]+)>=[\d.]+", package) for package in packages]
+    assert all(pins) and all(ranges), extras
+    # The test of the notebook needs no page to open it in.
+    assert {package[1] for package in ranges} - {package[1] for package in pins} == {"jupyterlab"}
+
+
+def test_tests_do_not_move_the_module_of_a_pip_install_at_the_same_time():
+    """maturin moves what it has built from release to maturin, in the folder of Cargo's, and back."""
+    script = (ROOT / "scripts" / "python-packages").read_text()
+    setting, command = "export CARGO_BUILD_BUILD_DIR CARGO_TARGET_DIR", "maturin develop"
+    assert "CARGO_TARGET_DIR=$CARGO_BUILD_BUILD_DIR/module" in script and -1 < script.find(setting) < script.find(command)
+
+
 def test_scripts_use_the_lock_file():
     calls = [
         (script.name, line.strip())

@@ -89,6 +89,27 @@ def test_the_tutorial_runs_as_written(program, tmp_path):
         assert shown.read_bytes() == (tmp_path / picture).read_bytes(), f"UPDATE_DOCS=1 draws {shown.name} again"
 
 
+def test_the_sweep_in_the_readme_runs_as_written(program, tmp_path):
+    (tmp_path / "stickslip").symlink_to(program.resolve())
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    section = re.search(r"## A sweep of your own\n(.*?)^## ", (ROOT / "README.md").read_text(), re.M | re.S)[1]
+    blocks = re.findall(r"^```(\w+)\n(.*?)^```", section, re.M | re.S)
+    assert [language for language, _ in blocks] == ["toml", "sh", "python"]
+    (tmp_path / "tour.toml").write_text(blocks[0][1])
+    for command in (["bash", "-euc", blocks[1][1]], [sys.executable, "-c", blocks[2][1]]):
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    assert (tmp_path / "results" / "tour" / "report.html").exists()
+
+
+def test_the_readme_installs_first_what_needs_no_download():
+    text = (ROOT / "README.md").read_text()
+    installs = [line.strip() for line in re.findall(r"^(?:cargo|pip) install.*?(?=  #|$)", text, re.M)]
+    assert installs[0] == "cargo install --path . --locked"
+    # test_module runs the first of these, scripts/test-release the last.
+    assert installs[1:] == ["pip install .", "pip install '.[examples]'", "pip install dist/stickslip-0.2.0-*.whl"]
+
+
 def commands(page):
     """The commands of `stickslip` on a page, in blocks and in lines, with values for what stands for one."""
     text = page.read_text()

@@ -1,5 +1,5 @@
 """pandas, polars and DuckDB read an export alike, in each format: the rows of the tables in the order of the plan, each
-with all that was swept and the frequency."""
+with all that was swept and the frequency, and of the reduced sets and edges."""
 
 import csv
 
@@ -16,7 +16,14 @@ model = {{ N = 9 }}
 axes = {{ Kd = [4e6, 8e6], seed = {{ count = {seeds} }}, zip = [{{ Delta = [0, 1e-6], frequency = [29, 29] }}] }}
 record = {{ slips = 4, precursors = true }}
 """
-TABLES = ("jobs", "precursors", "slips")
+REFINED = """
+name = "refined"
+model = { N = 3, Ns = 4 }
+axes = { V0 = { log = [1e-4, 1e-3], points = 3 } }
+record = { slips = 2 }
+refine = { axis = "V0", by = "slip_share", threshold = 0.5, to = 0.3, seeds = { from = 24, to = 48 }, jobs = 200 }
+"""
+TABLES = ("jobs", "precursors", "sets", "slips")
 READERS = {
     "pandas": {"parquet": pd.read_parquet, "csv": pd.read_csv, "arrow": pd.read_feather},
     "polars": {"parquet": pl.read_parquet, "csv": pl.read_csv, "arrow": pl.read_ipc},
@@ -33,6 +40,19 @@ def extended(stickslip, tmp_path_factory):
     for seeds in (2, 3):
         (folder / "sweep.toml").write_text(SWEEP.format(seeds=seeds))
         stickslip("run", folder / "sweep.toml", "--out", folder / "results", "--no-reduce")
+        if seeds == 2:
+            stickslip("reduce", folder / "results")
+    for format in FORMATS:
+        stickslip("export", folder / "results", "--out", folder / format, "--format", format)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def refined(stickslip, tmp_path_factory):
+    """The results of a sweep with edges, and its export in each format."""
+    folder = tmp_path_factory.mktemp("refined")
+    (folder / "sweep.toml").write_text(REFINED)
+    stickslip("run", folder / "sweep.toml", "--out", folder / "results", "--no-reduce")
     for format in FORMATS:
         stickslip("export", folder / "results", "--out", folder / format, "--format", format)
     return folder
@@ -46,7 +66,10 @@ def rows(table):
 
 
 def expected(results, name):
-    """A table in the order of its parts, with the frequency as people write it, Kd, which only the jobs have, and no control."""
+    """Sets as they are; or a table in the order of its parts, with the frequency as people write it, Kd, which only the jobs
+    have, and no control."""
+    if name == "sets":
+        return pd.read_parquet(results / "reduced" / "sets.parquet")
     table, jobs = (pd.read_parquet(results / "tables" / folder) for folder in (name, "jobs"))
     assert table["frequency"].dropna().tolist() == [float(f"{1 / period:.12g}") for period in table["T"].dropna()]
     table = table if name == "jobs" else table.join(jobs.set_index("job_id")["Kd"], on="job_id")
@@ -56,11 +79,12 @@ def expected(results, name):
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("format", FORMATS)
 def test_every_reader_finds_the_rows_of_the_tables_with_what_was_swept(extended, format, reader):
-    assert sorted(file.name for file in (extended / format).iterdir()) == [f"{table}.{format}" for table in TABLES]
+    files = [f"{table}.{format}" for table in TABLES]
+    assert sorted(file.name for file in (extended / format).iterdir()) == ["columns.csv"] * (format == "csv") + files
     for table in TABLES:
         columns, found = rows(READERS[reader][format](extended / format / f"{table}.{format}"))
         names, wanted = rows(expected(extended / "results", table))
-        assert columns == names and found == wanted and len(found) >= 2 * 2 * 3
+        assert columns == names and found == wanted and len(found) >= (2 * 2 if table == "sets" else 2 * 2 * 3)
 
 
 def test_units_are_in_the_fields(extended):
@@ -68,6 +92,23 @@ def test_units_are_in_the_fields(extended):
     for schema in (pq.read_schema(files[0]), pa.ipc.open_file(files[1]).schema):
         units = {name: schema.field(name).metadata[b"unit"] for name in ("interval", "Kd", "frequency", "periods")}
         assert units == {"interval": b"s", "Kd": b"N/m", "frequency": b"Hz", "periods": b""}
+
+
+def test_units_and_meanings_lie_beside_csv(extended):
+    header, *described = csv.reader((extended / "csv" / "columns.csv").read_text().splitlines(), strict=True)
+    assert header == ["table", "column", "unit", "meaning"]
+    schemas = {table: pq.read_schema(extended / "parquet" / f"{table}.parquet") for table in TABLES}
+    fields = [(table, field) for table, schema in schemas.items() for field in schema]
+    texts = [[table, field.name, *(field.metadata[key].decode() for key in (b"unit", b"description"))] for table, field in fields]
+    assert sorted(described) == sorted(texts)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_a_sweep_that_refines_has_its_edges(refined, format):
+    columns, found = rows(READERS["polars"][format](refined / format / f"edges.{format}"))
+    names, wanted = rows(pl.read_parquet(refined / "results" / "reduced" / "edges.parquet"))
+    assert columns == names and found == wanted and len(found) >= 1
+    assert format != "csv" or "\nedges,edge_low," in (refined / "csv" / "columns.csv").read_text()
 
 
 def test_a_spreadsheet_takes_the_csv(extended):

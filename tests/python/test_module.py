@@ -33,6 +33,7 @@ from conftest import ROOT, results_in
 from nbclient import NotebookClient
 
 import stickslip as module
+from stickslip import guesses
 from stickslip.tables import Sweep
 
 KEYS = {"N": 9, "Delta": 1e-6, "frequency": 29, "slips": 6}
@@ -424,8 +425,13 @@ def test_figures_show_the_data(results, opened):
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
-    maturin = Path(sys.executable).with_name("maturin")
-    subprocess.run([maturin, "build", "--release", "--locked", "--quiet", "--out", folder], cwd=ROOT, check=True)
+    build = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+    # As in scripts/python-packages.
+    folders = {"CARGO_BUILD_BUILD_DIR": str(build), "CARGO_TARGET_DIR": str(build / "module")}
+    environment = os.environ | folders | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    # What `pip install .` does, but for the download of maturin.
+    command = [sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder, "."]
+    subprocess.run(command, cwd=ROOT, env=environment, check=True)
     return next(folder.glob("*.whl"))
 
 
@@ -496,3 +502,46 @@ def test_sweeps_in_rounds_have_edges_and_say_whether_targets_are_met(tmp_path, o
     assert min(pa.table(refined.jobs())["seed"].to_pylist()) == 7
     with pytest.raises(module.ResultsError, match="refine"):
         opened.edges()
+
+
+def test_a_column_of_a_table_has_its_name(opened):
+    slips = opened.slips()
+    pd.testing.assert_series_equal(slips["interval"], slips.to_pandas()["interval"])
+    with pytest.raises(KeyError, match="intervall"):
+        slips["intervall"]
+
+
+@pytest.mark.parametrize(
+    ("guess", "words"),
+    [
+        ("results.show()", r"write results.sets\(\).to_pandas\(\), or `stickslip show {directory}`"),
+        ("results.status()", r"or `stickslip status {directory}`"),
+        ("results.report()", r"write `stickslip report {directory}`"),
+        ("results.to_pandas()", r"write results.slips\(\).to_pandas\(\)"),
+        ("results.slip()", r"Results has no slip: did you mean slips\?"),
+        ("results.xyz", "there are backbone, directory, edges,"),
+        ("results.slips().interval", r"columns are slips\[NAME\], and to_pandas\(\) gives"),
+        ("results.plot.phi_eta()", "write phase_eta"),
+        ("results.plot('tau-T')", "write intervals"),
+        ("results.plot.tau_histograms()", "write histograms"),
+        ("results.plot.overview()", "`stickslip plot {directory}` draws it"),
+        ("results.plot('locking-map')", "`stickslip plot {directory}` draws it"),
+        ("one.plot()", r"trace=True write one.trace\(\).to_pandas\(\).plot\('time', 'force'\), or `stickslip simulate --plot"),
+        ("one.mean_friction", r"write one.job\['mean_friction'\]"),
+        ("one.slip()", r"Simulation has no slip: did you mean slips\?"),
+    ],
+)
+def test_a_guess_gets_the_answer(opened, guess, words):
+    one = module.simulate(N=3, Ns=4, slips=1)
+    with pytest.raises(AttributeError, match=words.format(directory=opened.directory)):
+        eval(guess, {"results": opened, "one": one})
+
+
+def test_what_answers_to_guesses_name_is_there(opened):
+    one = module.simulate(**KEYS, trace=True)
+    assert {"time", "force"} <= set(one.trace().columns)
+    assert opened.jobs()["outcome"].value_counts()["done"] > 0
+    assert opened.plot("intervals").get_ylabel() == opened.plot.intervals().get_ylabel()
+    sources = "".join(path.read_text() for path in (ROOT / "src" / "figure").glob("*.rs"))
+    figures = set(re.findall(r'^pub\(super\) const [A-Z]+: &str = "(.+)";', sources, re.M))
+    assert {figure.replace("-", "_") for figure in figures} == set(guesses.INSTEAD["Plot"])

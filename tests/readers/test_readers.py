@@ -47,7 +47,7 @@ def files(tmp_path_factory):
     assert len(tables) == 3 and all(len(list(table.iterdir())) >= 2 for table in tables)
     places = ("results/reduced/*.parquet", "*.parquet", "parquet/*", "arrow/*")
     found = [file for place in places for file in sorted(folder.glob(place))]
-    assert len(found) == 4 + len(RECORDS) + 3 + 3
+    assert len(found) == 4 + len(RECORDS) + 4 + 4
     return [*tables, *found]
 
 

@@ -2,6 +2,8 @@
 
 use super::{faulty, fine, run};
 use crate::observe::Measurements;
+use crate::reduce::reduce;
+use crate::results::destination::NewFolder;
 use crate::results::layout::Layout;
 use crate::results::tables::Names;
 use crate::results::{ErrorKind, Results};
@@ -217,10 +219,16 @@ fn extended() -> tempfile::TempDir {
 fn an_export_that_ends_at_any_operation_leaves_no_half_a_file_and_can_be_done_again() {
     let root = extended();
     let before = tables_of(root.path());
+    reduce(&Results::read(&Layout::new(&Disk, root.path())).unwrap()).unwrap();
     let export = |disk: &dyn Storage, to: &Path| {
         Results::read(&Layout::new(disk, root.path()))
             .unwrap()
-            .export(to, Format::Csv, &AtomicBool::new(false), &mut |_, _| ())
+            .export(
+                NewFolder::new(to)?,
+                Format::Csv,
+                &AtomicBool::new(false),
+                &mut |_, _| (),
+            )
     };
     let files = |folder: &Path| super::faults::files_below(folder);
     let folder = tempfile::tempdir().unwrap();
@@ -232,7 +240,7 @@ fn an_export_that_ends_at_any_operation_leaves_no_half_a_file_and_can_be_done_ag
             .keys()
             .map(|path| path.to_str().unwrap())
             .collect::<Vec<_>>(),
-        ["jobs.csv", "slips.csv"]
+        ["columns.csv", "jobs.csv", "sets.csv", "slips.csv"]
     );
     let error = export(&Disk, &whole).unwrap_err();
     assert!(

@@ -6,8 +6,9 @@ use super::faults::{files_below, results, small_sweep, small_sweep_in_rounds};
 use super::host::Host;
 use super::schedule::{Schedule, random_index};
 use super::*;
-use crate::reduce::{NoJobs, reduce};
+use crate::reduce::{NoJobs, reduce, renew};
 use crate::results::commit::tests::{KNOWN_NUMBER, own_number};
+use crate::results::destination::NewFolder;
 use crate::results::tables::Names;
 use crate::results::verification::Verification;
 use crate::table::formats::Format;
@@ -85,9 +86,9 @@ impl Process {
                 let folder = layout
                     .root()
                     .with_file_name(format!("export-{:016x}", own_number()));
-                Ok(Results::read(layout)?
+                Ok(renew(&Results::read(layout)?)?
                     .export(
-                        &folder,
+                        NewFolder::new(&folder)?,
                         Format::Arrow,
                         &AtomicBool::new(false),
                         &mut |_, _| (),

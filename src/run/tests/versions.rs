@@ -2,6 +2,7 @@
 
 use super::{fine, options, run, run_all, sweep};
 use crate::reduce::{SetRow, read_reduced, reduce};
+use crate::results::destination::NewFolder;
 use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, Names, PrecursorRow, SlipRow};
 use crate::results::{ErrorKind, Results, of_other_versions};
@@ -75,7 +76,7 @@ fn a_directory_of_another_version_is_reduced_and_exported_unchanged_and_not_run(
     );
     let exported = own
         .export(
-            &out.path().join("x"),
+            NewFolder::new(&out.path().join("x")).unwrap(),
             Format::Csv,
             &AtomicBool::new(false),
             &mut |_, _| (),
