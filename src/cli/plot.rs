@@ -3,10 +3,9 @@
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
-    CustomFigure, Dots, Format, Limits, Look, PlottedSlip, Size, Style, draw_all, draw_custom,
-    write_custom,
+    CustomFigure, Dots, Format, Limits, Look, Size, Style, draw_all, draw_custom, write_custom,
 };
-use crate::reduce::{SetRow, renew};
+use crate::reduce::{SetRow, SlipOfSet, renew};
 use crate::results::Results;
 use crate::results::destination::{Destination, Kind};
 use crate::table::columns::{Column, Row as _};
@@ -125,7 +124,7 @@ pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
 /// The columns of sets and of slips.
 fn list() -> String {
     let sets = described(&SetRow::columns());
-    let slips = described(&PlottedSlip::columns());
+    let slips = described(&SlipOfSet::columns());
     format!("{sets}\nwith --of slips:\n{slips}")
 }
 

@@ -5,13 +5,13 @@ use super::{Exit, UsageError, layout};
 use crate::model::Symbol;
 use crate::reduce::{
     Condition, EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing,
-    read_reduced, read_sets, renew,
+    means_of_slips, read_reduced, read_sets, renew,
 };
 use crate::results::Results;
 use crate::sets::{Digits, FOUND, label, with_decimals};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
-use crate::table::columns::Kind;
+use crate::table::columns::{Kind, Row as _};
 use crate::table::shown::shown;
 use crate::table::value::floored;
 use anyhow::Result;
@@ -30,7 +30,8 @@ pub struct Arguments {
     /// A second one: what differs, seed by seed, between the sets of both that agree in all that either varies
     #[arg(value_name = "OTHER", conflicts_with_all = ["columns", "condition", "sort"])]
     other: Option<PathBuf>,
-    /// Columns of the sets, or formulas of such, separated by commas, beside what was swept [default: what was found]
+    /// Columns of the sets, or formulas of such, separated by commas, beside what was swept; of columns of slips, the
+    /// means [default: what was found]
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     columns: Vec<String>,
     /// Only sets for which a condition on their columns, by name or heading, holds, in SI
@@ -124,7 +125,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
     let mut rows = sets(results, usize::MAX)?;
     let usual = usual_names(&rows);
     if let Some(text) = &arguments.condition {
-        let condition = Condition::read(text)
+        let condition = Condition::read(text, &SetRow::columns())
             .map_err(|problem| UsageError(format!("--where {text}: {problem}")))?;
         if arguments.is_text() && !rows.iter().any(|row| condition.holds(row)) {
             return output::print(&(condition.unmatched("sets", &rows) + "\n"));
@@ -142,7 +143,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
     let columns = if arguments.columns.is_empty() {
         usual_columns(usual, &rows)
     } else {
-        chosen_columns(usual, &arguments.columns, &rows)?
+        chosen_columns(results, usual, &arguments.columns, &rows)?
     };
     let mut edges = edges(results)?;
     if arguments.condition.is_some() {
@@ -216,16 +217,20 @@ fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
         .collect()
 }
 
-/// The parameters of these names, and columns by name, heading or formula, each once.
+/// The parameters of these names, and columns by name, heading or formula, each once; of slips, their means.
 fn chosen_columns(
+    results: &Results<'_>,
     parameters: Vec<&'static str>,
     chosen: &[String],
     rows: &[SetRow],
 ) -> Result<Vec<Values>> {
     let mut columns = Vec::new();
     for name in chosen {
-        let values = Values::of(rows, name);
-        columns.push(values.map_err(|problem| UsageError(format!("--columns {name}: {problem}")))?);
+        columns.push(match Values::of(rows, name) {
+            Ok(values) => values,
+            Err(problem) => means_of_slips(results, rows, name)?
+                .ok_or_else(|| UsageError(format!("--columns {name}: {problem}")))?,
+        });
     }
     let is_left_out = |name: &&str| columns.iter().all(|values| values.name() != *name);
     let parameters = parameters.into_iter().filter(is_left_out);
@@ -419,7 +424,8 @@ const LOPSIDED: f64 = 0.2;
 /// the middle, or ± would reach beyond zero and the interval does not.
 fn with_interval(value: f64, low: f64, high: f64) -> String {
     let half = 0.5 * (high - low);
-    if half.is_nan() || half <= 0.0 {
+    // Up to rounding there is no interval.
+    if half.is_nan() || half <= 1e-12 * value.abs() {
         return Digits::THREE.number(value);
     }
     let crosses = low >= 0.0 && value < half || high <= 0.0 && value > -half;
@@ -529,10 +535,14 @@ fn note_on_drive(rows: &[SetRow]) -> Option<String> {
 }
 
 /// What swept parameters change beside what their names say.
-const SIDE_EFFECTS: [(Symbol, &str); 2] = [
+const SIDE_EFFECTS: [(Symbol, &str); 3] = [
     (
         Symbol::M,
-        "M: a heavier slider also has more drag, as gamma is a rate per mass",
+        "M: at the same gamma, a rate per mass, a heavier slider has more drag",
+    ),
+    (
+        Symbol::Ns,
+        "Ns: a precursor has at least Ns breaks unless precursor_size is set",
     ),
     (
         Symbol::TauR,

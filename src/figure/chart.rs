@@ -164,11 +164,7 @@ impl<'a> Chart<'a> {
 
     /// Sets that differ in the x axis alone, in its order.
     fn lines(&self, sets: &[usize]) -> Vec<Vec<usize>> {
-        let along = self.x.parameters();
-        let mut swept = self.swept.iter();
-        let axis =
-            swept.find_map(|swept| parameter(swept.name()).filter(|symbol| along.contains(symbol)));
-        let Some(symbol) = axis else {
+        let Some(symbol) = self.x.joined_along(self.swept) else {
             return Vec::new();
         };
         // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.

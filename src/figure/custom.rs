@@ -3,8 +3,8 @@
 use super::chart::Chart;
 use super::quantity::{Limits, Quantity, parameter};
 use super::{BadOption, Look, Picture};
+use crate::model::Symbol;
 use crate::reduce::{SetRow, Values};
-use crate::table::columns::Row;
 use crate::table::value::words;
 
 words! {
@@ -39,19 +39,19 @@ pub struct CustomFigure {
     pub ylabel: Option<String>,
 }
 
-/// Draws a dot for each row, with the next of the swept parameters as colours. If the rows are `sets`, those that differ
-/// in one parameter of the x axis alone are joined; if they are slips, there are none.
-pub(super) fn custom<R: Row>(
-    rows: &[R],
+/// Draws a dot for each row of which there are these quantities, with the next of the swept parameters as colours. If the
+/// rows are `sets`, those that differ in one parameter of the x axis alone are joined; if they are slips, there are none.
+pub(super) fn custom<'a>(
+    quantity: &dyn Fn(&'static str, &str) -> Result<Quantity<'a>, BadOption>,
     sets: &[SetRow],
     swept: &[Values],
-    figure: &CustomFigure,
+    figure: &'a CustomFigure,
     look: &Look,
 ) -> Result<Picture, BadOption> {
-    let mut x = Quantity::of(rows, "x", &figure.x)?;
+    let mut x = quantity("x", &figure.x)?;
     x.limits = figure.xlim;
     x.label = figure.xlabel.as_deref();
-    let mut y = Quantity::of(rows, "y", &figure.y)?;
+    let mut y = quantity("y", &figure.y)?;
     y.limits = figure.ylim;
     y.label = figure.ylabel.as_deref();
     if let Some(axes) = &figure.log {
@@ -59,12 +59,10 @@ pub(super) fn custom<R: Row>(
         y.is_log = axes.contains('y');
     }
     let named = |option, name: &Option<String>| {
-        name.as_ref()
-            .map(|name| Quantity::of(rows, option, name))
-            .transpose()
+        name.as_ref().map(|name| quantity(option, name)).transpose()
     };
     let panels = named("panels", &figure.panels)?;
-    let mut shown = x.parameters();
+    let mut shown: Vec<Symbol> = x.joined_along(swept).into_iter().collect();
     shown.extend(panels.iter().flat_map(Quantity::parameters));
     let is_free =
         |swept: &&Values| parameter(swept.name()).is_some_and(|symbol| !shown.contains(&symbol));
@@ -132,7 +130,8 @@ pub(super) mod tests {
 
     fn drawn(count: u32, figure: &CustomFigure, look: &Look) -> Result<Picture, BadOption> {
         let rows = rows(count);
-        custom(&rows, &rows, &swept(&rows), figure, look)
+        let quantity = |option, name: &str| Quantity::of(&rows, option, name);
+        custom(&quantity, &rows, &swept(&rows), figure, look)
     }
 
     fn svg(figure: &CustomFigure) -> String {

@@ -3,7 +3,6 @@
 //! ```text
 //! a file for each standing figure: its data, its panels; `None` where the data do not fit
 //! overview.rs, custom.rs -> sets against a column (chart.rs, quantity.rs): an overview, and any column against another
-//! slips.rs               -> slips for custom figures
 //! map.rs                 -> sets over two parameters
 //!     panel.rs            panels as data: axes, layers between them
 //!     frame.rs, axis.rs   frames on a sheet, axes; legend.rs, hues.rs explain marks and colours
@@ -29,7 +28,6 @@ mod phase_eta;
 mod picture;
 mod quantity;
 mod simulation;
-mod slips;
 mod style;
 mod work_precision;
 
@@ -37,17 +35,21 @@ pub use custom::{CustomFigure, Dots};
 pub use picture::{Format, Picture};
 pub use quantity::Limits;
 pub use simulation::simulation;
-pub use slips::PlottedSlip;
 pub use style::{INKS, Ink, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
+use self::quantity::Quantity;
 use crate::model::{Parameters, Symbol, Value};
-use crate::reduce::{Condition, EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
+use crate::reduce::{
+    Condition, EdgeRow, SetRow, SlipOfSet, Values, WRITER, advise, means_of_slips, read_reduced,
+    read_sets, sample_of_slips, swept,
+};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::{Results, ResultsError};
 use crate::sets::{Digits, label, symbol_of};
 use crate::table::Table;
+use crate::table::columns::Row as _;
 use anyhow::Result;
 use std::path::PathBuf;
 
@@ -116,27 +118,60 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     write(layout, &pictures, look, formats)
 }
 
-/// Draws a custom figure from the sets of a results directory; writes nothing.
+/// Draws a custom figure of the sets or slips of a results directory; writes nothing.
 pub fn draw_custom(results: &Results<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
     let sets = read_sets(results.layout()).collect::<Result<Vec<_>, _>>();
     let mut sets = sets.map_err(advise(ADVICE))?;
+    let text = figure.condition.as_deref();
+    let bad = |problem: String| BadOption::new("where", text.unwrap_or_default(), &problem);
+    let columns = match figure.of {
+        Dots::Sets => SetRow::columns(),
+        Dots::Slips => SlipOfSet::columns(),
+    };
+    let condition = text.map(|text| Condition::read(text, &columns));
+    let condition = condition.transpose().map_err(bad)?;
+    let shown = text.map_or_else(String::new, |text| format!("; where {text}"));
     let picture = match figure.of {
         Dots::Sets => {
-            if let Some(text) = &figure.condition {
-                let bad = |problem: String| BadOption::new("where", text, &problem);
-                let condition = Condition::read(text).map_err(bad)?;
+            if let Some(condition) = &condition {
                 if !sets.iter().any(|set| condition.holds(set)) {
                     return Err(bad(condition.unmatched("sets", &sets)).into());
                 }
                 sets.retain(|set| condition.holds(set));
             }
-            let look = look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
-            custom::custom(&sets, &sets, &swept(&sets), figure, &look)?
+            let names = [Some(&figure.x), Some(&figure.y), figure.colour.as_ref()];
+            let mut means = Vec::new();
+            for name in names.into_iter().flatten() {
+                if Values::of(&sets, name).is_err() {
+                    means.extend(means_of_slips(results, &sets, name)?);
+                }
+            }
+            let quantity = |option, name: &str| {
+                let mean = means.iter().find(|mean| mean.name() == name).cloned();
+                mean.map_or_else(
+                    || Quantity::of(&sets, option, name),
+                    |mean| Ok(Quantity::of_values(option, mean)),
+                )
+            };
+            let common = common(sets.iter().map(|set| &*set.parameters));
+            let look = look.with_note(&(common + &shown));
+            custom::custom(&quantity, &sets, &swept(&sets), figure, &look)?
         }
         Dots::Slips => {
-            let (slips, note) = slips::read(results, &sets, figure.condition.as_deref())?;
-            let look = look.with_note(&note);
-            custom::custom(&slips, &[], &swept(&sets), figure, &look)?
+            let (slips, every, matching) = sample_of_slips(results, &sets, condition.as_ref())?;
+            if let Some(condition) = condition.filter(|_| slips.is_empty()) {
+                let (all, ..) = sample_of_slips(results, &sets, None)?;
+                return Err(bad(condition.unmatched("slips", &all)).into());
+            }
+            let common = common(slips.iter().map(|slip| &*slip.0.1));
+            let part = if every > 1 {
+                format!("one in {every} of ")
+            } else {
+                String::new()
+            };
+            let look = look.with_note(&format!("{common}{shown}; {part}{matching} slips"));
+            let quantity = |option, name: &str| Quantity::of(&slips, option, name);
+            custom::custom(&quantity, &[], &swept(&sets), figure, &look)?
         }
     };
     check_size(&picture, look)?;

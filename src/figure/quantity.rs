@@ -58,6 +58,13 @@ impl Quantity<'_> {
             _ => None,
         };
         let drive = drive.filter(|drive| drive.numbers.iter().any(Option::is_some));
+        Ok(Self {
+            drive,
+            ..Self::of_values(option, column)
+        })
+    }
+
+    pub(super) fn of_values(option: &'static str, column: Values) -> Self {
         let (factor, unit) = column.scale();
         let symbol = parameter(column.name());
         let is_log = if symbol.is_some() {
@@ -65,17 +72,17 @@ impl Quantity<'_> {
         } else {
             lies_decades_apart(&column)
         };
-        Ok(Self {
+        Self {
             option,
             column,
             symbol,
-            drive,
+            drive: None,
             factor,
             unit,
             is_log,
             limits: (None, None),
             label: None,
-        })
+        }
     }
 
     pub(super) fn name(&self) -> &str {
@@ -87,6 +94,13 @@ impl Quantity<'_> {
         let sources = self.column.sources.iter();
         let symbols: Option<Vec<Symbol>> = sources.map(|source| parameter(source)).collect();
         symbols.unwrap_or_default()
+    }
+
+    /// The first of the swept parameters that it is made of, if it is made of parameters alone.
+    pub(super) fn joined_along(&self, swept: &[Values]) -> Option<Symbol> {
+        let own = self.parameters();
+        let mut swept = swept.iter().filter_map(|swept| parameter(swept.name()));
+        swept.find(|symbol| own.contains(symbol))
     }
 
     pub(super) fn typeset(&self) -> Label {

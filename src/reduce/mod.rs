@@ -13,6 +13,7 @@ mod pool;
 mod reduction;
 mod sequence;
 mod set;
+mod slips;
 mod values;
 
 pub use crate::sets::{FREQUENCY, SetRow};
@@ -36,6 +37,7 @@ pub use reduction::{
     read_reduced, read_sets, reduce, renew,
 };
 pub use sequence::quantile;
+pub use slips::{SlipOfSet, means_of_slips, sample_of_slips};
 pub use values::{
     Condition, Values, ascending, differing, has_even_steps, is_same, is_spread, swept,
 };

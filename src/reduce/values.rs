@@ -5,7 +5,6 @@
 
 use super::dimension::unit_of_formula;
 use crate::model::Symbol;
-use crate::observe::Slip;
 use crate::sets::{Digits, FREQUENCY, Label, SetRow, label};
 use crate::sweep::{Expression, MAX_NAMES, nearest, synonym};
 use crate::table::columns::{Column, Kind, Row, Value};
@@ -95,19 +94,24 @@ impl Values {
     }
 
     fn of_formula<R: Row>(rows: &[R], text: &str, columns: &[Column]) -> Result<Self, String> {
-        let mut letters = text.chars();
-        if letters.all(|letter| letter.is_alphanumeric() || "_⟨⟩".contains(letter)) {
-            return Err(unknown(text, columns));
-        }
-        let formula = Expression::formula(text, &|name| number_column(name, columns));
-        let formula = formula.map_err(|error| error.to_string())?;
+        let formula = formula(text, columns)?;
         let numbers = rows.iter().map(|row| evaluate(&formula, row));
         let found = numbers.map(|number| (number.is_finite().then_some(number), None));
+        Ok(Self::of_numbers(text, &formula, columns, found))
+    }
+
+    /// The numbers of a formula of columns, with their unit, and the ends of their intervals.
+    pub(super) fn of_numbers(
+        text: &str,
+        formula: &Expression<usize>,
+        columns: &[Column],
+        found: impl Iterator<Item = (Option<f64>, Option<(f64, f64)>)>,
+    ) -> Self {
         let mut values = Self::computed(text, Kind::Real, found);
         let names = formula.names().into_iter();
         values.sources = names.map(|&place| columns[place].name.clone()).collect();
-        values.column.unit = unit_of_formula(&formula, columns);
-        Ok(values)
+        values.column.unit = unit_of_formula(formula, columns);
+        values
     }
 
     /// A column of computed values and the ends of their intervals.
@@ -192,12 +196,8 @@ fn word(cell: Value<'_>) -> Option<String> {
 pub struct Condition(Expression<usize>);
 
 impl Condition {
-    pub fn read(text: &str) -> Result<Self, String> {
-        Self::read_on(text, &SetRow::columns())
-    }
-
-    /// Reads one on other columns.
-    pub fn read_on(text: &str, columns: &[Column]) -> Result<Self, String> {
+    /// Reads one on these columns.
+    pub fn read(text: &str, columns: &[Column]) -> Result<Self, String> {
         let expression = Expression::condition(text, &|name| number_column(name, columns));
         expression.map(Self).map_err(|error| error.to_string())
     }
@@ -225,8 +225,19 @@ impl Condition {
     }
 }
 
+/// A formula of columns, or a single one.
+pub(super) fn formula(text: &str, columns: &[Column]) -> Result<Expression<usize>, String> {
+    let mut letters = text.chars();
+    let is_name = letters.all(|letter| letter.is_alphanumeric() || "_⟨⟩".contains(letter));
+    if is_name && place(text, columns).is_none() {
+        return Err(unknown(text, columns));
+    }
+    let formula = Expression::formula(text, &|name| number_column(name, columns));
+    formula.map_err(|error| error.to_string())
+}
+
 /// The value of an expression for a row; NaN stands for a missing value.
-fn evaluate(expression: &Expression<usize>, row: &impl Row) -> f64 {
+pub(super) fn evaluate(expression: &Expression<usize>, row: &impl Row) -> f64 {
     let mut cells = Vec::new();
     row.cells(&mut |cell| cells.push(cell.number().unwrap_or(f64::NAN)));
     expression.evaluate(&|&column| cells[column])
@@ -264,11 +275,6 @@ fn unknown(name: &str, columns: &[Column]) -> String {
     let mut problem = "no such column;".to_owned();
     if let Some(meant) = meant {
         problem += &format!(" did you mean {meant}?");
-    }
-    let of_slips = Slip::columns().into_iter();
-    let mut of_slips = of_slips.filter(|slip| slip.name == name || is_longer(&slip.name));
-    if let Some(Column { name, .. }) = of_slips.find(|slip| !names.contains(&&*slip.name)) {
-        problem += &format!(" {name} is a column of slips: plot --of slips.");
     }
     problem + " `stickslip plot --list` shows all"
 }
@@ -433,7 +439,7 @@ mod tests {
             [None; 2]
         );
         let left = |condition: &str| {
-            let condition = Condition::read(condition)?;
+            let condition = Condition::read(condition, &SetRow::columns())?;
             Ok::<_, String>(rows().iter().filter(|&row| condition.holds(row)).count())
         };
         assert_eq!(
@@ -444,7 +450,8 @@ mod tests {
             ),
             (Ok(2), Ok(1), Ok(0))
         );
-        let unmatched = Condition::read("tau_mean > 90 and frequency == 49").unwrap();
+        let unmatched =
+            Condition::read("tau_mean > 90 and frequency == 49", &SetRow::columns()).unwrap();
         assert_eq!(
             unmatched.unmatched("sets", &rows()),
             "none of 2 sets matches; tau_mean nearest to 90: 2 s; frequency nearest to 49: 50 Hz"
@@ -468,9 +475,6 @@ mod tests {
         );
         assert!(error("tau").contains("did you mean tau_mean?"));
         assert_eq!(error("tau_").matches("tau_").count(), MAX_NAMES);
-        assert!(error("block").contains("nucleation_block is a column of slips"));
-        let both = error("interval");
-        assert!(both.contains("tau_mean?") && both.contains("interval is a column of slips"));
         assert!(
             error("colour").contains("plot --list` shows all"),
             "{}",

@@ -107,19 +107,27 @@ fn each_slip_is_a_dot_with_the_unit_of_its_column_or_formula() {
         "V₀·interval (µm)",
         ">√(drop/peak force)<",
         ">(b)<",
-        "32 slips",
+        "slip==2;",
     ] {
         assert!(chosen.contains(text), "{text}");
     }
+    // Against what was swept, the means of slips have intervals.
+    folder.ends(0, "plot r --x V0 --y precursors -o own.svg");
+    let means = fs::read_to_string(folder.path("own.svg")).unwrap();
+    assert!(means.contains(">Precursors<") && means.contains("bars: 95 %"));
+    let shown = folder
+        .ends(0, "show r --columns next_interval,drop/peak_force")
+        .stdout;
+    assert!(
+        shown.contains("next interval (ms)") && shown.contains(" ± "),
+        "{shown}"
+    );
     for (options, words) in [
         (
             "--of slips --x block --y drop",
             "did you mean nucleation_block?",
         ),
-        (
-            "--x drop --y tau_mean",
-            "drop is a column of slips: plot --of slips",
-        ),
+        ("--x wear --y tau_mean", "--x wear: no such column"),
         (
             "--of slips --x V0 --y drop --where V0==1",
             "none of 128 slips matches; V0 nearest to 1:",
@@ -255,7 +263,7 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
         ),
         (
             "--x V0 --y T_to",
-            &["--y T_to: no set has a value of both V0 and T_to"],
+            &["--y T_to: none of the sets has a value of both V0 and T_to"],
         ),
         (
             "--x V0 --y tau_mean --xlim 1:2",

@@ -48,12 +48,12 @@ fn run_ends_with_the_result_and_show_prints_it_again() {
     let shown = folder.ends(0, "show out").stdout;
     assert!(run.contains(&shown), "{run}\n{shown}");
     let lines: Vec<&str> = shown.lines().collect();
-    assert_eq!(lines.len(), 4, "a head and three sets: {shown}");
+    assert_eq!(lines.len(), 5, "a head, three sets and a note: {shown}");
     for head in ["Δ (µm)", "1/T (Hz)", "⟨τ⟩ (ms)", "⟨Fₛ⟩ (N)", "μ", "R"] {
         assert!(lines[0].contains(head), "{head}: {shown}");
     }
     assert!(
-        lines[1..]
+        lines[1..4]
             .iter()
             .all(|line| line.contains(" ± ") && line.contains("stick-slip")),
         "{shown}"

@@ -1,0 +1,116 @@
+//! Slips one by one, with all parameters of their sets: for figures, and for means that the table of sets lacks.
+
+use super::Condition;
+use super::sequence::Sequences;
+use super::values::{Values, formula};
+use crate::model::Selected;
+use crate::observe::Slip;
+use crate::results::tables::{JOBS, JobOfSlip, Loading, SLIPS};
+use crate::results::{Results, ResultsError};
+use crate::sets::{AllButSeed, SetRow};
+use crate::table::columns::{Row, columns};
+use std::collections::{BTreeMap, HashMap};
+
+/// Most slips in a figure: more hide each other, and make a picture of some megabytes.
+const MAX_SLIPS: usize = 20_000;
+
+columns! {
+    /// What comes after a slip.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Following {
+        next_interval: Option<f64> = "s", "time to the next onset; null for the last of a job";
+    }
+}
+
+/// A slip, and what it is a slip of.
+pub type SlipOfSet = (
+    (JobOfSlip, Selected<AllButSeed>),
+    (Loading, Slip, Following),
+);
+
+/// Gives each slip of some sets, with the place of its set.
+fn each_slip(
+    results: &Results<'_>,
+    sets: &[SetRow],
+    mut give: impl FnMut(usize, SlipOfSet),
+) -> Result<(), ResultsError> {
+    let ids = sets.iter().map(|set| &*set.set_id);
+    let places: HashMap<&str, usize> = ids.zip(0..).collect();
+    let mut last: Option<(usize, SlipOfSet)> = None;
+    let files = results.committed_files(SLIPS, &results.dataset(JOBS)?)?;
+    for batch in files.rows::<(JobOfSlip, Slip)>() {
+        for (job, slip) in batch? {
+            let Some(&place) = places.get(&*job.set_id) else {
+                continue;
+            };
+            if let Some((place, mut before)) = last.take() {
+                if before.0.0 == job {
+                    before.1.2.next_interval = slip.interval;
+                }
+                give(place, before);
+            }
+            let parameters = sets[place].parameters.clone();
+            let following = Following {
+                next_interval: None,
+            };
+            let loading = Loading::of(&parameters);
+            last = Some((place, ((job, parameters), (loading, slip, following))));
+        }
+    }
+    if let Some((place, slip)) = last {
+        give(place, slip);
+    }
+    Ok(())
+}
+
+/// The slips of these sets that fulfil a condition, one in so many of them, and how many fulfil it.
+pub fn sample_of_slips(
+    results: &Results<'_>,
+    sets: &[SetRow],
+    condition: Option<&Condition>,
+) -> Result<(Vec<SlipOfSet>, usize, usize), ResultsError> {
+    let mut slips: Vec<SlipOfSet> = Vec::new();
+    let mut every = 1;
+    let mut matching = 0_usize;
+    each_slip(results, sets, |_, slip| {
+        if condition.is_some_and(|condition| !condition.holds(&slip)) {
+            return;
+        }
+        if matching.is_multiple_of(every) {
+            slips.push(slip);
+        }
+        matching += 1;
+        if slips.len() > MAX_SLIPS {
+            every *= 2;
+            let mut is_kept = [true, false].into_iter().cycle();
+            slips.retain(|_| is_kept.next() == Some(true));
+        }
+    })?;
+    Ok((slips, every, matching))
+}
+
+/// The means over the slips of each set of a column of slips, or a formula of such; `None` if it is neither.
+pub fn means_of_slips(
+    results: &Results<'_>,
+    sets: &[SetRow],
+    name: &str,
+) -> Result<Option<Values>, ResultsError> {
+    let columns = SlipOfSet::columns();
+    let Ok(formula) = formula(name, &columns) else {
+        return Ok(None);
+    };
+    let mut jobs: Vec<BTreeMap<u64, Vec<f64>>> = vec![BTreeMap::new(); sets.len()];
+    each_slip(results, sets, |place, slip| {
+        let value = super::values::evaluate(&formula, &slip);
+        if value.is_finite() {
+            jobs[place].entry(slip.0.0.seed).or_default().push(value);
+        }
+    })?;
+    let found = jobs.iter().map(|jobs| {
+        let values = jobs.values().map(|job| job.iter().map(|value| [*value]));
+        let mean = Sequences::of(values).estimate();
+        let interval = mean.interval().map(|ends| (ends.low, ends.high));
+        (mean.value(), interval)
+    });
+    Ok(Some(Values::of_numbers(name, &formula, &columns, found)))
+}
