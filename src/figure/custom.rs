@@ -77,6 +77,7 @@ pub(super) fn custom(
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::chart::LINE_WIDTH;
+    use super::super::quantity::tests::set;
     use super::super::style::{BAR_WIDTH, Style};
     use super::*;
     use crate::model::Parameters;
@@ -307,6 +308,19 @@ pub(super) mod tests {
             })
             .contains(pooled)
         );
+    }
+
+    #[test]
+    fn a_series_without_a_mark_has_no_entry() {
+        let sets = [(1e-6, 0.02), (1e-6, 0.03), (0.0, 0.01)];
+        let sets = sets.map(|(amplitude, period)| set(amplitude, period, 4.0));
+        let figure = CustomFigure {
+            x: "frequency".into(),
+            y: "resultant_length".into(),
+            ..figure()
+        };
+        let svg = custom(&sets, &figure, &Look::default()).unwrap().svg();
+        assert!(!svg.contains(">Δ = 0<") && svg.contains("not shown: 1 of 3 sets"));
     }
 
     #[test]
