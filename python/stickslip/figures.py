@@ -88,7 +88,8 @@ class Plot:
         _scatter(axes, points, "eta", "phase")
         means = self._mean_phases(points)
         eta, mean = (means["eta_low"] * means["eta_high"]) ** 0.5, means["phase_mean"]
-        across, along = ((abs(means[[f"{of}_low", f"{of}_high"]].sub(at, axis=0))).T for of, at in (("eta", eta), ("phase_mean", mean)))
+        across = abs(means[["eta_low", "eta_high"]].sub(eta, axis=0)).T
+        along = abs(means[["phase_mean_low", "phase_mean_high"]].sub(mean, axis=0)).T
         label = r"mean of all slips in a bin of $\eta$, 95 %"
         axes.errorbar(eta, mean, along, across, fmt="o", color=AVERAGE, markersize=4.5, elinewidth=1, label=label)
         axes.plot(*_least_phases(high), color=THEORY, linewidth=1.6, label=r"$\phi_{\min}$, Eq. 2")
@@ -148,7 +149,7 @@ class Plot:
         return panels[:, 0]
 
     def _mean_phases(self, points: "pandas.DataFrame") -> "pandas.DataFrame":
-        """Bins of eta: ends of the eta of their slips, mean phase (rad) and ends of its interval; those in which a direction is known."""
+        """Bins of eta: ends of the eta of their slips, mean phase (rad) and its interval; those in which a direction is known."""
         from math import tau
 
         columns = ["eta_low", "eta_high", "phase_mean", "phase_mean_low", "phase_mean_high"]

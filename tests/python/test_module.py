@@ -413,7 +413,7 @@ def test_figures_show_the_data(results, opened):
     (means,) = axes.containers
     bins = pd.read_parquet(results / "reduced" / "backbone.parquet")
     assert means.lines[0].get_ydata() == pytest.approx(bins["phase_mean"]) and means.has_yerr
-    assert set(means.lines[0].get_xdata().round(9)) <= set(points["eta"].round(9))
+    assert set(means.lines[0].get_xdata().astype(float).round(9)) <= set(points["eta"].round(9))
     assert "rad" in axes.get_ylabel()
     axes = opened.plot.intervals()
     assert "(s)" in axes.get_xlabel()
