@@ -64,16 +64,15 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let modulated = sets
         .iter()
         .find(|set| set.parameters.modulation_period.is_some());
-    let lines = || match modulated.filter(|_| is_locking) {
-        Some(set) => {
+    let lines = || {
+        if let Some(set) = modulated.filter(|_| is_locking) {
             let amplitude =
                 |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
             let places = x_axis.evenly_placed(200).into_iter();
             let places: Vec<Place> = places.map(|place| (place, amplitude(place))).collect();
             let lines = [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke));
             lines.into()
-        }
-        None => {
+        } else {
             let mut lines = map.borders(|set| sets[set].regime, BORDER);
             for (regime, ink, _) in MARKS {
                 let of_it = map.sets.iter().map(|set| set.0);
