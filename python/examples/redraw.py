@@ -20,7 +20,7 @@ import stickslip
 
 
 def phase_eta(results):
-    """Phases of slips, means of sets that have a phase, and where Eq. 2 lets slips begin."""
+    """Phases of slips, means of all slips in bins of eta, and where Eq. 2 lets slips begin."""
     opened = stickslip.open(results)
     points = opened.points().to_pandas().dropna(subset="phase")
     bins = opened.backbone().to_pandas()
@@ -28,7 +28,10 @@ def phase_eta(results):
     for has_phase, colour, label in ((False, "0.6", "no phase"), (True, "black", "sets with a phase")):
         slips = points[points["has_phase"] == has_phase]
         axes.plot(slips["eta"], slips["phase"], ".", color=colour, markersize=2, label=label)
-    axes.plot(bins["eta_centre"], bins["set_phase_mean"], "o", color="tab:blue", label="mean of sets with a phase")
+    etas = [points["eta"][points["eta"].between(one.eta_low, one.eta_high, "left")] for one in bins.itertuples()]
+    middles = [(eta.min() * eta.max()) ** 0.5 for eta in etas]
+    bars = abs(bins[["phase_mean_low", "phase_mean_high"]].sub(bins["phase_mean"], axis=0)).T
+    axes.errorbar(middles, bins["phase_mean"], bars, fmt="o", color="tab:blue", label="mean of all slips in a bin, 95 %")
     eta = np.geomspace(1, max(10, points["eta"].max()))
     axes.plot(eta, -2 * np.sqrt(np.pi / eta), color="tab:red", label=r"$-2\sqrt{\pi/\eta}$")
     axes.plot(bins["eta_centre"], bins["phi_min"], "x", color="tab:red", label=r"$\phi_{\min}$, Eq. 2")

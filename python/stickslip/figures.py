@@ -54,8 +54,6 @@ MAX_PANELS = 8
 MAX_MULTIPLES = 40
 #: Least ratio of two n with a line each: closer ones would merge.
 MIN_RATIO = 1.4
-#: Sets with a mean phase of their own; of more, bins are shown.
-MAX_MEANS = 60
 #: Size of a slip.
 MARKER = 3.5
 
@@ -87,14 +85,18 @@ class Plot(Guessed):
 
     @_styled()
     def phase_eta(self, axes: "Axes | None" = None) -> "Axes":
-        """Phases of slips (rad) against eta, with means of sets that have a phase and where Eq. 2 lets slips begin (Fig. 3e)."""
+        """Phases of slips (rad) against eta, with means of all slips in bins of eta and where Eq. 2 lets slips begin (Fig. 3e)."""
         points = self._slips("phase")
         axes = axes or _new_axes()
         low, high = 0.8 * points["eta"].min(), 1.25 * points["eta"].max()
         axes.axvspan(min(low, 1), 1, color="0.9", zorder=0, label=r"$\eta$ < 1")
         _scatter(axes, points, "eta", "phase")
-        eta, mean, bars, what = self._mean_phases()
-        axes.errorbar(eta, mean, bars, fmt="o", color=AVERAGE, markersize=4.5, elinewidth=1, label=what)
+        means = self._mean_phases(points)
+        eta, mean = (means["eta_low"] * means["eta_high"]) ** 0.5, means["phase_mean"]
+        across = abs(means[["eta_low", "eta_high"]].sub(eta, axis=0)).T
+        along = abs(means[["phase_mean_low", "phase_mean_high"]].sub(mean, axis=0)).T
+        label = r"mean of all slips in a bin of $\eta$, 95 %"
+        axes.errorbar(eta, mean, along, across, fmt="o", color=AVERAGE, markersize=4.5, elinewidth=1, label=label)
         axes.plot(*_least_phases(high), color=THEORY, linewidth=1.6, label=r"$\phi_{\min}$, Eq. 2")
         label = r"$\eta = 2\pi\Delta/(T\,V_0)$"
         axes.set(xscale="log", xlim=(low, high), xlabel=label, ylabel=r"Phase $\phi$ (rad)")
@@ -151,16 +153,16 @@ class Plot(Guessed):
         figure.supylabel("Probability density (1/s)", fontsize=12)
         return panels[:, 0]
 
-    def _mean_phases(self) -> "tuple[pandas.Series, pandas.Series, numpy.ndarray, str]":
-        """eta, mean phase of sets that have one (rad), lower and upper bars, and what they are: sets, or bins of many sets."""
-        columns = ["eta", "phase_mean", "phase_mean_low", "phase_mean_high", "has_phase"]
-        found = self._results.sets(columns).to_pandas()
-        found, what = found[found["has_phase"]].drop(columns="has_phase"), "mean of a set with a phase"
-        if len(found) > MAX_MEANS:
-            columns = ["eta_centre", *(f"set_{column}" for column in columns[1:4])]
-            found, what = self._results.backbone(columns).to_pandas().dropna(), "mean of sets with a phase"
-        eta, mean, low, high = (found[column] for column in found)
-        return eta, mean, abs(found[[low.name, high.name]].sub(mean, axis=0)).T.to_numpy(), what
+    def _mean_phases(self, points: "pandas.DataFrame") -> "pandas.DataFrame":
+        """Bins of eta: ends of the eta of their slips, mean phase (rad) and its interval; those in which a direction is known."""
+        from math import tau
+
+        columns = ["eta_low", "eta_high", "phase_mean", "phase_mean_low", "phase_mean_high"]
+        bins = self._results.backbone(columns).to_pandas().dropna()
+        bins = bins[bins["phase_mean_high"] - bins["phase_mean_low"] < tau * (1 - 1e-9)]
+        within = [points["eta"].between(low, high, "left") for low, high in zip(bins["eta_low"], bins["eta_high"], strict=True)]
+        etas = [points["eta"][of_bin] for of_bin in within]
+        return bins.assign(eta_low=[eta.min() for eta in etas], eta_high=[eta.max() for eta in etas])
 
     def _slips(self, column: str) -> "pandas.DataFrame":
         """Slips under modulation with a value in a column."""

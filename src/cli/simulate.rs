@@ -231,7 +231,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     tables.write(files.profile.as_deref(), records.profile.iter().copied())?;
     tables.write(files.contacts.as_deref(), contacts)?;
     tables.write(files.slip_table.as_deref(), slips)?;
-    arguments.write_plots(parameters, &records, &measured.slips)?;
+    arguments.write_plots(parameters, &records, &measured)?;
 
     let report = Report::new(&label.0.job_id, &measured, wall);
     if arguments.json {
@@ -297,7 +297,7 @@ impl Arguments {
         &self,
         parameters: &Parameters,
         records: &Records,
-        slips: &[Slip],
+        measured: &Measurements,
     ) -> Result<()> {
         let PlotFlags { files, from, .. } = &self.plot;
         if files.is_empty() {
@@ -318,10 +318,10 @@ impl Arguments {
         let trace: Vec<(f64, f64)> = trace.map(|row| (row.time, row.force)).collect();
         let map = records.map.iter().filter(|row| shown.contains(&row.time));
         let map: Vec<_> = map.copied().collect();
-        let onsets: Vec<f64> = slips.iter().map(|slip| slip.onset).collect();
+        let onsets: Vec<f64> = measured.slips.iter().map(|slip| slip.onset).collect();
         let trace = self.plot.draws(Panel::Force).then_some(&*trace);
         let map = self.plot.draws(Panel::Map).then_some(&*map);
-        let picture = simulation(parameters, trace, map, &onsets);
+        let picture = simulation(parameters, trace, map, [&measured.start_up, &onsets]);
         let picture = picture.map_err(|error| refused(error.to_string()))?;
         for path in files {
             let (destination, format) = picture_file(path)?;

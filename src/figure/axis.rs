@@ -1,6 +1,6 @@
 //! Axes: range, scale, and where ticks go.
 
-use crate::sets::{Digits, power_of_ten, with_decimals};
+use crate::sets::{power_of_ten, with_decimals};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,8 +18,6 @@ pub(super) struct Axis {
     pub(super) low: f64,
     pub(super) high: f64,
     scale: Scale,
-    /// Power of ten over which the numbers of a linear axis are; `None` if its ticks are given.
-    power: Option<i32>,
     pub(super) ticks: Vec<(f64, String)>,
     pub(super) minor: Vec<f64>,
 }
@@ -28,12 +26,15 @@ pub(super) struct Axis {
 const MAX_TICKS: f64 = 6.0;
 /// Fewest numbers that show the scale of an axis.
 const FEWEST: usize = 3;
-/// Mantissas with a number on logarithmic axes: over several decades, over few, and over so short a range that those
-/// give one or two numbers.
-const MANTISSAS: [&[f64]; 3] = [
+/// Mantissas with a number on logarithmic axes: over several decades, over few, and over ranges so short that those give
+/// one or two numbers.
+const MANTISSAS: [&[f64]; 4] = [
     &[1.0],
     &[1.0, 2.0, 5.0],
     &[1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0],
+    &[
+        1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0,
+    ],
 ];
 /// Numbers of values within these limits are written out, if they need no more decimals than this; others are multiples
 /// of a power of ten that stands in the label.
@@ -69,8 +70,12 @@ impl Axis {
             0
         };
         let mut axis = Self::bare(&with_power(label, power), low, high);
-        axis.power = Some(power);
-        axis.set_steps(nice_step((high - low) / max_ticks), power);
+        // Finer steps, where these would give one or two numbers.
+        for count in [max_ticks, MAX_TICKS, 1.5 * MAX_TICKS] {
+            if axis.ticks.len() < FEWEST {
+                axis.set_steps(nice_step((high - low) / count), power);
+            }
+        }
         axis
     }
 
@@ -95,45 +100,6 @@ impl Axis {
         if self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length {
             self.minor.clear();
         }
-    }
-
-    /// The same axis with a number at each of these values, which differ, and no other tick.
-    pub(super) fn with_ticks_at(mut self, label: &str, values: &[f64]) -> Self {
-        let digits = Digits::THREE.distinguishing(values);
-        let ticks = values.iter().map(|&value| (value, digits.typeset(value)));
-        label.clone_into(&mut self.label);
-        self.power = None;
-        self.ticks = ticks.collect();
-        self.minor.clear();
-        self
-    }
-
-    /// The same axis with three numbers or more, where one or two would not show its scale.
-    pub(super) fn with_enough_numbers(self) -> Self {
-        if self.ticks.len() >= FEWEST {
-            return self;
-        }
-        let finer = |refine: &dyn Fn(&mut Self)| {
-            let mut axis = self.clone();
-            refine(&mut axis);
-            if self.minor.is_empty() {
-                axis.minor.clear();
-            }
-            (axis.ticks.len() >= FEWEST).then_some(axis)
-        };
-        let finer = match (self.scale, self.power) {
-            (Scale::Logarithmic, _) => MANTISSAS
-                .into_iter()
-                .find_map(|mantissas| finer(&|axis| axis.set_mantissas(mantissas))),
-            (Scale::Linear, Some(power)) => {
-                let step = nice_step((self.high - self.low) / FEWEST as f64);
-                [1.0, 0.5, 0.4, 0.2, 0.1]
-                    .into_iter()
-                    .find_map(|share| finer(&|axis| axis.set_steps(nice_step(share * step), power)))
-            }
-            (Scale::Linear, None) => None,
-        };
-        finer.unwrap_or(self)
     }
 
     /// For data: logarithmic where these lie decades apart, and a little wider than they are; `None` without any.
@@ -165,7 +131,11 @@ impl Axis {
         let [low, high] = [low, high].map(|end| end.clamp(1.0 / LARGEST, LARGEST));
         let mut axis = Self::bare(label, low, high);
         axis.scale = Scale::Logarithmic;
-        axis.set_mantissas(MANTISSAS[usize::from(libm::log10(high / low) < 2.0)]);
+        for mantissas in &MANTISSAS[usize::from(libm::log10(high / low) < 2.0)..] {
+            if axis.ticks.len() < FEWEST {
+                axis.set_mantissas(mantissas);
+            }
+        }
         axis
     }
 
@@ -231,7 +201,6 @@ impl Axis {
             low,
             high,
             scale: Scale::Linear,
-            power: None,
             ticks: Vec::new(),
             minor: Vec::new(),
         }
@@ -493,44 +462,21 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_with_one_or_two_numbers_gets_three_or_more() {
-        let enough = |axis: Axis| axis.with_enough_numbers();
-        assert_eq!(
-            labels(&enough(Axis::logarithmic("", 40.0, 125.0))),
-            ["40", "60", "80", "100"]
-        );
-        assert_eq!(
-            labels(&enough(Axis::logarithmic("", 0.012, 0.05))),
-            ["0.015", "0.02", "0.03", "0.04"]
-        );
-        assert_eq!(
-            labels(&enough(Axis::logarithmic("", 0.3, 60.0))),
-            ["0.5", "1", "2", "5", "10", "20", "50"]
-        );
-        assert_eq!(
-            labels(&enough(Axis::sparse("", 0.0, 78.0))),
-            ["0", "20", "40", "60"]
-        );
-        assert!(
-            enough(Axis {
-                minor: Vec::new(),
-                ..Axis::sparse("", 0.0, 78.0)
-            })
-            .minor
-            .is_empty()
-        );
-        assert_eq!(
-            labels(&enough(Axis::logarithmic("", 1.0, 1e5))).len(),
-            6,
-            "it has enough"
-        );
-        assert_eq!(
-            labels(&enough(Axis::categories(
-                "",
-                &["one", "two"].map(str::to_owned)
-            ))),
-            ["one", "two"]
-        );
+    fn an_axis_has_three_numbers_or_more() {
+        for (axis, expected) in [
+            (
+                Axis::logarithmic("", 40.0, 125.0),
+                ["40", "60", "80", "100"],
+            ),
+            (
+                Axis::logarithmic("", 0.012, 0.05),
+                ["0.015", "0.02", "0.03", "0.04"],
+            ),
+            (Axis::logarithmic("", 0.3, 6.0), ["0.5", "1", "2", "5"]),
+            (Axis::sparse("", 0.0, 78.0), ["0", "20", "40", "60"]),
+        ] {
+            assert_eq!(labels(&axis), expected);
+        }
         for exponent in -12..12 {
             for (start, span) in [
                 (1.01, 3.2),
@@ -544,7 +490,7 @@ mod tests {
                     Axis::logarithmic("", low, span * low),
                     Axis::sparse("", low, span * low),
                 ] {
-                    let count = enough(axis).ticks.len();
+                    let count = axis.ticks.len();
                     assert!((3..=9).contains(&count), "{low} {span}: {count}");
                 }
             }

@@ -8,7 +8,7 @@ use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::{Quantity, parameter, without_value};
+use super::quantity::{Quantity, parameter, shows_phase, without_value};
 use super::style::{
     BAR_WIDTH, BLACK, Dot, GREY, INKS, Ink, Look, RADIUS, REFERENCE, STRIPE, Stroke, WHITE, dot,
     drive_alone,
@@ -124,7 +124,7 @@ impl<'a> Chart<'a> {
                 panels.push(panel);
             }
         }
-        let look = look.with_note(&self.note(&inside, dots.free.len()));
+        let look = look.with_note(&self.note(&inside, &dots.free));
         let legend = self.legend(&inside, &dots);
         Ok(panel::draw(name, &look, layout, &legend, panels))
     }
@@ -153,6 +153,7 @@ impl<'a> Chart<'a> {
             self.x.symbol == Some(Symbol::T)
                 && self.sets[set].parameters.modulation_period.is_none()
                 && !self.x.has(set)
+                && self.ys.iter().any(|y| y.has(set))
         };
         let free: Vec<usize> = (0..self.sets.len()).filter(is_free).collect();
         if free.len() > INKS.len() {
@@ -314,9 +315,10 @@ impl Chart<'_> {
     fn legend(&self, inside: &[usize], dots: &Dots) -> Vec<Entry> {
         let mut entries = Vec::new();
         if let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) {
-            let numbers: Vec<Option<f64>> = inside.iter().map(|&set| colour.number(set)).collect();
+            let shown = [inside, &dots.free].concat();
+            let numbers: Vec<Option<f64>> = shown.iter().map(|&set| colour.number(set)).collect();
             entries.extend(hues.entries(RADIUS, |value| numbers.contains(&Some(value))));
-            if numbers.contains(&None) {
+            if inside.iter().any(|&set| colour.number(set).is_none()) {
                 let text = without_value(&colour.column);
                 entries.push(entry(Mark::Dot(dot(GREY)), text));
             }
@@ -325,7 +327,10 @@ impl Chart<'_> {
             entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
         }
         if inside.iter().any(|&set| self.slides(set)) {
-            entries.push(entry(Mark::Ring(BLACK, RADIUS, RADIUS - HOLE), "sliding"));
+            entries.push(entry(
+                Mark::Ring(BLACK, WHITE, RADIUS, RADIUS - HOLE),
+                "sliding",
+            ));
         }
         if self.ys.iter().any(|y| y.name() == "slip_share") {
             let [mixed, sliding] = Regime::MIN_SHARES;
@@ -366,7 +371,7 @@ impl Chart<'_> {
     }
 
     /// What bars are, and what is not there.
-    fn note(&self, inside: &[usize], levels: usize) -> String {
+    fn note(&self, inside: &[usize], free: &[usize]) -> String {
         let mut notes = Vec::new();
         let has_bars = |y: &Quantity<'_>| inside.iter().any(|&set| y.interval(set).is_some());
         if self.ys.iter().any(has_bars) {
@@ -382,8 +387,20 @@ impl Chart<'_> {
             let slide = still.len();
             notes.push(format!("{slide} of {count} sets slide: no intervals"));
         }
-        let still_outside = still.iter().filter(|set| !inside.contains(set)).count();
-        let left_out = count - inside.len() - levels - still_outside;
+        let mut quantities = self.ys.iter().chain([&self.x]);
+        let shows_phase = quantities.any(|shown| shows_phase(shown.name()));
+        let has_none = |row: &SetRow| !row.has_phase && row.phase_mean.is_some();
+        let is_unphased = |set: &usize| shows_phase && self.sets.get(*set).is_some_and(has_none);
+        let unphased = (0..count).filter(is_unphased).count();
+        if unphased > 0 {
+            let text = format!("not shown: {unphased} of {count} sets, without a phase");
+            notes.push(text);
+        }
+        let is_left_out = |set: &usize| {
+            let is_shown = inside.contains(set) || free.contains(set);
+            !(is_shown || is_still(set) || is_unphased(set))
+        };
+        let left_out = (0..count).filter(is_left_out).count();
         if left_out > 0 {
             notes.push(format!(
                 "not shown: {left_out} of {count} {}, without a value or outside the axes",

@@ -90,6 +90,7 @@ pub(super) fn custom<'a>(
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::chart::LINE_WIDTH;
+    use super::super::quantity::tests::set;
     use super::super::style::{BAR_WIDTH, Style};
     use super::*;
     use crate::model::Parameters;
@@ -128,10 +129,13 @@ pub(super) mod tests {
         }
     }
 
+    fn drawn_of(rows: &[SetRow], figure: &CustomFigure, look: &Look) -> Result<Picture, BadOption> {
+        let quantity = |option, name: &str| Quantity::of(rows, option, name);
+        custom(&quantity, rows, &swept(rows), figure, look)
+    }
+
     fn drawn(count: u32, figure: &CustomFigure, look: &Look) -> Result<Picture, BadOption> {
-        let rows = rows(count);
-        let quantity = |option, name: &str| Quantity::of(&rows, option, name);
-        custom(&quantity, &rows, &swept(&rows), figure, look)
+        drawn_of(&rows(count), figure, look)
     }
 
     fn svg(figure: &CustomFigure) -> String {
@@ -326,6 +330,19 @@ pub(super) mod tests {
             })
             .contains(pooled)
         );
+    }
+
+    #[test]
+    fn a_series_without_a_mark_has_no_entry() {
+        let sets = [(1e-6, 0.02), (1e-6, 0.03), (0.0, 0.01)];
+        let sets = sets.map(|(amplitude, period)| set(amplitude, period, 4.0));
+        let figure = CustomFigure {
+            x: "frequency".into(),
+            y: "resultant_length".into(),
+            ..figure()
+        };
+        let svg = drawn_of(&sets, &figure, &Look::default()).unwrap().svg();
+        assert!(!svg.contains(">Δ = 0<") && svg.contains("not shown: 1 of 3 sets"));
     }
 
     #[test]

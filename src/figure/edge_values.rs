@@ -5,7 +5,7 @@ use super::frame::{Ends, Layout};
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::{MAX_TICKS, axis_of, distinct};
+use super::quantity::{axis_of, distinct};
 use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, REFERENCE, Stroke, dot};
 use crate::model::Symbol;
 use crate::reduce::{EdgeRow, FREQUENCY, Interval, ascending};
@@ -55,14 +55,8 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
         Some((x_factor * value(key, edge)?, ends))
     });
     let searched: Vec<(f64, Ends)> = searched.collect();
-    let known = places().chain(searched.iter().map(|row| (row.0, 0.0)));
-    let known = ascending(known.map(|place| place.0));
-    let x = Axis::of_data(&x_label, known.iter().copied())?;
-    let x = if known.len() > MAX_TICKS {
-        x
-    } else {
-        x.with_ticks_at(&x_label, &known)
-    };
+    let known = places().map(|place| place.0);
+    let x = Axis::of_data(&x_label, known.chain(searched.iter().map(|row| row.0)))?;
     let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
     let statistics = distinct(edges.iter().map(|edge| &*edge.statistic));
     let mut legend = Vec::new();

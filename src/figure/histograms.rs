@@ -157,7 +157,8 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
             title: title(set),
             bars: bars(set),
             overlay: twin.map(|twin| bars(twin)),
-            period: set.parameters.modulation_period,
+            // A ramp has many.
+            period: (set.parameters.modulation_period).filter(|_| set.parameters.ramp_time == 0.0),
         }
     };
     shown

@@ -8,7 +8,7 @@ use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
 use super::style::{Dot, GREY, GRID, LIGHT_GREY, Look};
-use crate::reduce::{Point, ascending};
+use crate::reduce::{Point, ascending, is_same};
 use crate::sets::{Digits, label};
 
 pub(super) const NAME: &str = "tau-T";
@@ -23,7 +23,8 @@ const OTHER: Dot = Dot {
 const LINES: u32 = 12;
 
 /// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
-/// τ = nT; `None` without any interval under modulation. Slips of sets with a phase have the colour of their V0.
+/// τ = nT; `None` without intervals at two periods or more. Slips of sets with a phase have the colour of their V0, or
+/// of their Δ at a common V0.
 pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
         let period = point.period?;
@@ -34,6 +35,9 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         .iter()
         .filter_map(|point| Some((point, place(point)?)))
         .collect();
+    if ascending(slips.iter().map(|slip| slip.1.0)).len() < 2 {
+        return None;
+    }
     let (x_label, factor) = axis_of("T", slips.iter().map(|slip| slip.1.0));
     for slip in &mut slips {
         slip.1.0 *= factor;
@@ -42,22 +46,31 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let x = Axis::logarithmic(&x_label, low, high);
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;
     let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
-    let few = "τ / T: up to 12 periods";
-    let few = Axis::linear(few, 0.0, f64::from(LINES) + 0.5)
-        .with_ticks_at(few, &(0..=LINES).map(f64::from).collect::<Vec<_>>());
+    let mut few = Axis::linear("τ / T: up to 12 periods", 0.0, f64::from(LINES) + 0.5);
+    few.ticks = (0..=LINES).map(|n| (f64::from(n), n.to_string())).collect();
+    few.minor.clear();
 
     let (phased, others): (Vec<&(&Point, Place)>, Vec<_>) =
         slips.iter().partition(|slip| slip.0.has_phase);
-    let of_phased = phased.iter().map(|slip| slip.0.drive_velocity);
-    let of_phased: Vec<f64> = of_phased.collect();
+    let velocities = ascending(slips.iter().map(|slip| slip.0.drive_velocity));
+    let amplitudes = ascending(slips.iter().map(|slip| slip.0.amplitude));
+    let has_both = velocities.len() > 1 && amplitudes.len() > 1;
+    let (column, values, of): (_, _, fn(&Point) -> f64) = if velocities.len() > 1 {
+        ("V0", velocities, |point| point.drive_velocity)
+    } else {
+        ("Delta", amplitudes, |point| point.amplitude)
+    };
+    let colour = label(column);
+    let (to_unit, unit) = colour.scale(values.iter().copied().fold(0.0, f64::max));
+    let value = |point: &Point| to_unit * of(point);
     // The same colours whatever has a phase.
-    let velocity = label("V0");
-    let velocities = ascending(points.iter().map(|point| point.drive_velocity));
-    let digits = Digits::THREE.distinguishing(&velocities);
-    let hues = Hues::of(&velocity.short("m/s"), velocities.into_iter(), |value| {
-        velocity.setting(value, digits)
+    let digits = Digits::THREE.distinguishing(&values);
+    let hues = values.iter().map(|value| to_unit * value);
+    let hues = Hues::of(&colour.short(unit), hues, |value| {
+        colour.setting(value / to_unit, digits)
     });
-    let mut entries: Vec<Entry> = hues.entries(3.0, |value| of_phased.contains(&value));
+    let is_shown = |shown| phased.iter().any(|slip| is_same(value(slip.0), shown));
+    let mut entries: Vec<Entry> = hues.entries(3.0, is_shown);
     if hues.bar().is_some() {
         let dot = Dot::solid(hues.ink(f64::INFINITY), RADIUS);
         entries.push(entry(Mark::Dot(dot), "slips of sets with a phase"));
@@ -75,7 +88,7 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         layers.push(Layer::Dots(places.collect(), OTHER));
         layers.extend(phased.iter().map(|&&(point, place)| {
             let dot = Dot {
-                ink: hues.ink(point.drive_velocity),
+                ink: hues.ink(value(point)),
                 radius: RADIUS,
                 opacity: 0.8,
             };
@@ -86,6 +99,8 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
             ..Panel::inside(height, x.clone(), y, layers)
         }
     });
+    let note = "not told apart: sets that differ in Δ";
+    let look = &look.with_note(if has_both { note } else { "" });
     let layout = Layout::column(560.0);
     Some(panel::draw(NAME, look, layout, &entries, panels.into()))
 }
@@ -112,6 +127,7 @@ mod tests {
     #[test]
     fn every_colour_is_explained() {
         let mut points = vec![point(1, true), point(4, true), point(7, false)];
+        points[1].period = Some(0.02);
         let texts = |points: &[Point], texts: &[&str]| {
             let svg = intervals(points, &Look::default()).unwrap().svg();
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
@@ -119,13 +135,16 @@ mod tests {
         assert!(texts(
             &points,
             &[
-                "V₀ = 10⁻⁴ m/s",
+                "Δ = 1 µm",
                 "slips of sets without a phase",
                 "τ = nT",
                 "4",
                 "12"
             ]
         ));
+        let mut amplitudes = points.clone();
+        amplitudes[1].amplitude = 3e-7;
+        assert!(texts(&amplitudes, &["Δ = 0.3 µm", "Δ = 1 µm"]));
         let first = points[0];
         points.extend((1..9).map(|step| Point {
             drive_velocity: 1e-6 * f64::from(1 << step),
@@ -142,12 +161,12 @@ mod tests {
     }
 
     #[test]
-    fn without_modulation_there_is_nothing_to_draw() {
+    fn without_two_periods_there_is_nothing_to_draw() {
         let still = Point {
             period: None,
             periods: None,
             ..point(1, false)
         };
-        assert!(intervals(&[still], &Look::default()).is_none());
+        assert!(intervals(&[still, point(1, true)], &Look::default()).is_none());
     }
 }

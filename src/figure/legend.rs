@@ -1,7 +1,7 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
 use super::picture::{Anchor, Picture};
-use super::style::{Dot, Fill, Ink, LEGEND_TEXT, Stroke, WHITE, text_width};
+use super::style::{Dot, Fill, Ink, LEGEND_TEXT, Stroke, text_width};
 
 /// Width of a line or a patch, and of a dot.
 const MARK: f64 = 26.0;
@@ -16,8 +16,8 @@ const TOP: f64 = 8.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Mark {
     Dot(Dot),
-    /// A circle with a hole, by their radii.
-    Ring(Ink, f64, f64),
+    /// A disc in a disc: their inks and radii.
+    Ring(Ink, Ink, f64, f64),
     /// A dot with an error bar.
     Bar(Dot),
     Line(Stroke),
@@ -95,9 +95,9 @@ fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
             };
             sheet.discs([centre], dot);
         }
-        Mark::Ring(ink, radius, hole) => {
+        Mark::Ring(ink, middle, radius, hole) => {
             sheet.discs([centre], Dot::solid(ink, radius));
-            sheet.discs([centre], Dot::solid(WHITE, hole));
+            sheet.discs([centre], Dot::solid(middle, hole));
         }
         Mark::Bar(dot) => {
             let ends = vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)];

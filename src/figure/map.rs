@@ -8,7 +8,7 @@ use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Grid, Quantity};
-use super::style::{BLACK, Fill, Ink, Look, Stroke, WHITE, diverging, shade};
+use super::style::{BLACK, Dot, Fill, Ink, Look, Stroke, WHITE, cell_shade, diverging};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{FREQUENCY, SetRow, Values, differing, has_even_steps};
@@ -19,16 +19,21 @@ pub(super) const LOCKING: &str = "locking-map";
 pub(super) const REGIMES: &str = "regime-map";
 /// Numbers of periods that have a colour each; larger numbers share one.
 const MAX_PERIODS: f64 = 12.0;
-/// Share of the scale at the least number of periods, which is not to be taken for the ground.
-const FIRST_SHADE: f64 = 0.22;
 /// Least end of the scale of the excess, so that chance is pale.
 const MIN_EXCESS: f64 = 0.2;
 const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 /// Under the line, so that it is seen on dark cells.
 const CASING: Stroke = Stroke::solid(WHITE, 4.4);
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
+/// Marks of regimes: the ink of their middle, and their name; radii of a mark and of its middle.
+const MARKS: [(Regime, Ink, &str); 2] = [
+    (Regime::Mixed, BLACK, "mixed"),
+    (Regime::Sliding, WHITE, "sliding"),
+];
+const MARK: f64 = 2.4;
+const HOLE: f64 = 1.5;
 /// Sets without a phase.
-const FREE: Ink = Ink::new(0xf2_f2_f0);
+const FREE: Ink = Ink::new(0xe9_e9_e7);
 
 /// A column and a row of a map.
 type Position = (usize, usize);
@@ -59,16 +64,26 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let modulated = sets
         .iter()
         .find(|set| set.parameters.modulation_period.is_some());
-    let lines = || match modulated.filter(|_| is_locking) {
-        Some(set) => {
+    let lines = || {
+        if let Some(set) = modulated.filter(|_| is_locking) {
             let amplitude =
                 |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
             let places = x_axis.evenly_placed(200).into_iter();
             let places: Vec<Place> = places.map(|place| (place, amplitude(place))).collect();
             let lines = [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke));
             lines.into()
+        } else {
+            let mut lines = map.borders(|set| sets[set].regime, BORDER);
+            for (regime, ink, _) in MARKS {
+                let of_it = map.sets.iter().map(|set| set.0);
+                let of_it = of_it.filter(|&set| sets[set].regime == Some(regime));
+                let places = of_it.filter_map(|set| x.number(set).zip(y.number(set)));
+                let places: Vec<Place> = places.collect();
+                lines.push(Layer::Dots(places.clone(), Dot::solid(BLACK, MARK)));
+                lines.push(Layer::Dots(places, Dot::solid(ink, HOLE)));
+            }
+            lines
         }
-        None => map.borders(|set| sets[set].regime, BORDER),
     };
     let panel = |column: &str| {
         let quantity = of(column)?;
@@ -84,7 +99,7 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let label = quantity.axis_label();
         let scale = scale_of(column, &label, ends())?;
         let is_excess = column == "resultant_excess";
-        let colour = if is_excess { diverging } else { shade };
+        let colour = if is_excess { diverging } else { cell_shade };
         let mut bar = ColourBar::of_axis(&scale, colour);
         if is_of_periods {
             mark_periods(&mut bar, &scale, ends().unwrap_or_default());
@@ -92,8 +107,10 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let none = is_of_periods.then_some(FREE);
         let cells = map.coloured(|set| number(set).map(|n| colour(scale.place(n))).or(none));
         let layers = std::iter::once(cells).chain(lines());
+        let heading = Some(std::mem::take(&mut bar.label));
         let height = if is_locking { 280.0 } else { 220.0 };
         Some(Panel {
+            heading,
             bar: Some(bar),
             ..Panel::inside(height, x_axis.clone(), y_axis.clone(), layers)
         })
@@ -106,7 +123,7 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let panels = columns.into_iter().filter_map(panel).collect();
     let name = if is_locking { LOCKING } else { REGIMES };
     let layout = Layout::column(if is_locking { 560.0 } else { 490.0 });
-    let legend = legend(is_locking);
+    let legend = legend(is_locking, sets);
     Some(panel::draw(name, look, layout, &legend, panels))
 }
 
@@ -126,11 +143,10 @@ fn scale_of(column: &str, label: &str, ends: Option<(f64, f64)>) -> Option<Axis>
     Some(match column {
         "periods" => {
             let (first, last) = ends.unwrap_or_default();
-            let steps = (last - first).max(1.0);
             Axis::linear(
-                "n = τ / T",
-                first - steps * FIRST_SHADE / (1.0 - FIRST_SHADE),
-                first + steps,
+                "Median interval in periods, n",
+                first,
+                last.max(first + 1.0),
             )
         }
         "resultant_excess" => {
@@ -161,28 +177,33 @@ fn mark_periods(bar: &mut ColourBar, scale: &Axis, (first, last): (f64, f64)) {
             n.to_string()
         }
     };
-    bar.colours = all().map(|n| shade(scale.place(n))).collect();
+    bar.colours = all().map(|n| cell_shade(scale.place(n))).collect();
     bar.ticks = all()
         .map(|n| ((n - first + 0.5) / (last - first + 1.0), text(n)))
         .collect();
 }
 
-fn legend(is_locking: bool) -> Vec<Entry> {
-    let free = Fill {
-        ink: FREE,
-        opacity: 1.0,
-    };
+fn legend(is_locking: bool, sets: &[SetRow]) -> Vec<Entry> {
     if is_locking {
-        vec![
+        let free = Fill {
+            ink: FREE,
+            opacity: 1.0,
+        };
+        return vec![
             entry(Mark::Line(LINE), "η = 1; above, the drive turns back"),
             entry(Mark::Patch(free), "no phase"),
-        ]
-    } else {
-        let [mixed, sliding] = Regime::MIN_SHARES;
-        let text =
-            format!("stick-slip, mixed (share of {mixed} or more), sliding ({sliding} or more)");
-        vec![entry(Mark::Line(BORDER), text)]
+        ];
     }
+    let mut entries = Vec::new();
+    for ((regime, ink, name), share) in MARKS.into_iter().zip(Regime::MIN_SHARES) {
+        if sets.iter().any(|set| set.regime == Some(regime)) {
+            let mark = Mark::Ring(BLACK, ink, MARK, HOLE);
+            entries.push(entry(mark, format!("{name}, share of {share} or more")));
+        }
+    }
+    let borders = "between regimes; unmarked: stick-slip";
+    entries.push(entry(Mark::Line(BORDER), borders));
+    entries
 }
 
 struct Map {
@@ -399,6 +420,19 @@ mod tests {
                 .matches("stroke-width=\"1.6\"")
                 .count()
         };
+        let svg = map(
+            &grid(|row, _| if row < 2 { 0.05 } else { 1.0 }),
+            &Look::default(),
+        );
+        let svg = svg.unwrap().svg();
+        for text in [
+            "Share of time within slips",
+            "Mean interval ⟨τ⟩ (s)",
+            "sliding, share of 0.95 or more",
+        ] {
+            assert!(svg.contains(&format!(">{text}<")), "{text}");
+        }
+        assert!(!svg.contains("mixed, "), "no set is mixed");
         let without = drawn(&grid(|_, _| 0.05));
         assert_eq!(
             drawn(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })),

@@ -89,7 +89,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     let sets = sets_with_results(layout).map_err(advise(ADVICE))?;
     let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, &sets, look));
+    pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, look));
     pictures.extend(intervals::intervals(&points, look));
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.

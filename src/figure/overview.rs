@@ -95,7 +95,7 @@ mod tests {
             .flat_map(|&dfs| [spread(dfs, 0.0), spread(dfs, 1e-6)])
             .collect();
         let svg = overview_of(&sets);
-        for text in ["(c) Mean friction ⟨Fₛ⟩ (N)", "Δ = 0", "Δ = 1 µm", "0.137"] {
+        for text in ["(c) Mean friction ⟨Fₛ⟩ (N)", "Δ = 0", "Δ = 1 µm", "0.05"] {
             assert!(svg.contains(&format!(">{text}<")), "{text}");
         }
         assert!(

@@ -1,18 +1,19 @@
-//! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and averages over sets that have a phase.
+//! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and the mean of each column.
 
 use super::axis::{Axis, angle_bounds, bounds};
 use super::frame::{Cell, Ends, Layout, OVERLAP, Place};
 use super::hues::ColourBar;
-use super::legend::{Mark, entry};
+use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::Grid;
-use super::style::{BAR_WIDTH, BLUE, Dot, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, dot, shade};
+use super::style::{
+    BAR_WIDTH, BLUE, Dot, Ink, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade, dot,
+};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::reduce::{BackboneBin, Point, SetRow};
+use crate::reduce::{BackboneBin, Point};
 use crate::sets::label;
 use std::collections::BTreeMap;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 pub(super) const NAME: &str = "phi-eta";
 
@@ -24,39 +25,54 @@ const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
 const ASYMPTOTE: Stroke = Stroke::solid(RED, 2.4);
 const EXACT: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
 const CURVE_POINTS: usize = 400;
-/// Most values of η that have a column each; more are put into columns, this many a decade.
-const MAX_COLUMNS: usize = 60;
-const COLUMNS_PER_DECADE: f64 = 10.0;
-/// Largest ratio of a column's edge to its η. A wider column would show phases of one η far from the curves at that η.
+/// Columns a decade: those of the bins of the averages, or under a ramp, where there are none.
+const PER_DECADE: [f64; 2] = [4.0, 20.0];
+/// Largest ratio of a column's edge to the η of its slips. A wider column would show phases far from the curves there.
 const WIDEST: f64 = 1.5;
 /// Rows of the density in half a turn.
 const ROWS: f64 = 36.0;
-/// Least density shown, in 1/rad: a quarter of that of phases spread over the whole turn.
-const FAINTEST: f64 = 0.25 / (2.0 * PI);
+
+/// Slips at neighbouring η.
+struct Column {
+    /// Least and largest η of its slips.
+    values: Ends,
+    /// Halfway to the neighbours' slips.
+    edges: Ends,
+    /// φ_min at the least η, in rad; `None` if it is < 1, or a slip lies below φ_min.
+    least: Option<f64>,
+    slips: Vec<Place>,
+}
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
-pub(super) fn phase_eta(
-    points: &[Point],
-    bins: &[BackboneBin],
-    sets: &[SetRow],
-    look: &Look,
-) -> Option<Picture> {
+pub(super) fn phase_eta(points: &[Point], bins: &[BackboneBin], look: &Look) -> Option<Picture> {
     let slips: Vec<Place> = points
         .iter()
         .filter_map(|point| Some((point.eta, point.phase?)).filter(|_| point.eta > 0.0))
         .collect();
-    let (shades, cells) = density(&slips);
-    let (low, high) = bounds(cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?;
-    let averages = averages(bins, sets);
-    let of_bins = "mean of all sets with a phase in a bin of η, 95 %";
+    let columns = columns(&slips, PER_DECADE[usize::from(bins.is_empty())]);
+    let cells: Vec<(Cell, f64)> = columns.iter().flat_map(cells).collect();
+    let (least, most) = bounds(cells.iter().map(|cell| cell.1))?;
+    let shades = Axis::logarithmic("density (1/rad)", least, most.max(10.0 * least));
+    let averages = averages(bins, &columns);
+    let x = Axis::logarithmic(
+        &label("eta").axis(""),
+        columns.first()?.edges.0,
+        columns.last()?.edges.1,
+    );
+    let has_curves = x.high > 1.0;
     let entries = [
-        entry(Mark::Bar(AVERAGE), of_bins),
-        entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
-        entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
-        entry(Mark::Line(REFERENCE), "η = 1"),
+        (
+            !averages.is_empty(),
+            Mark::Bar(AVERAGE),
+            "mean of all slips of a column, 95 %",
+        ),
+        (has_curves, Mark::Line(ASYMPTOTE), "−2√(π/η)"),
+        (has_curves, Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
+        (x.contains(1.0), Mark::Line(REFERENCE), "η = 1"),
     ];
-    let x = Axis::logarithmic(&label("eta").axis(""), low, high).with_enough_numbers();
+    let shown = entries.into_iter().filter(|(is_shown, ..)| *is_shown);
+    let entries: Vec<Entry> = shown.map(|(_, mark, text)| entry(mark, text)).collect();
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
     let curve = |phase: fn(f64) -> Option<f64>| {
         let etas = x.evenly_placed(CURVE_POINTS).into_iter();
@@ -67,12 +83,13 @@ pub(super) fn phase_eta(
     };
     let coloured = cells
         .iter()
-        .map(|&(cell, density)| (cell, shade(shades.place(density))));
-    let mut layers = vec![Layer::Cells(coloured.collect(), OVERLAP)];
+        .map(|&(cell, density)| (cell, cell_shade(shades.place(density))));
+    let mut layers = vec![
+        Layer::Cells(coloured.collect(), OVERLAP),
+        Layer::Cells(below_curve(&x, low, &columns), 0.0),
+    ];
     let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
-    let bars = averages
-        .iter()
-        .filter_map(|&(eta, _, ends)| Some((eta, ends?)));
+    let bars = averages.iter().map(|&(eta, _, ends)| (eta, ends));
     layers.extend([
         Layer::Upright(1.0, REFERENCE),
         Layer::Curve(curve(|eta| Some(minimum_phase_asymptote(eta))), ASYMPTOTE),
@@ -81,7 +98,7 @@ pub(super) fn phase_eta(
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
-    let bar = Some(ColourBar::of_axis(&shades, shade));
+    let bar = Some(ColourBar::of_axis(&shades, cell_shade));
     let panel = Panel {
         bar,
         ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers)
@@ -90,150 +107,149 @@ pub(super) fn phase_eta(
     Some(panel::draw(NAME, look, layout, &entries, vec![panel]))
 }
 
-/// Mean η of the sets of each bin that have a phase, the mean of these phases in rad, and the ends of its interval.
-fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<(f64, f64, Option<Ends>)> {
+/// The middle of the η of each column's slips, their mean phase in rad, and its interval, unless that is the whole turn.
+fn averages(bins: &[BackboneBin], columns: &[Column]) -> Vec<(f64, f64, Ends)> {
     let average = |bin: &BackboneBin| {
-        let within = |eta: &f64| (bin.eta_low..bin.eta_high).contains(eta);
-        let phased = sets
-            .iter()
-            .filter(|set| set.has_phase)
-            .map(|set| set.parameters.eta())
-            .filter(within);
-        let (count, sum) = phased.fold((0.0, 0.0), |(count, sum), eta| {
-            (count + 1.0, sum + libm::log(eta))
-        });
-        let eta = if count > 0.0 {
-            libm::exp(sum / count)
-        } else {
-            bin.eta_centre
-        };
-        Some((
-            eta,
-            bin.set_phase_mean?,
-            bin.set_phase_mean_low.zip(bin.set_phase_mean_high),
-        ))
+        let is_of_bin = |column: &&Column| (bin.eta_low..bin.eta_high).contains(&column.values.0);
+        let (low, high) = columns.iter().find(is_of_bin)?.values;
+        let ends = bin.phase_mean_low.zip(bin.phase_mean_high);
+        let known = ends.filter(|(low, high)| high - low < 0.999 * TAU);
+        Some(((low * high).sqrt(), bin.phase_mean?, known?))
     };
     bins.iter().filter_map(average).collect()
 }
 
-/// How slips at each η are spread over the phase: the scale of densities in 1/rad, and cells with theirs.
-fn density(slips: &[Place]) -> (Axis, Vec<(Cell, f64)>) {
-    let columns = columns(slips.iter().map(|slip| slip.0));
+/// Cells of a column, from φ_min at its least η on, and their densities in 1/rad.
+fn cells(column: &Column) -> Vec<(Cell, f64)> {
     let height = PI / ROWS;
-    let mut counts: Vec<BTreeMap<i64, u32>> = vec![BTreeMap::new(); columns.len()];
-    for &(eta, phase) in slips {
-        let column = columns
-            .partition_point(|column| column.1 <= eta)
-            .min(columns.len() - 1);
+    let base = column.least.unwrap_or(0.0);
+    let mut counts: BTreeMap<i64, u32> = BTreeMap::new();
+    for (_, phase) in &column.slips {
         #[expect(clippy::cast_possible_truncation, reason = "a few rows")]
-        let row = (phase / height).floor() as i64;
-        *counts[column].entry(row).or_default() += 1;
+        let row = ((phase - base) / height).floor() as i64;
+        *counts.entry(row).or_default() += 1;
     }
-    let cells: Vec<(Cell, f64)> = columns
-        .iter()
-        .zip(&counts)
-        .flat_map(|(&column, counts)| {
-            let slips = f64::from(counts.values().sum::<u32>());
-            counts.iter().map(move |(&row, &count)| {
-                let ends = (row as f64 * height, (row + 1) as f64 * height);
-                ((column, ends), f64::from(count) / (slips * height))
-            })
-        })
-        .collect();
-    let most = cells
-        .iter()
-        .map(|cell| cell.1)
-        .fold(10.0 * FAINTEST, f64::max);
-    (Axis::logarithmic("density (1/rad)", FAINTEST, most), cells)
+    let of_one = 1.0 / (column.slips.len() as f64 * height);
+    let edge = |row: i64| base + row as f64 * height;
+    let cell = |(row, count)| {
+        (
+            (column.edges, (edge(row), edge(row + 1))),
+            f64::from(count) * of_one,
+        )
+    };
+    counts.into_iter().map(cell).collect()
 }
 
-/// Ends of the columns along η: one for each value if these are few, else evenly spaced.
-fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
-    /// Values that differ by rounding alone are one.
-    const SAME: f64 = 1.0 + 1e-9;
-    let mut values: Vec<f64> = etas.filter(|eta| *eta > 0.0).collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup_by(|next, value| *next <= *value * SAME);
-    if values.len() <= MAX_COLUMNS {
-        let cells = Grid::logarithmic_cells(values.clone())
-            .into_iter()
-            .zip(values);
-        let clipped = |((low, high), eta): ((f64, f64), f64)| {
-            let low = low.max(eta / WIDEST);
-            let high = high.min(eta * WIDEST);
-            // None reaches over η = 1, where the load begins to fall in each period.
-            let least = if eta > SAME { 1.0 } else { 0.0 };
-            let most = if eta * SAME < 1.0 { 1.0 } else { f64::INFINITY };
-            (low.max(least), high.min(most))
+/// Paper from the lower end of an axis to φ_min, over the parts of cells where no slip can lie at this η, and none lies.
+fn below_curve(x: &Axis, low: f64, columns: &[Column]) -> Vec<(Cell, Ink)> {
+    let etas = x.evenly_placed(CURVE_POINTS);
+    let part = |pair: &[f64]| {
+        let (start, end) = (pair[0], pair[1]);
+        let holds_slips = |column: &Column| {
+            column.least.is_none() && start < column.edges.1 && end > column.edges.0
         };
-        return cells.map(clipped).collect();
+        let least = minimum_phase(end).filter(|_| !columns.iter().any(holds_slips));
+        Some((((start, end), (low, least?)), WHITE))
+    };
+    etas.windows(2).filter_map(part).collect()
+}
+
+/// Slips in columns along η.
+fn columns(slips: &[Place], per_decade: f64) -> Vec<Column> {
+    let mut bins: BTreeMap<i32, Vec<Place>> = BTreeMap::new();
+    for &slip in slips {
+        #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
+        let bin = (libm::log10(slip.0) * per_decade).floor() as i32;
+        bins.entry(bin).or_default().push(slip);
     }
-    #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
-    let column = |eta: f64| (libm::log10(eta) * COLUMNS_PER_DECADE).floor() as i32;
-    let first = column(values[0]);
-    let last = column(values[values.len() - 1]);
-    let edge = |column: i32| libm::exp10(f64::from(column) / COLUMNS_PER_DECADE);
-    (first..=last)
-        .map(|column| (edge(column), edge(column + 1)))
-        .collect()
+    let values = |slips: &Vec<Place>| bounds(slips.iter().map(|slip| slip.0));
+    let values: Vec<Ends> = bins.values().filter_map(values).collect();
+    let column = |(index, slips): (usize, Vec<Place>)| {
+        let (low, high) = values[index];
+        let before = (index > 0).then(|| (low / values[index - 1].1).sqrt());
+        let after = values.get(index + 1).map(|next| (next.0 / high).sqrt());
+        let nearest = before.into_iter().chain(after).fold(WIDEST, f64::min);
+        // None reaches over η = 1, where the load begins to fall in each period.
+        let side: fn(f64, f64) -> f64 = if low < 1.0 { f64::min } else { f64::max };
+        let is_above =
+            |&(eta, phase): &Place| minimum_phase(eta).is_some_and(|least| phase >= least);
+        Column {
+            values: (low, high),
+            edges: (side(low / nearest, 1.0), side(high * nearest, 1.0)),
+            least: minimum_phase(low).filter(|_| slips.iter().all(is_above)),
+            slips,
+        }
+    };
+    bins.into_values().enumerate().map(column).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::quantity::tests::set;
     use super::*;
 
     #[test]
-    fn columns_hold_every_slip_and_are_those_of_a_grid_where_there_is_one() {
-        let grid = columns([1.0, 2.0, 4.0, 2.0, 4.0 * (1.0 + 1e-13)].into_iter());
-        assert_eq!(grid.len(), 3);
+    fn columns_are_bins_of_eta_around_their_slips() {
+        let at =
+            |etas: &[f64]| columns(&etas.iter().map(|&eta| (eta, 0.0)).collect::<Vec<_>>(), 4.0);
+        let grid = at(&[2.0, 4.0, 8.0, 4.0 * (1.0 + 1e-13)]);
+        let middles: Vec<f64> = grid
+            .iter()
+            .map(|column| (column.edges.0 * column.edges.1).sqrt())
+            .collect();
+        assert_eq!(grid[1].slips.len(), 2);
         assert!(
-            (grid[1].0 - 2.0_f64.sqrt()).abs() < 1e-12
-                && (grid[1].1 - 8.0_f64.sqrt()).abs() < 1e-12
+            middles
+                .iter()
+                .zip([2.0, 4.0, 8.0])
+                .all(|(middle, eta)| (middle - eta).abs() < 1e-9),
+            "{middles:?}"
         );
-        let etas: Vec<f64> = (0..1000).map(|step| 0.2 * 1.008_f64.powi(step)).collect();
-        let sample = columns(etas.iter().copied());
-        assert!(
-            sample.len() < 50 && sample[0].0 <= etas[0] && sample[sample.len() - 1].1 > etas[999]
-        );
-        assert!(sample.windows(2).all(|pair| pair[0].1 == pair[1].0));
-        let [low, high] = [[0.5, 1.09], [0.9, 2.0]].map(|etas| columns(etas.into_iter()));
-        assert_eq!(
-            (low[1].0, high[0].1),
-            (1.0, 1.0),
-            "no column reaches over η = 1"
-        );
+        let pair = at(&[0.9, 0.95, 1.0, 1.2]);
+        assert_eq!((pair.len(), pair[1].edges.0), (2, 1.0));
     }
 
     #[test]
-    fn the_density_of_a_column_integrates_to_one() {
-        let point = |step: u32| {
-            (
-                if step.is_multiple_of(3) { 2.0 } else { 8.0 },
-                1e-3 * f64::from(step % 700) - 0.5,
-            )
-        };
-        let (_, cells) = density(&(0..3000).map(point).collect::<Vec<_>>());
-        for eta in [2.0, 8.0] {
-            let column = cells.iter().filter(|((x, _), _)| (x.0..x.1).contains(&eta));
-            let integral: f64 = column.map(|((_, y), density)| density * (y.1 - y.0)).sum();
-            assert!((integral - 1.0).abs() < 1e-12, "{integral}");
+    fn the_density_of_a_column_integrates_to_one_and_nothing_is_seen_below_the_least_phase() {
+        for (eta, lowest) in [(0.5, -3.0), (1.0, -4.6), (2.0, -2.2), (30.0, -0.6)] {
+            let slips = (0..3000).map(|step| (eta, lowest * 1e-3 * f64::from(step % 1000)));
+            let columns = columns(&slips.collect::<Vec<_>>(), 4.0);
+            let cells = cells(&columns[0]);
+            let mass = cells.iter().map(|((_, y), density)| (y.1 - y.0) * density);
+            assert!((mass.sum::<f64>() - 1.0).abs() < 1e-9, "{eta}");
+            let lowest = cells[0].0.1.0;
+            assert!(
+                minimum_phase(eta).is_none_or(|least| lowest >= least),
+                "{eta}"
+            );
+            let x = Axis::logarithmic("", columns[0].edges.0, columns[0].edges.1);
+            let parts = below_curve(&x, -5.0, &columns);
+            assert_eq!(parts.len(), if eta < 1.0 { 0 } else { CURVE_POINTS - 1 });
+            assert!(
+                parts
+                    .iter()
+                    .all(|((x, y), _)| Some(y.1) == minimum_phase(x.1))
+            );
         }
+        let columns = columns(&[(30.0, -3.0), (30.0, -0.5)], 4.0);
+        let x = Axis::logarithmic("", 20.0, 40.0);
+        assert!(
+            below_curve(&x, -5.0, &columns).is_empty(),
+            "a slip is shown wherever it lies"
+        );
     }
 
     #[test]
-    fn means_lie_at_the_eta_of_the_sets_that_they_are_of() {
-        let sets = [set(1e-6, 0.02, 4.0), set(1e-6, 0.021, 4.0)];
-        let etas = [0, 1].map(|index| sets[index].parameters.eta());
-        let bin = BackboneBin {
-            eta_low: 2.0,
-            eta_high: 5.0,
-            eta_centre: 3.5,
-            set_phase_mean: Some(-1.0),
+    fn the_mean_of_all_slips_of_a_column_lies_in_its_middle_unless_it_has_no_direction() {
+        let columns = columns(&[(2.0, -1.0), (3.0, -1.1), (20.0, 0.0)], 4.0);
+        let bin = |eta_low, half| BackboneBin {
+            eta_low,
+            eta_high: 2.0 * eta_low,
+            phase_mean: Some(-1.0),
+            phase_mean_low: Some(-1.0 - half),
+            phase_mean_high: Some(-1.0 + half),
             ..BackboneBin::default()
         };
-        let found = averages(&[bin], &sets);
-        assert!((found[0].0 - (etas[0] * etas[1]).sqrt()).abs() < 1e-9);
-        assert_eq!(averages(&[bin], &[])[0].0, 3.5);
+        let found = averages(&[bin(1.8, 0.1), bin(18.0, PI)], &columns);
+        assert_eq!(found, [(6.0_f64.sqrt(), -1.0, (-1.1, -0.9))]);
     }
 }

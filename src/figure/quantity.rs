@@ -6,12 +6,10 @@ use super::frame::Ends;
 use super::hues::Hues;
 use super::style::INKS;
 use crate::model::Symbol;
-use crate::reduce::{FREQUENCY, Values, has_even_steps, is_spread};
+use crate::reduce::{FREQUENCY, Values, ascending, has_even_steps, is_spread, quantile};
 use crate::sets::{Label, label};
 use crate::table::columns::Row;
 
-/// Values of a parameter up to which each has its tick.
-pub(super) const MAX_TICKS: usize = 6;
 const MAX_WORDS: usize = 12;
 /// Values of a statistic from which on one alone says nothing of its scale.
 const FEW_VALUES: usize = 8;
@@ -44,14 +42,27 @@ pub(super) fn parameter(column: &str) -> Option<Symbol> {
     }
 }
 
+/// Whether a column holds mean phases: only sets with a phase have a place.
+pub(super) fn shows_phase(column: &str) -> bool {
+    column.contains("phase_mean")
+}
+
 impl Quantity<'_> {
     pub(super) fn of<R: Row>(
         rows: &[R],
         option: &'static str,
         name: &str,
     ) -> Result<Self, BadOption> {
-        let column =
+        let mut column =
             Values::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
+        let phased = Values::of(rows, "has_phase");
+        if let Some(phased) = phased.ok().filter(|_| shows_phase(column.name())) {
+            let has_phase = |word: f64| phased.word(word) == Some("yes");
+            for (number, word) in column.numbers.iter_mut().zip(&phased.numbers) {
+                *number = number.filter(|_| word.is_some_and(has_phase));
+            }
+            column.distinct = ascending(column.numbers.iter().copied().flatten());
+        }
         let drive = match column.name() {
             "resultant_length" => Values::of(rows, "resultant_drive").ok(),
             "locking_index" => Values::of(rows, "locking_index_drive").ok(),
@@ -164,14 +175,7 @@ impl Quantity<'_> {
         }
         let (low, high) = self.ends(sets)?;
         let axis = |label: &str| Axis::of_scale(self.is_log, label, low, high);
-        let has_few = (2..=MAX_TICKS).contains(&self.column.distinct.len());
-        if self.symbol.is_some() && self.limits == (None, None) && has_few {
-            let values: Vec<f64> = self.distinct().collect();
-            let mut axis = axis(&label).with_ticks_at(&label, &values);
-            axis.short_label = short_label;
-            return Ok(axis);
-        }
-        let mut shown = axis(&label).with_enough_numbers();
+        let mut shown = axis(&label);
         shown.short_label = short_label.map(|label| axis(&label).label);
         Ok(shown)
     }
@@ -203,8 +207,20 @@ impl Quantity<'_> {
         if self.is_log && !(is_positive(lower) && is_positive(upper)) {
             return Err(self.refuse_limits("must be > 0 on a logarithmic axis"));
         }
+        let scale: fn(f64) -> f64 = if self.is_log {
+            libm::log
+        } else {
+            |value| value
+        };
+        let length = |(low, high): Ends| scale(high) - scale(low);
+        let bars = sets.iter().filter_map(|&set| self.interval(set));
+        let mut lengths: Vec<f64> = bars.map(length).collect();
+        lengths.sort_by(f64::total_cmp);
+        // Bars that are far longer than others run out of the frame.
+        let longest = 1.5 * quantile(&lengths, 0.5).unwrap_or(0.0);
         let shown = |&set: &usize| {
-            let bar = self.interval(set).map(|(low, high)| [low, high]);
+            let bar = self.interval(set).filter(|&bar| length(bar) <= longest);
+            let bar = bar.map(|(low, high)| [low, high]);
             let drive = self.drive.as_ref().and_then(|drive| drive.numbers[set]);
             self.number(set)
                 .into_iter()
@@ -255,12 +271,14 @@ fn lies_decades_apart(column: &Values) -> bool {
         return false;
     };
     let values = &column.distinct;
+    // Shares are seen near 0, where their intervals reach it.
     let intervals = column.intervals.iter().flatten();
-    let low = intervals.map(|(low, _)| *low).fold(least, f64::min);
+    let intervals = intervals.filter(|_| column.column.unit.is_empty());
+    let least = intervals.map(|(low, _)| *low).fold(least, f64::min);
     // A single set, such as the only one that slides, changes no scale.
     let alone = usize::from(values.len() >= FEW_VALUES);
     let ends = (values[alone], values[values.len() - 1 - alone]);
-    !column.is_worded() && low > 0.0 && is_wide(ends)
+    !column.is_worded() && least > 0.0 && is_wide(ends)
 }
 
 /// Each name once, in the order of first appearance.
@@ -302,17 +320,6 @@ impl Grid {
     pub(super) fn of(values: Vec<f64>) -> Self {
         let is_linear = has_even_steps(&values) || !is_spread(&values);
         Self { values, is_linear }
-    }
-
-    /// The cells around `values` > 0 that ascend, spaced logarithmically.
-    pub(super) fn logarithmic_cells(values: Vec<f64>) -> Vec<(f64, f64)> {
-        let grid = Self {
-            values,
-            is_linear: false,
-        };
-        (0..grid.values.len())
-            .map(|index| grid.cell(index))
-            .collect()
     }
 
     /// An axis for cells: it ends half a step beyond the values.
@@ -421,6 +428,42 @@ pub(super) mod tests {
             slip_share: Some(0.05),
             ..SetRow::default()
         }
+    }
+
+    #[test]
+    fn a_set_without_a_phase_has_no_place_on_an_axis_of_mean_phases() {
+        let mut rows = [set(1e-6, 0.02, 4.0), set(1e-6, 0.03, 4.0)];
+        rows[1].has_phase = false;
+        for row in &mut rows {
+            row.phase_mean = Some(-1.0);
+        }
+        let phases = Quantity::of(&rows, "y", "phase_mean").unwrap();
+        assert!(phases.has(0) && !phases.has(1));
+    }
+
+    #[test]
+    fn the_longest_bar_sets_no_axis_and_ticks_are_round() {
+        let mut rows = [1.0, 2.0, 3.0, 4.0, 5.0].map(|step| set(2.34e-7 * step, 0.02, 4.0));
+        rows[2].mean_friction_interval = Some(Interval {
+            low: 0.0,
+            high: 600.0,
+        });
+        let axis = |name| {
+            Quantity::of(&rows, "y", name)
+                .unwrap()
+                .axis(&[0, 1, 2, 3, 4])
+                .unwrap()
+        };
+        let friction = axis("mean_friction");
+        assert!(
+            friction.low > 200.0 && friction.high < 350.0,
+            "{friction:?}"
+        );
+        let ticks = axis("Delta").ticks;
+        assert!(
+            ticks.len() > 2 && ticks.iter().all(|(_, number)| number.len() < 4),
+            "{ticks:?}"
+        );
     }
 
     #[test]

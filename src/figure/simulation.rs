@@ -8,7 +8,7 @@ use super::hues::ColourBar;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::style::{BLACK, BLUE, GRID, Ink, Look, RED, REFERENCE, Stroke, shade};
+use super::style::{BLACK, BLUE, GRID, INKS, Ink, Look, RED, REFERENCE, Stroke, shade};
 use crate::model::Parameters;
 use crate::observe::MapRow;
 use crate::sets::label;
@@ -23,7 +23,11 @@ const MICROMETRES: f64 = 1e6;
 const MILLIMETRES: f64 = 1e3;
 const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
 const MODULATION: Stroke = Stroke::solid(BLUE, 1.6);
-const ONSET: Stroke = Stroke::solid(RED, 1.6);
+/// Onsets of slips of start-up, and of those that are recorded.
+const ONSETS: [(Stroke, &str); 2] = [
+    (Stroke::solid(INKS[4], 1.6), "onset of a slip of start-up"),
+    (Stroke::solid(RED, 1.6), "onset of a slip"),
+];
 /// Colours that an eye can distinguish.
 const LEVELS: f64 = 100.0;
 /// Periods whose peaks are marked, and that are drawn at all; more would be a grey area.
@@ -43,16 +47,18 @@ struct Shared<'a> {
     last: f64,
     /// Peaks of the modulation, on the time axis.
     peaks: Vec<f64>,
+    /// Onsets of slips, on the time axis.
+    onsets: Vec<(f64, Stroke)>,
     width: f64,
 }
 
 /// Draws what is given: the shear force in N against time in s, the map, instant by instant, or the map under the
-/// force; above them the modulation. Onsets of slips are marked in the map.
+/// force; above them the modulation. Onsets of slips, of start-up and recorded, are marked in all panels.
 pub fn simulation(
     parameters: &Parameters,
     trace: Option<&[(f64, f64)]>,
     map: Option<&[MapRow]>,
-    onsets: &[f64],
+    onsets: [&[f64]; 2],
 ) -> Result<Picture> {
     let of_all = common(std::iter::once(parameters));
     let look = &Look::default().with_note(&format!("{of_all}, seed {}", parameters.seed));
@@ -73,6 +79,14 @@ pub fn simulation(
         |period: &f64| parameters.ramp_time == 0.0 && (last - first) / period <= MAX_PERIODS;
     let period = parameters.modulation_period.filter(is_drawn);
     let peaks = period.map(|period| time.multiples_of(factor * period, MAX_PEAKS));
+    let mut legend = Vec::new();
+    let mut marks = Vec::new();
+    for (onsets, (stroke, name)) in onsets.into_iter().zip(ONSETS) {
+        let shown = onsets.iter().filter(|onset| (first..=last).contains(onset));
+        let shown: Vec<(f64, Stroke)> = shown.map(|onset| (factor * onset, stroke)).collect();
+        legend.extend((!shown.is_empty()).then(|| entry(Mark::Line(stroke), name)));
+        marks.extend(shown);
+    }
     let shared = Shared {
         parameters,
         time,
@@ -80,27 +94,22 @@ pub fn simulation(
         first,
         last,
         peaks: peaks.unwrap_or_default(),
+        onsets: marks,
         width: WIDTHS[usize::from(map.is_some())],
     };
-    let mut onsets = onsets.to_vec();
-    onsets.retain(|onset| (first..=last).contains(onset));
-    let mut legend = Vec::new();
-    if map.is_some() && !onsets.is_empty() {
-        legend.push(entry(Mark::Line(ONSET), "onset of a slip"));
-    }
     if !shared.peaks.is_empty() {
         legend.push(entry(Mark::Line(REFERENCE), "peaks of the modulation"));
     }
     let modulation = period.map(|period| shared.modulation(period));
     let force = trace.map(|trace| shared.force(trace));
-    let contacts = map.map(|map| shared.contacts(map, &onsets));
+    let contacts = map.map(|map| shared.contacts(map));
     let panels = [modulation, force, contacts].into_iter().flatten();
     let layout = Layout::column(shared.width);
     Ok(panel::draw(NAME, look, layout, &legend, panels.collect()))
 }
 
 impl Shared<'_> {
-    /// A panel with these layers around the peaks of the modulation.
+    /// A panel with these layers around the peaks of the modulation and the onsets.
     fn panel<'l>(
         &self,
         height: f64,
@@ -110,7 +119,13 @@ impl Shared<'_> {
     ) -> Panel<'l> {
         let peaks = self.peaks.iter();
         let peaks = peaks.map(|&peak| Layer::Upright(peak, REFERENCE));
-        let layers = under.into_iter().chain(peaks).chain(over);
+        // Many lines would cover the slips.
+        let are_marks = self.onsets.len() > MAX_LINES;
+        let length = if are_marks { 0.07 } else { 1.0 } * (y.high - y.low);
+        let ends = [y.high, y.high - length];
+        let onset = |&(at, stroke)| Layer::Curve(ends.map(|end| (at, end)).into(), stroke);
+        let onsets = self.onsets.iter().map(onset);
+        let layers = under.into_iter().chain(peaks).chain(onsets).chain(over);
         Panel::inside(height, self.time.clone(), y, layers)
     }
 
@@ -137,7 +152,7 @@ impl Shared<'_> {
         self.panel(230.0, y, None, [force])
     }
 
-    fn contacts(&self, map: &[MapRow], onsets: &[f64]) -> Panel<'static> {
+    fn contacts(&self, map: &[MapRow]) -> Panel<'static> {
         let Self { factor, first, .. } = *self;
         let length = self.parameters.slider_length * MILLIMETRES;
         let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, length);
@@ -145,15 +160,10 @@ impl Shared<'_> {
         let cells = cells
             .map(|(((left, right), y), colour)| (((factor * left, factor * right), y), colour));
         let cells = Layer::Cells(cells.collect(), OVERLAP);
-        // Many lines would cover the slips.
-        let are_marks = onsets.len() > MAX_LINES;
-        let bottom = if are_marks { 0.93 * length } else { 0.0 };
-        let onsets = onsets.iter().map(|onset| factor * onset);
-        let onsets = onsets.map(|at| Layer::Curve(vec![(at, length), (at, bottom)], ONSET));
         let percent = Axis::linear("detached (%)", 0.0, 100.0);
         Panel {
             bar: Some(ColourBar::of_axis(&percent, shade)),
-            ..self.panel(260.0, y, Some(cells), onsets)
+            ..self.panel(260.0, y, Some(cells), [])
         }
     }
 }
@@ -251,7 +261,11 @@ mod tests {
             modulation_period: period,
             ..Parameters::default()
         };
-        Some(simulation(&parameters, trace, map, &[0.5, 2.0]).ok()?.svg())
+        Some(
+            simulation(&parameters, trace, map, [&[0.25], &[0.5, 2.0]])
+                .ok()?
+                .svg(),
+        )
     }
 
     #[test]
@@ -300,12 +314,12 @@ mod tests {
         );
         let still = drawn(None, Some(&map()), None).unwrap();
         assert!(!still.contains("Modulation") && still.contains("onset of a slip"));
-        assert!(
-            !drawn(Some(FORCE), None, None)
-                .unwrap()
-                .contains("onset of a slip"),
-            "onsets go with the map"
-        );
+        let both = drawn(Some(FORCE), Some(&map()), None).unwrap();
+        for (Stroke { ink, .. }, name) in ONSETS {
+            assert!(both.contains(&format!(">{name}<")));
+            let count = both.matches(&ink.to_string()).count();
+            assert_eq!(count, 3, "{name}: in the legend and both panels");
+        }
         assert!(
             !drawn(None, Some(&map()), Some(1e-3))
                 .unwrap()

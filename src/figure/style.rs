@@ -226,9 +226,17 @@ pub const INKS: [Ink; 6] = [
     Ink::new(0x56_b4_e9),
 ];
 
-/// For dots on a scale: the darker of the shades, which are seen on white.
+/// For dots on a scale: ten steps that differ in hue and lightness, dark for large values.
 pub static SCALE: LazyLock<[Ink; 10]> =
-    LazyLock::new(|| std::array::from_fn(|step| shade(0.3 + 0.7 * step as f64 / 9.0)));
+    LazyLock::new(|| std::array::from_fn(|step| ink(mixed(&HUES, step as f64 / 9.0))));
+
+/// Of viridis (matplotlib), from its end, without the yellow that is not seen on white.
+const HUES: [[f64; 3]; 4] = [
+    [160.0, 218.0, 57.0],
+    [31.0, 161.0, 135.0],
+    [54.0, 92.0, 141.0],
+    [68.0, 1.0, 84.0],
+];
 
 /// Border and ticks of a frame.
 pub(super) const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
@@ -276,6 +284,11 @@ const DIVERGING: [[f64; 3]; 3] = [
 /// A share from 0 to 1 as a colour on a light ground, pale at 0.
 pub(super) fn shade(share: f64) -> Ink {
     ink(mixed(&SHADES, share))
+}
+
+/// A share from 0 to 1 as the colour of a cell, which differs from the paper also at 0.
+pub(super) fn cell_shade(share: f64) -> Ink {
+    shade(0.18 + 0.82 * share)
 }
 
 /// A share from 0 to 1 as a colour, pale at 1/2.
@@ -327,6 +340,11 @@ mod tests {
             "{steps:?}"
         );
         assert!(lightness(mixed(&SHADES, 0.0)) > 0.95);
+        let Ink(faintest) = cell_shade(0.0);
+        assert!(
+            lightness(faintest.map(f64::from)) < 0.9,
+            "a cell is no paper"
+        );
     }
 
     #[test]

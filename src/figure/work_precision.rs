@@ -48,7 +48,7 @@ impl<'a> Line<'a> {
 
     fn entry(&self) -> Entry {
         let mark = if self.hole > 0.0 {
-            Mark::Ring(self.ink, self.radius, self.hole)
+            Mark::Ring(self.ink, WHITE, self.radius, self.hole)
         } else {
             Mark::Dot(Dot::solid(self.ink, self.radius))
         };

@@ -313,6 +313,7 @@ fn a_plot_shows_the_panels_and_the_time_that_were_asked_for_in_every_file() {
     assert!(
         map.contains("Position x") && map.contains("detached (%)") && !map.contains("Shear force")
     );
+    assert!(map.contains(">onset of a slip<") && map.contains(">onset of a slip of start-up<"));
 }
 
 #[test]

@@ -411,6 +411,10 @@ def test_figures_show_the_data(results, opened):
     axes = opened.plot.phase_eta()
     slips = [line for line in axes.get_lines() if line.get_label() in ("other slips", "slips of sets with a phase")]
     assert sum(len(line.get_xdata()) for line in slips) == points["phase"].notna().sum() > 0
+    (means,) = axes.containers
+    bins = pd.read_parquet(results / "reduced" / "backbone.parquet")
+    assert means.lines[0].get_ydata() == pytest.approx(bins["phase_mean"]) and means.has_yerr
+    assert set(means.lines[0].get_xdata().astype(float).round(9)) <= set(points["eta"].round(9))
     assert "rad" in axes.get_ylabel()
     axes = opened.plot.intervals()
     assert "(s)" in axes.get_xlabel()

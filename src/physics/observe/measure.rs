@@ -53,6 +53,8 @@ impl Regime {
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
+    /// Onsets of the slips of start-up, in s.
+    pub start_up: Vec<f64>,
     /// Slips past start-up, in order.
     pub slips: Vec<Slip>,
     /// Their precursors, in order; empty if not recorded.
@@ -71,10 +73,11 @@ pub struct Measurements {
 
 impl Measurements {
     /// What an observer has measured in a simulation that ended with this summary.
-    pub fn new(observer: SlipObserver, summary: Summary) -> Self {
+    pub fn new(mut observer: SlipObserver, summary: Summary) -> Self {
         let mut measured = Self {
             averages: observer.averages(),
             running_interval: observer.running_interval(),
+            start_up: std::mem::take(&mut observer.start_up),
             ruptures: observer.ruptures,
             has_given_up: observer.has_given_up,
             summary,

@@ -69,6 +69,8 @@ pub struct SlipObserver {
     rupture: Option<Active>,
     slips_seen: u64,
     last_onset: Option<f64>,
+    /// Onsets of the slips of start-up, in s.
+    pub(super) start_up: Vec<f64>,
     slips: Vec<Slip>,
     precursors: Vec<Precursor>,
     pending: Pending,
@@ -118,6 +120,7 @@ impl SlipObserver {
             rupture: None,
             slips_seen: 0,
             last_onset: None,
+            start_up: Vec::new(),
             slips: Vec::new(),
             precursors: Vec::new(),
             pending: Pending::default(),
@@ -270,6 +273,8 @@ impl SlipObserver {
         if self.slips_seen >= discard {
             let slip = self.slip(active, onset);
             self.slips.push(slip);
+        } else {
+            self.start_up.push(onset.time);
         }
         if self.drops.is_some() {
             self.breaks_of_slips.push((first.time, last.time));
