@@ -5,7 +5,7 @@
 
 use super::fields::fields;
 use super::theory::{eta, to_twelve_digits, typical_interval};
-use crate::columns::{Column, Part, Row};
+use crate::columns::{Column, Row};
 use crate::value::{Value, words};
 use std::f64::consts::TAU;
 use std::marker::PhantomData;
@@ -259,7 +259,7 @@ impl<S> Deref for Selected<S> {
     }
 }
 
-impl<S: Selection> Part for Selected<S> {
+impl<S: Selection> Row for Selected<S> {
     fn columns_as(_: Column) -> Vec<Column> {
         let columns = S::SYMBOLS.iter();
         columns
@@ -267,13 +267,13 @@ impl<S: Selection> Part for Selected<S> {
             .collect()
     }
 
-    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
         for &symbol in S::SYMBOLS {
             give(self.parameters.get(symbol));
         }
     }
 
-    fn take<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+    fn from_cells<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         let mut parameters = Parameters::default();
         for &symbol in S::SYMBOLS {
             parameters
@@ -286,8 +286,6 @@ impl<S: Selection> Part for Selected<S> {
             .map_err(|error| error.to_string())
     }
 }
-
-impl<S: Selection> Row for Selected<S> {}
 
 #[cfg(test)]
 mod tests {
