@@ -74,7 +74,7 @@ impl Rupture {
 }
 
 /// A largest shear force, in N, and its time, in s.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Peak {
     pub time: f64,
     pub force: f64,

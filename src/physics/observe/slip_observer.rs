@@ -13,7 +13,7 @@ use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
 
 /// Largest shear forces since the last slip's end, the last rupture of precursor size, and the last break.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct PeaksSince {
     slip: Peak,
     precursor: Peak,
@@ -83,10 +83,6 @@ pub struct SlipObserver {
 
 impl SlipObserver {
     pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
-        let start = Peak {
-            time: 0.0,
-            force: 0.0,
-        };
         let contacts = (parameters.blocks * parameters.contacts_per_block) as u64;
         let criteria = Criteria {
             precursor_size: recording
@@ -110,11 +106,7 @@ impl SlipObserver {
             now: Instant::default(),
             at_event: Instant::default(),
             attached: contacts,
-            peaks_since: PeaksSince {
-                slip: start,
-                precursor: start,
-                last_break: start,
-            },
+            peaks_since: PeaksSince::default(),
             rupture: None,
             slips_seen: 0,
             last_onset: None,
