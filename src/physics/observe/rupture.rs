@@ -4,9 +4,9 @@
 use crate::model::{ContactEvent, Parameters};
 use crate::solver::Spent;
 
-/// A rupture in progress or just ended.
+/// A rupture in progress or just ended, with what is measured on its force.
 #[derive(Clone, Debug)]
-pub struct Rupture {
+pub(super) struct Rupture {
     /// Block of the first break, from 0.
     pub first_block: usize,
     pub size: u64,
@@ -18,22 +18,38 @@ pub struct Rupture {
     pub attached_before: u64,
     /// Fewest contacts attached so far.
     pub least_attached: u64,
+    /// Peak since the last slip, when the rupture reached the leading edge.
+    pub onset: Option<Peak>,
+    /// Peak since the last precursor, when the rupture began.
+    pub precursor_onset: Peak,
+    /// Least force so far, and up to the last break, in N.
+    pub least: f64,
+    pub least_at_last_break: f64,
+    pub first: Instant,
+    pub last: Instant,
+    /// Whether the shear force was rising at the onset.
+    pub onset_cut: bool,
 }
 
 impl Rupture {
-    /// The rupture that begins with this break, on a slider of `blocks` blocks.
-    pub fn new(first: &ContactEvent, blocks: usize) -> Self {
-        let mut rupture = Self {
-            first_block: first.block,
+    /// The rupture that begins with this break, not included yet, on a slider of `blocks` blocks.
+    pub fn new(event: &ContactEvent, first: Instant, precursor_onset: Peak, blocks: usize) -> Self {
+        Self {
+            first_block: event.block,
             size: 0,
-            reach: first.block,
+            reach: event.block,
             fronts: Vec::new(),
             broken: vec![false; blocks],
-            attached_before: first.attached + 1,
-            least_attached: first.attached,
-        };
-        rupture.include(first);
-        rupture
+            attached_before: event.attached + 1,
+            least_attached: event.attached,
+            onset: None,
+            precursor_onset,
+            least: first.force,
+            least_at_last_break: first.force,
+            first,
+            last: first,
+            onset_cut: false,
+        }
     }
 
     pub fn include(&mut self, event: &ContactEvent) {
@@ -106,23 +122,6 @@ pub(super) struct Instant {
     pub spent: Spent,
 }
 
-/// A rupture in progress, with what is measured on its force.
-#[derive(Clone, Debug)]
-pub(super) struct Active {
-    pub rupture: Rupture,
-    /// Peak since the last slip, when the rupture reached the leading edge.
-    pub onset: Option<Peak>,
-    /// Peak since the last precursor, when the rupture began.
-    pub precursor_onset: Peak,
-    /// Least force so far, and up to the last break, in N.
-    pub least: f64,
-    pub least_at_last_break: f64,
-    pub first: Instant,
-    pub last: Instant,
-    /// Whether the shear force was rising at the onset.
-    pub onset_cut: bool,
-}
-
 /// What makes a rupture a slip or a precursor, and when it and the job end.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Criteria {
@@ -140,7 +139,7 @@ impl Criteria {
 }
 
 /// Slope of position against time by least squares; `None` unless it is positive and finite.
-pub fn advance_speed(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<f64> {
+pub(super) fn advance_speed(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<f64> {
     let count = points.clone().count() as f64;
     let (time, position) = points
         .clone()

@@ -6,7 +6,7 @@
 //! its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::drops::{DropDetector, Drops};
-use super::rupture::{Active, Criteria, Instant, Peak, Rupture, advance_speed};
+use super::rupture::{Criteria, Instant, Peak, Rupture, advance_speed};
 use super::slip::{Energies, Modulation, Precursor, Slip, phase};
 use super::{Averages, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
@@ -66,7 +66,7 @@ pub struct SlipObserver {
     at_event: Instant,
     attached: u64,
     peaks_since: PeaksSince,
-    rupture: Option<Active>,
+    rupture: Option<Rupture>,
     slips_seen: u64,
     last_onset: Option<f64>,
     slips: Vec<Slip>,
@@ -200,27 +200,16 @@ impl SlipObserver {
         };
         self.at_event = here;
         self.attached = event.attached;
-        let active = if let Some(active) = &mut self.rupture {
-            active.rupture.include(event);
-            active
-        } else {
-            self.rupture.insert(Active {
-                rupture: Rupture::new(event, blocks),
-                onset: None,
-                precursor_onset: self.peaks_since.precursor,
-                least: self.now.force,
-                least_at_last_break: self.now.force,
-                first: here,
-                last: here,
-                onset_cut: false,
-            })
-        };
-        if event.block + 1 == blocks && active.onset.is_none() {
-            active.onset = Some(self.peaks_since.slip);
-            active.onset_cut = self.now.force >= self.peaks_since.slip.force;
+        let precursor_onset = self.peaks_since.precursor;
+        let begin = || Rupture::new(event, here, precursor_onset, blocks);
+        let rupture = self.rupture.get_or_insert_with(begin);
+        rupture.include(event);
+        if event.block + 1 == blocks && rupture.onset.is_none() {
+            rupture.onset = Some(self.peaks_since.slip);
+            rupture.onset_cut = self.now.force >= self.peaks_since.slip.force;
         }
-        active.least_at_last_break = active.least;
-        active.last = here;
+        rupture.least_at_last_break = rupture.least;
+        rupture.last = here;
         self.peaks_since.last_break = Peak {
             time: event.time,
             force: self.now.force,
@@ -231,36 +220,33 @@ impl SlipObserver {
     #[inline(always)]
     fn finish_rupture_before(&mut self, time: f64) {
         let crossing_time = self.criteria.crossing_time;
-        let is_over = |active: &Active| time - active.last.time > crossing_time;
+        let is_over = |rupture: &Rupture| time - rupture.last.time > crossing_time;
         if self.rupture.as_ref().is_some_and(is_over) {
             self.finish_rupture();
         }
     }
 
     fn finish_rupture(&mut self) {
-        let Some(active) = self.rupture.take() else {
+        let Some(rupture) = self.rupture.take() else {
             return;
         };
         self.ruptures += 1;
-        if !self.criteria.is_recorded(&active.rupture) {
-            return;
-        }
-        if active.rupture.is_slip(self.criteria.contacts) {
-            self.record_slip(&active);
-        } else {
-            self.record_precursor(&active);
+        if rupture.is_slip(self.criteria.contacts) {
+            self.record_slip(&rupture);
+        } else if self.criteria.is_recorded(&rupture) {
+            self.record_precursor(&rupture);
         }
     }
 
-    fn record_slip(&mut self, active: &Active) {
+    fn record_slip(&mut self, rupture: &Rupture) {
         // A slip has reached the leading edge.
-        let onset = active.onset.unwrap_or(self.peaks_since.slip);
-        let first = active.first;
-        let last = active.last;
+        let onset = rupture.onset.unwrap_or(self.peaks_since.slip);
+        let first = rupture.first;
+        let last = rupture.last;
         let discard = self.recording.discard;
         self.drive_at.slip_onset.advance_to(onset.time);
         if self.slips_seen >= discard {
-            let slip = self.slip(active, onset);
+            let slip = self.slip(rupture, onset);
             self.slips.push(slip);
         }
         if self.drops.is_some() {
@@ -284,10 +270,9 @@ impl SlipObserver {
     }
 
     /// The row of a slip; drops are found at the end.
-    fn slip(&mut self, active: &Active, onset: Peak) -> Slip {
-        let rupture = &active.rupture;
-        let first = active.first;
-        let last = active.last;
+    fn slip(&mut self, rupture: &Rupture, onset: Peak) -> Slip {
+        let first = rupture.first;
+        let last = rupture.last;
         let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
         let drive = &self.drive_at.slip_onset;
         let modulation = Modulation::of(drive);
@@ -310,7 +295,7 @@ impl SlipObserver {
                 .period
                 .map(|period| phase(since_cycle, period, drive.eta)),
             peak_force: onset.force,
-            drop: onset.force - active.least_at_last_break,
+            drop: onset.force - rupture.least_at_last_break,
             nucleation: first.time,
             nucleation_block: rupture.first_block as u64 + 1,
             duration: last.time - first.time,
@@ -319,7 +304,7 @@ impl SlipObserver {
             least_attached: rupture.least_attached as f64 / contacts,
             distance: last.mean_displacement - first.mean_displacement,
             edge_distance,
-            onset_cut: active.onset_cut,
+            onset_cut: rupture.onset_cut,
             front_speed: rupture.front_speed(&self.parameters),
             precursors: self.pending.count,
             largest_precursor: self.pending.largest,
@@ -335,11 +320,10 @@ impl SlipObserver {
         self.drive_at.slip_break.motion(at.time).0 - at.force / self.drive_at.slip_break.stiffness
     }
 
-    fn record_precursor(&mut self, active: &Active) {
-        let rupture = &active.rupture;
-        let first = active.first;
-        let last = active.last;
-        let onset = active.precursor_onset.time;
+    fn record_precursor(&mut self, rupture: &Rupture) {
+        let first = rupture.first;
+        let last = rupture.last;
+        let onset = rupture.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
             self.drive_at.precursor_onset.advance_to(onset);
             self.precursors.push(Precursor {
@@ -383,7 +367,7 @@ impl Observer for SlipObserver {
         let recordable = self
             .rupture
             .as_ref()
-            .is_some_and(|active| self.criteria.is_recorded(&active.rupture));
+            .is_some_and(|rupture| self.criteria.is_recorded(rupture));
         let floor = if recordable {
             self.peaks_since.last_break.force
         } else {
@@ -395,10 +379,10 @@ impl Observer for SlipObserver {
             self.peaks_since.precursor.raise(peak);
             self.peaks_since.slip.raise(peak);
         }
-        if let Some(active) = &mut self.rupture
-            && let Some((_, force)) = segment.minimum_below(active.least)
+        if let Some(rupture) = &mut self.rupture
+            && let Some((_, force)) = segment.minimum_below(rupture.least)
         {
-            active.least = force;
+            rupture.least = force;
         }
         if let Some(drops) = &mut self.drops {
             drops.advance(segment);
