@@ -49,6 +49,12 @@ pub trait Row: Sized {
         Self::columns_as(Column::default())
     }
 
+    /// The names of these columns.
+    fn names() -> Vec<Cow<'static, str>> {
+        let columns = Self::columns().into_iter();
+        columns.map(|column| column.name).collect()
+    }
+
     /// Gives its cells, in the order of the columns.
     fn cells(&self, give: &mut dyn FnMut(Value<'_>));
 

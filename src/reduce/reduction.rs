@@ -213,10 +213,7 @@ impl<'a> RoundsOfSets<'a> {
     fn left_out(&self) -> Vec<Cow<'static, str>> {
         match self.sweep.rounds() {
             Some(_) => Vec::new(),
-            None => RoundOfSet::columns()
-                .into_iter()
-                .map(|column| column.name)
-                .collect(),
+            None => RoundOfSet::names(),
         }
     }
 
