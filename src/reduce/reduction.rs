@@ -92,7 +92,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let slips = all_jobs.iter().map(|set| set.slips);
     let total = slips.fold(0, u64::saturating_add);
     let mut summary = ReductionSummary {
-        jobs: all_jobs.iter().map(|set| set.finished).sum(),
+        jobs: all_jobs.iter().map(|set| set.finished.len() as u64).sum(),
         failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
         ..ReductionSummary::default()
     };

@@ -11,7 +11,7 @@ use crate::results::tables::JobOutcome;
 use crate::sets::SetRow;
 use crate::table::columns::{Interval, columns};
 use crate::table::value::floored;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
 
 /// Width from which an interval of a mean phase counts as the whole turn, in rad: others are half a turn wide at most.
@@ -345,8 +345,8 @@ pub(super) struct SetJobs {
     pub set_id: String,
     /// Its parameters; the seed is that of any of its jobs.
     pub parameters: Parameters,
-    /// Jobs that were run to an end.
-    pub finished: u64,
+    /// Seeds of the jobs that were run to an end.
+    pub finished: BTreeSet<u64>,
     pub failed: u64,
     /// Slips that the jobs recorded.
     pub slips: u64,
@@ -378,7 +378,7 @@ impl SetJobs {
             self.failed += 1;
             return;
         }
-        self.finished += 1;
+        self.finished.insert(seed);
         self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
         self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
         self.cut += u64::from(job.outcome == JobOutcome::TimeLimit);
@@ -405,7 +405,7 @@ impl SetJobs {
             parameters: Selected::new(self.parameters.clone()),
             frequency: self.parameters.frequency(),
             eta: self.parameters.eta(),
-            finished_jobs: self.finished,
+            finished_jobs: self.finished.len() as u64,
             failed_jobs: self.failed,
             jobs_without_slips: self.without_slips,
             jobs_cut: Some(self.cut),
@@ -455,7 +455,7 @@ pub(super) mod tests {
         SetJobs {
             set_id: format!("{amplitude:e} {period}"),
             parameters,
-            finished: 1,
+            finished: [0].into(),
             ..SetJobs::default()
         }
     }
