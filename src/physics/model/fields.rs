@@ -30,46 +30,32 @@
 //! [`Parameters`](super::Parameters), in `parameters.rs`.
 
 use crate::columns::Column;
-use crate::value::Kind;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
+use std::ops::Deref;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Description {
-    /// Key in files, flags and tables.
+    /// The name of the column.
     pub key: &'static str,
-    /// Symbol in the paper; empty if it has none.
-    pub symbol: &'static str,
-    /// What axes of figures call it; empty if the meaning begins so.
-    pub words: &'static str,
-    /// SI unit; empty for a pure number, a flag or a word.
-    pub unit: &'static str,
-    /// One line, without a full stop.
-    pub meaning: &'static str,
+    /// The field as a column of a table.
+    pub column: Column,
     /// The values that the field can take by itself.
     pub range: Range,
     /// What else must hold, beside other fields; empty for nothing.
     pub rule: &'static str,
-    pub kind: Kind,
-    /// Whether it may be missing.
-    pub nullable: bool,
     /// The words that it can be, if it is one.
     pub choices: &'static [&'static str],
 }
 
-impl Description {
-    /// The field as a column of a table.
-    pub fn column(&self) -> Column {
-        Column {
-            name: self.key.into(),
-            unit: self.unit,
-            meaning: self.meaning,
-            symbol: self.symbol,
-            words: self.words,
-            kind: self.kind,
-            nullable: self.nullable,
-        }
-    }
+impl Deref for Description {
+    type Target = Column;
 
+    fn deref(&self) -> &Column {
+        &self.column
+    }
+}
+
+impl Description {
     /// The values that the field can take by itself, with their unit.
     pub fn allowed(&self) -> String {
         let words = self.range.words;
@@ -179,19 +165,21 @@ macro_rules! fields {
         }
 
         impl $Key {
-            /// Key, unit, meaning and range.
             pub const fn description(self) -> $crate::model::Description {
                 match self {$(
                     Self::$variant => $crate::model::Description {
                         key: $key,
-                        symbol: concat!($($symbol)?),
-                        words: concat!($($($words)?)?),
-                        unit: $unit,
-                        meaning: $meaning,
+                        column: $crate::columns::Column {
+                            name: std::borrow::Cow::Borrowed($key),
+                            unit: $unit,
+                            meaning: $meaning,
+                            symbol: concat!($($symbol)?),
+                            words: concat!($($($words)?)?),
+                            kind: <$type as $crate::value::Field>::KIND,
+                            nullable: <$type as $crate::value::Field>::NULLABLE,
+                        },
                         range: $crate::model::fields::Range::$range,
                         rule: concat!($($rule)?),
-                        kind: <$type as $crate::value::Field>::KIND,
-                        nullable: <$type as $crate::value::Field>::NULLABLE,
                         choices: <$type as $crate::value::Field>::WORDS,
                     },
                 )+}

@@ -262,9 +262,7 @@ impl<S> Deref for Selected<S> {
 impl<S: Selection> Row for Selected<S> {
     fn columns_as(_: Column) -> Vec<Column> {
         let columns = S::SYMBOLS.iter();
-        columns
-            .map(|symbol| symbol.description().column())
-            .collect()
+        columns.map(|symbol| symbol.description().column).collect()
     }
 
     fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
