@@ -16,22 +16,8 @@ use crate::sets::{FREQUENCY, SetRow};
 use crate::table::columns::{Interval, Kind};
 use std::collections::{BTreeMap, HashMap};
 
-/// Sums of a job, whose means are the statistics.
-#[derive(Clone, Copy, Debug, Default)]
-struct JobSums {
-    interval: Sum,
-    friction: Sum,
-    phase: Sum,
-}
-
-type SumOf = fn(&JobSums) -> Sum;
-
-/// What is compared: columns of the sets, and their sums.
-const STATISTICS: [(&str, SumOf); 3] = [
-    ("tau_mean", |job| job.interval),
-    ("mean_friction", |job| job.friction),
-    ("resultant_length", |job| job.phase),
-];
+/// What is compared: columns of the sets, each the mean of a sum.
+const STATISTICS: [&str; 3] = ["tau_mean", "mean_friction", "resultant_length"];
 
 /// The sets of a directory with a job that did not fail, controls left out.
 fn sets_in(results: &Results<'_>) -> Result<Vec<SetJobs>, ResultsError> {
@@ -53,33 +39,41 @@ struct Pair<'a> {
     seeds: Vec<u64>,
 }
 
-/// A set of some seeds: its row, and its jobs in the order of these.
+/// A set of some seeds: its row, and the sums of its jobs in the order of these.
 struct Found {
     row: SetRow,
-    jobs: Vec<JobSums>,
+    jobs: Vec<[Sum; STATISTICS.len()]>,
 }
 
-impl JobSums {
-    fn of(set: &Gathered, seed: u64) -> Self {
-        let mut sums = Self::default();
-        if let Some(job) = set.jobs.averages.get(&seed) {
-            sums.friction.push([job.time * job.friction, 0.0], job.time);
-        }
-        for slip in set.slips.of_job(seed) {
-            if let Some(interval) = non_nan(slip.interval) {
-                sums.interval.push([interval, 0.0], 1.0);
-            }
-            if let Some(angle) = non_nan(slip.phase) {
-                sums.phase.push(unit(angle), 1.0);
-            }
-        }
-        sums
+/// The sums of a job, in the order of the statistics.
+fn sums(set: &Gathered, seed: u64) -> [Sum; STATISTICS.len()] {
+    let mut intervals = Sum::default();
+    let mut friction = Sum::default();
+    let mut phases = Sum::default();
+    if let Some(job) = set.jobs.averages.get(&seed) {
+        friction.push([job.time * job.friction, 0.0], job.time);
     }
+    for slip in set.slips.of_job(seed) {
+        if let Some(interval) = non_nan(slip.interval) {
+            intervals.push([interval, 0.0], 1.0);
+        }
+        if let Some(angle) = non_nan(slip.phase) {
+            phases.push(unit(angle), 1.0);
+        }
+    }
+    [intervals, friction, phases]
 }
 
-/// The interval of a difference B - A, less the difference itself.
-fn error(a: &Found, b: &Found, sum: SumOf) -> Option<Interval> {
-    let added = |found: &Found| Sum::added(&found.jobs.iter().map(sum).collect::<Vec<_>>());
+/// The interval of the difference B - A of a statistic, less the difference itself.
+fn error(a: &Found, b: &Found, statistic: usize) -> Option<Interval> {
+    let sums = |found: &Found| {
+        found
+            .jobs
+            .iter()
+            .map(|job| job[statistic])
+            .collect::<Vec<_>>()
+    };
+    let added = |found: &Found| Sum::added(&sums(found));
     let added = added(a).into_iter().zip(added(b));
     let added = added.map(|(a, b)| [b - a]).collect();
     Sequences::independent(added).estimate().interval()
@@ -98,7 +92,7 @@ fn found_in(
     Gathering::of_jobs(results, &is_wanted)?.each_set(MAX_SLIPS, u64::MAX, |set, _| {
         let id = set.jobs.set_id.clone();
         let seeds = wanted[&*id].iter();
-        let jobs = seeds.map(|&seed| JobSums::of(&set, seed)).collect();
+        let jobs = seeds.map(|&seed| sums(&set, seed)).collect();
         let row = set.slips.finish(&set.jobs).row;
         found.insert(id, Found { row, jobs });
         Ok(())
@@ -148,7 +142,7 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
         .iter()
         .map(|pair| (Some(pair.seeds.len() as f64), None));
     let mut found = vec![Values::computed("seeds", Kind::Count, seeds)];
-    for (name, sum) in STATISTICS {
+    for (statistic, name) in STATISTICS.into_iter().enumerate() {
         let of_a = |pair: &Pair<'_>| found_in_a[&pair.a.set_id].row.number(name);
         let of_b = |pair: &Pair<'_>| found_in_b[&pair.b.set_id].row.number(name);
         let difference = |pair: &Pair<'_>| {
@@ -156,7 +150,7 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
             let errors = error(
                 &found_in_a[&pair.a.set_id],
                 &found_in_b[&pair.b.set_id],
-                sum,
+                statistic,
             );
             let interval = whole.zip(errors);
             let interval = interval.map(|(whole, error)| (whole + error.low, whole + error.high));
