@@ -365,15 +365,12 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
 
 /// Whether something failed because writing is not permitted.
 fn is_read_only(error: &anyhow::Error) -> bool {
+    use io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
     let of_storage = error.downcast_ref().map(StorageError::kind);
     let of_results = error.downcast_ref().map(|error: &ResultsError| error.kind);
-    let kind = of_storage.map(ErrorKind::Disk).or(of_results);
-    let Some(ErrorKind::Disk(kind)) = kind else {
-        return false;
-    };
     matches!(
-        kind,
-        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
+        of_storage.map(ErrorKind::Disk).or(of_results),
+        Some(ErrorKind::Disk(PermissionDenied | ReadOnlyFilesystem))
     )
 }
 
