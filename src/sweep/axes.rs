@@ -10,6 +10,7 @@
 //! a shorter one. Logarithms and exponentials come from `libm`: the same bits on every machine.
 
 use super::quantity::{Point, Quantity};
+use crate::model::theory::to_twelve_digits;
 use crate::model::{Parameters, Symbol, Value};
 use std::cmp::Ordering;
 
@@ -251,9 +252,6 @@ const fn index(row: u64) -> usize {
 
 /// Length of the Sobol sequence.
 pub(super) const MAX_SAMPLE: u64 = 1 << 16;
-/// Significant digits of a value between the ends of a range: 1e-4 as people write it, not what a logarithm makes of
-/// it.
-const DIGITS: usize = 12;
 
 /// A range of a quantity, low < high.
 #[derive(Clone, Copy, Debug)]
@@ -267,7 +265,8 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// The value at a fraction of the way, 0 to 1, rounded; the ends are exact.
+    /// The value at a fraction of the way, 0 to 1, rounded: 1e-4 as people write it, not what a logarithm makes of it.
+    /// The ends are exact.
     pub fn at(&self, fraction: f64) -> f64 {
         if fraction <= 0.0 {
             return self.low;
@@ -286,7 +285,7 @@ impl Range {
         let rounded = if self.whole {
             value.round()
         } else {
-            significant(value)
+            to_twelve_digits(value)
         };
         rounded.clamp(self.low, self.high)
     }
@@ -296,11 +295,6 @@ impl Range {
         let last = (points - 1) as f64;
         (0..points).map(move |point| self.at(point as f64 / last))
     }
-}
-
-/// The double that is nearest to a value in [`DIGITS`].
-fn significant(value: f64) -> f64 {
-    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }
 
 /// The coordinates of the first Sobol points in one dimension, each in [0, 1).
