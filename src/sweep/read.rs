@@ -32,10 +32,8 @@ impl Sweep {
             source: error.source,
         })?;
         let text = String::from_utf8(bytes);
-        Self::parse(
-            &text.map_err(|_| SweepError::NotUtf8(path.to_owned()))?,
-            path,
-        )
+        let text = text.map_err(|_| SweepError::NotUtf8(path.to_owned()))?;
+        Self::parse(&text, path)
     }
 
     /// Reads the text of a sweep file; the path is for messages only.
