@@ -39,42 +39,40 @@ struct Pair<'a> {
     seeds: Vec<u64>,
 }
 
-/// A set of some seeds: its row, and the sums of its jobs in the order of these.
+/// A set of some seeds: its row, and for each statistic the sums of its jobs in the order of these.
 struct Found {
     row: SetRow,
-    jobs: Vec<[Sum; STATISTICS.len()]>,
+    sums: [Vec<Sum>; STATISTICS.len()],
 }
 
-/// The sums of a job, in the order of the statistics.
-fn sums(set: &Gathered, seed: u64) -> [Sum; STATISTICS.len()] {
-    let mut intervals = Sum::default();
-    let mut friction = Sum::default();
-    let mut phases = Sum::default();
-    if let Some(job) = set.jobs.averages.get(&seed) {
-        friction.push([job.time * job.friction, 0.0], job.time);
-    }
-    for slip in set.slips.of_job(seed) {
-        if let Some(interval) = non_nan(slip.interval) {
-            intervals.push([interval, 0.0], 1.0);
+impl Found {
+    fn of(set: Gathered, seeds: &[u64]) -> Self {
+        let mut sums = [const { Vec::new() }; STATISTICS.len()];
+        for seed in seeds {
+            let [mut intervals, mut friction, mut phases] = [Sum::default(); STATISTICS.len()];
+            if let Some(job) = set.jobs.averages.get(seed) {
+                friction.push([job.time * job.friction, 0.0], job.time);
+            }
+            for slip in set.slips.of_job(*seed) {
+                if let Some(interval) = non_nan(slip.interval) {
+                    intervals.push([interval, 0.0], 1.0);
+                }
+                if let Some(angle) = non_nan(slip.phase) {
+                    phases.push(unit(angle), 1.0);
+                }
+            }
+            for (sums, sum) in sums.iter_mut().zip([intervals, friction, phases]) {
+                sums.push(sum);
+            }
         }
-        if let Some(angle) = non_nan(slip.phase) {
-            phases.push(unit(angle), 1.0);
-        }
+        let row = set.slips.finish(&set.jobs).row;
+        Self { row, sums }
     }
-    [intervals, friction, phases]
 }
 
-/// The interval of the difference B - A of a statistic, less the difference itself.
-fn error(a: &Found, b: &Found, statistic: usize) -> Option<Interval> {
-    let sums = |found: &Found| {
-        found
-            .jobs
-            .iter()
-            .map(|job| job[statistic])
-            .collect::<Vec<_>>()
-    };
-    let added = |found: &Found| Sum::added(&sums(found));
-    let added = added(a).into_iter().zip(added(b));
+/// The interval of a difference B - A, less the difference itself, from the sums of jobs in A and in B.
+fn error(a: &[Sum], b: &[Sum]) -> Option<Interval> {
+    let added = Sum::added(a).into_iter().zip(Sum::added(b));
     let added = added.map(|(a, b)| [b - a]).collect();
     Sequences::independent(added).estimate().interval()
 }
@@ -91,10 +89,8 @@ fn found_in(
     let mut found = HashMap::new();
     Gathering::of_jobs(results, &is_wanted)?.each_set(MAX_SLIPS, u64::MAX, |set, _| {
         let id = set.jobs.set_id.clone();
-        let seeds = wanted[&*id].iter();
-        let jobs = seeds.map(|&seed| sums(&set, seed)).collect();
-        let row = set.slips.finish(&set.jobs).row;
-        found.insert(id, Found { row, jobs });
+        let seeds = wanted[&*id];
+        found.insert(id, Found::of(set, seeds));
         Ok(())
     })?;
     Ok(found)
@@ -147,11 +143,8 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
         let of_b = |pair: &Pair<'_>| found_in_b[&pair.b.set_id].row.number(name);
         let difference = |pair: &Pair<'_>| {
             let whole = of_b(pair).zip(of_a(pair)).map(|(b, a)| b - a);
-            let errors = error(
-                &found_in_a[&pair.a.set_id],
-                &found_in_b[&pair.b.set_id],
-                statistic,
-            );
+            let sums_in_a = &found_in_a[&pair.a.set_id].sums[statistic];
+            let errors = error(sums_in_a, &found_in_b[&pair.b.set_id].sums[statistic]);
             let interval = whole.zip(errors);
             let interval = interval.map(|(whole, error)| (whole + error.low, whole + error.high));
             (whole, interval)
