@@ -29,19 +29,18 @@ struct Pending {
     last_onset: Option<f64>,
     /// Those that advanced the reach: time and position.
     advances: Vec<(f64, f64)>,
-    /// The furthest block that they reach, from 0.
-    furthest: Option<usize>,
+    /// Blocks up to the furthest that they reach.
+    furthest: usize,
 }
 
 /// The instants between which averages over time are taken.
 #[derive(Clone, Debug, Default)]
 struct Span {
     start_up_end: Option<Instant>,
-    last_slip_end: Option<Instant>,
+    /// The start, as long as there is no slip.
+    last_slip_end: Instant,
     /// Halfway from the last slip to where the job gives up.
     settled: Option<Instant>,
-    /// Time within slips that have ended, in s.
-    slipping: f64,
 }
 
 /// The drive in its cycle at an instant of a slip or precursor.
@@ -128,14 +127,10 @@ impl SlipObserver {
         self.precursors.retain(|precursor| precursor.slip < slips);
         if let Some(drops) = self.drops {
             let discarded = self.breaks_of_slips.len() - self.slips.len();
-            let of_slips = drops
-                .of_slips(&self.breaks_of_slips)
-                .into_iter()
-                .skip(discarded);
-            self.slips
-                .iter_mut()
-                .zip(of_slips)
-                .for_each(|(slip, drops)| slip.drops = drops);
+            let of_slips = drops.of_slips(&self.breaks_of_slips).into_iter();
+            for (slip, drops) in self.slips.iter_mut().zip(of_slips.skip(discarded)) {
+                slip.drops = drops;
+            }
         }
         (self.slips, self.precursors)
     }
@@ -149,7 +144,7 @@ impl SlipObserver {
                 let start_up_end = self.span.start_up_end.filter(|_| !self.slips.is_empty());
                 (start_up_end.unwrap_or(settled), self.sliding())
             }
-            None => self.span.start_up_end.zip(self.span.last_slip_end)?,
+            None => (self.span.start_up_end?, self.span.last_slip_end),
         };
         let time = end.time - start.time;
         (time > 0.0).then(|| Averages {
@@ -183,8 +178,8 @@ impl SlipObserver {
         Instant {
             attached_time: self.at_event.attached_time
                 + self.attached as f64 * (self.now.time - self.at_event.time),
-            slipping: self.span.slipping + self.now.time
-                - self.span.last_slip_end.map_or(0.0, |end| end.time),
+            slipping: self.span.last_slip_end.slipping + self.now.time
+                - self.span.last_slip_end.time,
             ..self.now
         }
     }
@@ -253,15 +248,14 @@ impl SlipObserver {
             self.breaks_of_slips.push((first.time, last.time));
         }
         self.slips_seen += 1;
-        self.span.slipping += last.time - first.time;
         let end = Instant {
-            slipping: self.span.slipping,
+            slipping: self.span.last_slip_end.slipping + (last.time - first.time),
             ..last
         };
         if self.slips_seen == discard.max(1) {
             self.span.start_up_end = Some(end);
         }
-        self.span.last_slip_end = Some(end);
+        self.span.last_slip_end = end;
         self.span.settled = None;
         self.last_onset = Some(onset.time);
         self.peaks_since.slip = self.peaks_since.last_break;
@@ -277,10 +271,7 @@ impl SlipObserver {
         let drive = &self.drive_at.slip_onset;
         let modulation = Modulation::of(drive);
         let interval = self.last_onset.map(|last| onset.time - last);
-        let spent = self
-            .span
-            .last_slip_end
-            .map_or(Spent::default(), |end| end.spent);
+        let spent = self.span.last_slip_end.spent;
         let has_energies = self.recording.energies;
         let energies = has_energies.then(|| Energies::between(spent, last.spent));
         let contacts = self.criteria.contacts as f64;
@@ -343,15 +334,12 @@ impl SlipObserver {
                 front_speed: rupture.front_speed(&self.parameters),
             });
         }
-        if self
-            .pending
-            .furthest
-            .is_none_or(|furthest| rupture.reach > furthest)
-        {
-            let position = (rupture.reach + 1) as f64 * self.parameters.slider_length
-                / self.parameters.blocks as f64;
+        let reach = rupture.reach + 1;
+        if reach > self.pending.furthest {
+            let position =
+                reach as f64 * self.parameters.slider_length / self.parameters.blocks as f64;
             self.pending.advances.push((first.time, position));
-            self.pending.furthest = Some(rupture.reach);
+            self.pending.furthest = reach;
         }
         self.pending.count += 1;
         self.pending.largest = self.pending.largest.max(rupture.size);
@@ -395,7 +383,7 @@ impl Observer for SlipObserver {
             ..self.now
         };
         self.finish_rupture_before(self.now.time);
-        let since_slip = self.now.time - self.span.last_slip_end.map_or(0.0, |end| end.time);
+        let since_slip = self.now.time - self.span.last_slip_end.time;
         if self.span.settled.is_none() && since_slip >= 0.5 * self.criteria.give_up_time {
             self.span.settled = Some(self.sliding());
         }
