@@ -120,11 +120,9 @@ impl Parameters {
     pub fn check_rules(&self) -> Result<(), ParameterError> {
         let is_modulated = self.modulation_amplitude > 0.0;
         let can_ramp = is_modulated && self.ramp_time > 0.0;
+        let contacts = self.blocks * self.contacts_per_block;
         let rules = [
-            (
-                Symbol::Ns,
-                self.blocks * self.contacts_per_block <= MAX_CONTACTS,
-            ),
+            (Symbol::Ns, contacts <= MAX_CONTACTS),
             (Symbol::Dfs, self.threshold_deviation <= self.mean_threshold),
             (Symbol::V0, typical_interval(self) <= MAX_INTERVAL),
             (Symbol::T, self.modulation_period.is_some() || !is_modulated),

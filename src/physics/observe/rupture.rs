@@ -83,9 +83,7 @@ impl Rupture {
             .fronts
             .iter()
             .map(|&(block, time)| (time, spacing * block.abs_diff(self.first_block) as f64));
-        (self.extent() >= 3)
-            .then(|| advance_speed(points))
-            .flatten()
+        advance_speed(points).filter(|_| self.extent() >= 3)
     }
 }
 
@@ -141,18 +139,11 @@ impl Criteria {
 /// Slope of position against time by least squares; `None` unless it is positive and finite.
 pub(super) fn advance_speed(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<f64> {
     let count = points.clone().count() as f64;
-    let (time, position) = points
-        .clone()
-        .fold((0.0, 0.0), |(t, p), point| (t + point.0, p + point.1));
-    let time = time / count;
-    let position = position / count;
-    let (covariance, variance) = points.fold((0.0, 0.0), |(covariance, variance), point| {
-        let late = point.0 - time;
-        (
-            covariance + late * (point.1 - position),
-            variance + late * late,
-        )
-    });
+    let sum = |of: &dyn Fn((f64, f64)) -> f64| points.clone().map(of).sum::<f64>();
+    let mean_time = sum(&|(time, _)| time) / count;
+    let mean_position = sum(&|(_, position)| position) / count;
+    let covariance = sum(&|(time, position)| (time - mean_time) * (position - mean_position));
+    let variance = sum(&|(time, _)| (time - mean_time) * (time - mean_time));
     let speed = covariance / variance;
     (speed.is_finite() && speed > 0.0).then_some(speed)
 }
