@@ -27,11 +27,10 @@ pub(super) struct Column {
 /// An axis of a sweep. Has at least one row.
 #[derive(Clone, Debug)]
 pub(super) enum Axis {
-    /// The whole numbers from `first` on.
+    /// Whole numbers, one after the other.
     Counted {
         symbol: Symbol,
-        first: u64,
-        count: u64,
+        values: std::ops::Range<u64>,
     },
     Table(Table),
 }
@@ -96,15 +95,16 @@ impl Axis {
 
     pub fn len(&self) -> u64 {
         match self {
-            Self::Counted { count, .. } => *count,
+            Self::Counted { values, .. } => values.end - values.start,
             Self::Table(table) => table.sorted.len() as u64,
         }
     }
 
     pub fn apply(&self, row: u64, point: &mut Point) {
         match self {
-            Self::Counted { symbol, first, .. } => {
-                point.set(Quantity::Parameter(*symbol), Value::Count(first + row));
+            Self::Counted { symbol, values } => {
+                let value = Value::Count(values.start + row);
+                point.set(Quantity::Parameter(*symbol), value);
             }
             Self::Table(table) => {
                 for column in &table.columns {
@@ -132,45 +132,33 @@ impl Axis {
         Some(&column.values)
     }
 
-    /// The seeds of the rows that can lead to these parameters but for the seed; `None` if it does not move the seed.
-    pub fn seeds<'a>(
-        &'a self,
-        wanted: &'a Parameters,
-    ) -> Option<Box<dyn Iterator<Item = u64> + 'a>> {
+    /// The first seeds, `most` at most, of the rows that can lead to these parameters but for the seed; `None` if it
+    /// does not move the seed.
+    pub fn seeds(&self, wanted: &Parameters, most: usize) -> Option<Vec<u64>> {
         let table = match self {
-            Self::Counted {
-                symbol,
-                first,
-                count,
-            } => {
-                let seeds = *first..first + count;
-                return (*symbol == Symbol::Seed)
-                    .then(|| Box::new(seeds) as Box<dyn Iterator<Item = u64>>);
+            Self::Counted { symbol, values } => {
+                return (*symbol == Symbol::Seed).then(|| values.clone().take(most).collect());
             }
             Self::Table(table) => table,
         };
         let seeds = table.columns.iter().find(|column| column.is_seed())?;
-        let order = move |row: &u32| table.compare_but_seed(*row, wanted);
+        let order = |row: &u32| table.compare_but_seed(*row, wanted);
         let begin = table.sorted.partition_point(|row| order(row).is_lt());
         let found = table.sorted[begin..].iter();
-        let found = found.take_while(move |row| order(row).is_eq());
+        let found = found.take_while(|row| order(row).is_eq());
         let seed = |row: &u32| match seeds.values[*row as usize] {
             Value::Count(seed) => Some(seed),
             _ => None,
         };
-        Some(Box::new(found.filter_map(seed)))
+        Some(found.filter_map(seed).take(most).collect())
     }
 
     /// The only row that can lead to these parameters; without modulation the first of those that differ in the period
     /// alone.
     pub fn find(&self, wanted: &Parameters) -> Option<u64> {
         match self {
-            Self::Counted {
-                symbol,
-                first,
-                count,
-            } => match wanted.get(*symbol) {
-                Value::Count(value) => value.checked_sub(*first).filter(|row| row < count),
+            Self::Counted { symbol, values } => match wanted.get(*symbol) {
+                Value::Count(value) if values.contains(&value) => Some(value - values.start),
                 _ => None,
             },
             Self::Table(table) => {
