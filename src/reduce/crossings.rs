@@ -14,15 +14,13 @@
 use super::confidence::student;
 use super::drive_alone::Explained;
 use super::gather::{Gathered, of_chosen};
-use crate::model::Parameters;
-use crate::model::Selected;
+use crate::model::{Parameters, Selected};
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, Digits, Statistic, label};
 use crate::sweep::{Refinement, Sweep};
 use crate::table::columns::{Interval, columns};
 use crate::table::tables;
-use crate::table::value::floored;
-use crate::table::value::words;
+use crate::table::value::{floored, words};
 use std::collections::BTreeMap;
 
 /// Groups of seeds, so that the cost of leaving them out is bounded.

@@ -11,8 +11,7 @@
 
 use super::drive_alone::{Controls, Explained};
 use super::set::{FinishedSet, JobFacts, SetJobs, SetSlips};
-use crate::model::{Parameters, Symbol, Value};
-use crate::model::{Selected, Selection as _};
+use crate::model::{Parameters, Selected, Selection as _, Symbol, Value};
 use crate::observe::Slip;
 use crate::results::tables::{All, JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};

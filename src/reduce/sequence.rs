@@ -151,7 +151,7 @@ fn rare<const D: usize>(deviations: &[[f64; D]]) -> [f64; D] {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate<const D: usize> {
-    count: u64,
+    pub(super) count: u64,
     pub(super) total: [f64; D],
     /// Of the sum.
     covariance: [[f64; D]; D],
@@ -190,10 +190,6 @@ impl<const D: usize> Estimate<D> {
             freedom,
             rare: [0.0; D],
         }
-    }
-
-    pub(super) const fn count(&self) -> u64 {
-        self.count
     }
 
     /// Their mean; `None` without values.
