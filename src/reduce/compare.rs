@@ -49,19 +49,16 @@ impl Found {
     fn of(set: Gathered, seeds: &[u64]) -> Self {
         let mut sums = [const { Vec::new() }; STATISTICS.len()];
         for seed in seeds {
-            let [mut intervals, mut friction, mut phases] = [Sum::default(); STATISTICS.len()];
+            let slips = set.slips.of_job(*seed).iter();
+            let intervals = slips.clone().filter_map(|slip| non_nan(slip.interval));
+            let intervals = Sum::of(intervals.map(|interval| [interval, 0.0]));
+            let mut friction = Sum::default();
             if let Some(job) = set.jobs.averages.get(seed) {
                 friction.push([job.time * job.friction, 0.0], job.time);
             }
-            for slip in set.slips.of_job(*seed) {
-                if let Some(interval) = non_nan(slip.interval) {
-                    intervals.push([interval, 0.0], 1.0);
-                }
-                if let Some(angle) = non_nan(slip.phase) {
-                    phases.push(unit(angle), 1.0);
-                }
-            }
-            for (sums, sum) in sums.iter_mut().zip([intervals, friction, phases]) {
+            let phases = slips.filter_map(|slip| non_nan(slip.phase));
+            let of_job = [intervals, friction, Sum::of(phases.map(unit))];
+            for (sums, sum) in sums.iter_mut().zip(of_job) {
                 sums.push(sum);
             }
         }

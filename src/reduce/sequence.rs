@@ -254,6 +254,13 @@ pub(super) struct Sum {
 }
 
 impl Sum {
+    /// Of vectors of weight 1.
+    pub(super) fn of(vectors: impl Iterator<Item = [f64; 2]>) -> Self {
+        let mut sum = Self::default();
+        vectors.for_each(|vector| sum.push(vector, 1.0));
+        sum
+    }
+
     pub(super) fn push(&mut self, vector: [f64; 2], weight: f64) {
         add(&mut self.vector, &vector);
         self.weight += weight;
