@@ -84,44 +84,34 @@ pub struct Range {
 }
 
 impl Range {
-    pub const SIZE: Self = Self::new(
-        "a whole number from 1 to 100000",
-        Included(1.0),
-        Included(1e5),
-    );
-    pub const HELD: Self = Self::new(
+    pub const SIZE: Self = Self::from_to("a whole number from 1 to 100000", 1.0, 1e5);
+    pub const HELD: Self = Self::from_to(
         "a whole number from 1 to 10000000: a job holds them in memory, 320 bytes each",
-        Included(1.0),
-        Included(1e7),
+        1.0,
+        1e7,
     );
-    pub const COUNT: Self = Self::new(
-        "a whole number from 1 to 2^53 - 1",
-        Included(1.0),
-        Excluded(TOO_LARGE),
-    );
-    pub const COUNT_OR_ZERO: Self = Self::new(
-        "a whole number from 0 to 2^53 - 1",
-        Included(0.0),
-        Excluded(TOO_LARGE),
-    );
+    pub const COUNT: Self = Self::below("a whole number from 1 to 2^53 - 1", 1.0, TOO_LARGE);
+    pub const COUNT_OR_ZERO: Self =
+        Self::below("a whole number from 0 to 2^53 - 1", 0.0, TOO_LARGE);
     pub const POSITIVE: Self = Self::new(
         "a finite number > 0",
         Excluded(0.0),
         Excluded(f64::INFINITY),
     );
-    pub const NOT_NEGATIVE: Self = Self::new(
-        "a finite number >= 0",
-        Included(0.0),
-        Excluded(f64::INFINITY),
-    );
+    pub const NOT_NEGATIVE: Self = Self::below("a finite number >= 0", 0.0, f64::INFINITY);
     pub const FLAG: Self = Self::new("true or false", Unbounded, Unbounded);
-    pub const TOLERANCE: Self = Self::new(
-        "a number from 1e-12 to 1e-2, relative to fs/k",
-        Included(1e-12),
-        Included(1e-2),
-    );
+    pub const TOLERANCE: Self =
+        Self::from_to("a number from 1e-12 to 1e-2, relative to fs/k", 1e-12, 1e-2);
     /// Of a field that is one of several words, which its type lists.
     pub const WORD: Self = Self::new("", Unbounded, Unbounded);
+
+    const fn from_to(words: &'static str, low: f64, high: f64) -> Self {
+        Self::new(words, Included(low), Included(high))
+    }
+
+    const fn below(words: &'static str, low: f64, end: f64) -> Self {
+        Self::new(words, Included(low), Excluded(end))
+    }
 
     const fn new(words: &'static str, low: Bound<f64>, high: Bound<f64>) -> Self {
         Self {

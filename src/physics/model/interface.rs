@@ -212,14 +212,13 @@ impl Interface {
 
     /// The initial attachment of every contact as events at time 0, in order.
     pub fn initial_attachments(&self) -> impl Iterator<Item = ContactEvent> {
-        (0..self.block_stiffness.len())
-            .flat_map(move |block| {
-                (0..self.contacts_per_block).map(move |contact| (block, contact))
-            })
-            .map(|(block, contact)| {
-                let what = self.change(block, contact, 0.0, 0.0, Change::Attach);
-                ContactEvent::new(what, (self.attached.count, 0.0), 0.0)
-            })
+        let contacts = 0..self.block_stiffness.len() * self.contacts_per_block;
+        contacts.map(|index| {
+            let block = index / self.contacts_per_block;
+            let contact = index % self.contacts_per_block;
+            let what = self.change(block, contact, 0.0, 0.0, Change::Attach);
+            ContactEvent::new(what, (self.attached.count, 0.0), 0.0)
+        })
     }
 
     /// Time of the next reattachment, in s; infinite when no contact is detached.

@@ -190,15 +190,13 @@ impl Profile {
 
 impl Observer for Profile {
     fn end(&mut self, time: f64, displacement: &[f64]) {
-        self.rows = (1..)
-            .zip(displacement)
-            .map(|(block, &displacement)| ProfileRow {
-                time,
-                block,
-                position: block as f64 * self.spacing,
-                displacement,
-            })
-            .collect();
+        let row = |(block, &displacement): (u64, &f64)| ProfileRow {
+            time,
+            block,
+            position: block as f64 * self.spacing,
+            displacement,
+        };
+        self.rows = (1..).zip(displacement).map(row).collect();
     }
 }
 
