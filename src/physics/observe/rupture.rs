@@ -83,7 +83,7 @@ impl Rupture {
             .fronts
             .iter()
             .map(|&(block, time)| (time, spacing * block.abs_diff(self.first_block) as f64));
-        advance_speed(points).filter(|_| self.extent() >= 3)
+        advance_speed(&points).filter(|_| self.extent() >= 3)
     }
 }
 
@@ -137,7 +137,7 @@ impl Criteria {
 }
 
 /// Slope of position against time by least squares; `None` unless it is positive and finite.
-pub(super) fn advance_speed(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<f64> {
+pub(super) fn advance_speed(points: &(impl Iterator<Item = (f64, f64)> + Clone)) -> Option<f64> {
     let count = points.clone().count() as f64;
     let sum = |of: &dyn Fn((f64, f64)) -> f64| points.clone().map(of).sum::<f64>();
     let mean_time = sum(&|(time, _)| time) / count;

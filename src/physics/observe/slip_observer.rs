@@ -299,7 +299,7 @@ impl SlipObserver {
             front_speed: rupture.front_speed(&self.parameters),
             precursors: self.pending.count,
             largest_precursor: self.pending.largest,
-            slow_front_speed: advance_speed(self.pending.advances.iter().copied()),
+            slow_front_speed: advance_speed(&self.pending.advances.iter().copied()),
             energies: energies.unwrap_or_default(),
             drops: Drops::default(),
         }
