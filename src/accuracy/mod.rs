@@ -57,7 +57,8 @@ impl SolverColumns {
 impl fmt::Display for SolverColumns {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let method = Method::from_word(&self.method).unwrap_or(Method::EventDriven);
-        let Description { key, unit, .. } = method.settings()[0].description();
+        let Description { key, column, .. } = method.settings()[0].description();
+        let unit = column.unit;
         let setting = format!("{}, {key} {:e} {unit}", self.name(), self.setting);
         f.write_str(setting.trim_end())
     }

@@ -39,36 +39,30 @@ pub struct Column {
     pub nullable: bool,
 }
 
-/// A field of a row type: one cell, several that belong together, or all the cells of another row.
-pub trait Part: Sized {
+/// A row, or a part of one: a single cell, or several that belong together.
+pub trait Row: Sized {
     /// The columns of a field that is described so; its type says of which kind they are. Rows describe their own.
     fn columns_as(described: Column) -> Vec<Column>;
 
-    fn give(&self, give: &mut dyn FnMut(Value<'_>));
-
-    /// Reads the cells of a field with this name.
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String>;
-}
-
-/// A type whose values are rows, or parts of rows.
-pub trait Row: Part {
-    /// Its columns, in order.
+    /// The columns of a row, in order.
     fn columns() -> Vec<Column> {
         Self::columns_as(Column::default())
     }
 
-    /// Gives the cells of a row, in the order of the columns.
-    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
-        self.give(give);
+    /// The names of these columns.
+    fn names() -> Vec<Cow<'static, str>> {
+        let columns = Self::columns().into_iter();
+        columns.map(|column| column.name).collect()
     }
 
-    /// The row with these cells, in the order of the columns.
-    fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
-        Self::take("", next)
-    }
+    /// Gives its cells, in the order of the columns.
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>));
+
+    /// Reads the cells of a field with this name, or those of a row, in the order of the columns.
+    fn from_cells<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String>;
 }
 
-impl<T: Field> Part for T {
+impl<T: Field> Row for T {
     fn columns_as(described: Column) -> Vec<Column> {
         vec![Column {
             kind: T::KIND,
@@ -77,18 +71,18 @@ impl<T: Field> Part for T {
         }]
     }
 
-    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
         give(self.value());
     }
 
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+    fn from_cells<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         let cell = next();
         T::from_value(cell).ok_or_else(|| format!("column {name} cannot hold {cell:?}"))
     }
 }
 
 /// A text of a row's own is no [`Field`]: its value does not outlive the row.
-impl Part for String {
+impl Row for String {
     fn columns_as(described: Column) -> Vec<Column> {
         vec![Column {
             kind: Kind::Text,
@@ -96,17 +90,17 @@ impl Part for String {
         }]
     }
 
-    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
         give(Value::Text(self));
     }
 
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
-        <Option<Self> as Part>::take(name, next)?
+    fn from_cells<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        <Option<Self> as Row>::from_cells(name, next)?
             .ok_or_else(|| format!("column {name} cannot hold {:?}", Value::Null))
     }
 }
 
-impl Part for Option<String> {
+impl Row for Option<String> {
     fn columns_as(described: Column) -> Vec<Column> {
         vec![Column {
             kind: Kind::Text,
@@ -115,11 +109,11 @@ impl Part for Option<String> {
         }]
     }
 
-    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
         give(self.as_deref().map_or(Value::Null, Value::Text));
     }
 
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+    fn from_cells<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         match next() {
             Value::Null => Ok(None),
             Value::Text(text) => Ok(Some(text.to_owned())),
@@ -136,7 +130,7 @@ pub struct Interval {
 }
 
 /// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
-impl Part for Option<Interval> {
+impl Row for Option<Interval> {
     fn columns_as(described: Column) -> Vec<Column> {
         let end = |end: &str, meaning| Column {
             name: format!("{}_{end}", described.name).into(),
@@ -147,12 +141,12 @@ impl Part for Option<Interval> {
         vec![end("low", described.meaning), end("high", "upper end")]
     }
 
-    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
         give(self.map(|interval| interval.low).value());
         give(self.map(|interval| interval.high).value());
     }
 
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+    fn from_cells<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         match (next(), next()) {
             (Value::Real(low), Value::Real(high)) => Ok(Some(Interval { low, high })),
             (Value::Null, Value::Null) => Ok(None),
@@ -186,9 +180,9 @@ macro_rules! columns {
             )*
         }
 
-        impl $crate::columns::Part for $row {
+        impl $crate::columns::Row for $row {
             fn columns_as(_: $crate::columns::Column) -> Vec<$crate::columns::Column> {
-                [$(<$type as $crate::columns::Part>::columns_as($crate::columns::Column {
+                [$(<$type as $crate::columns::Row>::columns_as($crate::columns::Column {
                     name: $crate::columns!(@name $field $($name)?).into(),
                     unit: $crate::columns!(@text $($unit)?),
                     meaning: $crate::columns!(@text $($meaning)?),
@@ -198,64 +192,58 @@ macro_rules! columns {
                 })),*].concat()
             }
 
-            fn give(&self, give: &mut dyn FnMut($crate::columns::Value<'_>)) {
-                $($crate::columns::Part::give(&self.$field, give);)*
+            fn cells(&self, give: &mut dyn FnMut($crate::columns::Value<'_>)) {
+                $($crate::columns::Row::cells(&self.$field, give);)*
             }
 
-            fn take<'a>(
+            fn from_cells<'a>(
                 _: &str,
                 next: &mut dyn FnMut() -> $crate::columns::Value<'a>,
             ) -> Result<Self, String> {
-                $(let $field = $crate::columns::Part::take(
+                $(let $field = $crate::columns::Row::from_cells(
                     $crate::columns!(@name $field $($name)?),
                     next,
                 )?;)*
                 Ok(Self { $($field),* })
             }
         }
-
-        impl $crate::columns::Row for $row {}
     };
 }
 pub use columns;
 
 /// Rows that many rows share need not be cloned to be written.
-impl<T: Row + Clone> Part for Cow<'_, T> {
+impl<T: Row + Clone> Row for Cow<'_, T> {
     fn columns_as(_: Column) -> Vec<Column> {
         T::columns()
     }
 
-    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
-        self.as_ref().give(give);
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
+        self.as_ref().cells(give);
     }
 
-    fn take<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
-        T::from_cells(next).map(Cow::Owned)
+    fn from_cells<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        T::from_cells("", next).map(Cow::Owned)
     }
 }
-
-impl<T: Row + Clone> Row for Cow<'_, T> {}
 
 /// Rows side by side are a row.
 macro_rules! side_by_side {
     ($($part:ident),*) => {
-        impl<$($part: Row),*> Part for ($($part,)*) {
+        impl<$($part: Row),*> Row for ($($part,)*) {
             fn columns_as(_: Column) -> Vec<Column> {
                 [$($part::columns()),*].concat()
             }
 
             #[allow(non_snake_case, reason = "a part is called as its type")]
-            fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+            fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
                 let ($($part,)*) = self;
-                $($part.give(give);)*
+                $($part.cells(give);)*
             }
 
-            fn take<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
-                Ok(($($part::from_cells(next)?,)*))
+            fn from_cells<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+                Ok(($($part::from_cells("", next)?,)*))
             }
         }
-
-        impl<$($part: Row),*> Row for ($($part,)*) {}
     };
 }
 

@@ -75,7 +75,8 @@ words! {
 }
 
 /// The value of a field. Of one kind, values that are no NaN have an order.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Serialize)]
+#[serde(untagged)]
 pub enum Value<'a> {
     /// A value that is not there, such as a period while the modulation is off.
     Null,
@@ -106,18 +107,6 @@ impl fmt::Display for Value<'_> {
             Self::Count(count) => write!(f, "{count}"),
             Self::Flag(flag) => write!(f, "{flag}"),
             Self::Text(text) => write!(f, "{text}"),
-        }
-    }
-}
-
-impl serde::Serialize for Value<'_> {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Null => serializer.serialize_none(),
-            Self::Real(real) => serializer.serialize_f64(*real),
-            Self::Count(count) => serializer.serialize_u64(*count),
-            Self::Flag(flag) => serializer.serialize_bool(*flag),
-            Self::Text(text) => serializer.serialize_str(text),
         }
     }
 }

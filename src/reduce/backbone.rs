@@ -128,7 +128,7 @@ impl Backbone {
     /// Adds a set. Left out are sets without modulation, which have no phase, with a ramp, which have no single η, and
     /// with a single slip, whose phase has no interval.
     pub(super) fn push(&mut self, set: &FinishedSet) {
-        if set.row.parameters.ramp_time > 0.0 || set.phases.mean.count() < 2 {
+        if set.row.parameters.ramp_time > 0.0 || set.phases.mean.count < 2 {
             return;
         }
         let Some(phase) = set.row.phase_mean else {
@@ -139,7 +139,7 @@ impl Backbone {
         let all = &set.phases.mean;
         let as_seen = |deviation| deviation;
         bin.phases
-            .push(all.count(), all.total, &set.seeds, &set.phases, as_seen);
+            .push(all.count, all.total, &set.seeds, &set.phases, as_seen);
         if set.row.has_phase {
             // The mean direction is off by the deviations across it, over the length of their sum.
             let [x, y] = unit(phase);
@@ -167,8 +167,8 @@ impl Backbone {
                 eta_high,
                 eta_centre,
                 sets: bin.sets,
-                phased_sets: means.count(),
-                slips: phases.count(),
+                phased_sets: means.count,
+                slips: phases.count,
                 phase_mean: phases.direction(top),
                 phase_mean_low: interval.map(|interval| interval.low),
                 phase_mean_high: interval.map(|interval| interval.high),

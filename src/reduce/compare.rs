@@ -5,103 +5,71 @@
 //! mean over these seeds, of what each adds to it: the jackknife to first order, in a time proportional to the number
 //! of slips.
 
-use super::gather::{Gathered, Gathering, MAX_SLIPS, by_parameters, each_job};
+use super::gather::{Gathered, Gathering, MAX_SLIPS, sets_of};
 use super::sequence::{Sequences, Sum, unit};
-use super::set::non_nan;
+use super::set::{SetJobs, non_nan};
 use super::values::Values;
 use crate::model::{Parameters, Symbol};
-use crate::results::tables::{JOBS, JobOutcome};
+use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
 use crate::sets::{FREQUENCY, SetRow};
 use crate::table::columns::{Interval, Kind};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 
-/// Sums of a job, whose means are the statistics.
-#[derive(Clone, Copy, Debug, Default)]
-struct JobSums {
-    interval: Sum,
-    friction: Sum,
-    phase: Sum,
-}
+/// What is compared: columns of the sets, each the mean of a sum.
+const STATISTICS: [&str; 3] = ["tau_mean", "mean_friction", "resultant_length"];
 
-type SumOf = fn(&JobSums) -> Sum;
-
-/// What is compared: columns of the sets, and their sums.
-const STATISTICS: [(&str, SumOf); 3] = [
-    ("tau_mean", |job| job.interval),
-    ("mean_friction", |job| job.friction),
-    ("resultant_length", |job| job.phase),
-];
-
-struct Set {
-    id: String,
-    parameters: Parameters,
-    /// Of the jobs that did not fail.
-    seeds: BTreeSet<u64>,
-}
-
-fn sets_of(results: &Results<'_>) -> Result<Vec<Set>, ResultsError> {
+/// The sets of a directory with a job that did not fail, controls left out.
+fn sets_in(results: &Results<'_>) -> Result<Vec<SetJobs>, ResultsError> {
     let plan = results.plan();
-    let mut sets: HashMap<String, Set> = HashMap::new();
-    let is_wanted = |parameters: &Parameters| !plan.is_control(parameters);
-    each_job(&results.dataset(JOBS)?, &is_wanted, |job, parameters| {
-        if job.facts.outcome == JobOutcome::Failed {
-            return;
-        }
-        let seed = parameters.seed;
-        let new = |id: &String| Set {
-            id: id.clone(),
-            parameters,
-            seeds: BTreeSet::new(),
-        };
-        let set = sets.entry(job.set_id).or_insert_with_key(new);
-        set.seeds.insert(seed);
-    })?;
-    let mut sets: Vec<Set> = sets.into_values().collect();
-    sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
+    let mut sets = sets_of(&results.dataset(JOBS)?, &|set| !plan.is_control(set))?;
+    sets.retain(|set| !set.finished.is_empty());
     Ok(sets)
 }
 
-fn varies(sets: &[Set], symbol: Symbol) -> bool {
+fn varies(sets: &[SetJobs], symbol: Symbol) -> bool {
     let values = || sets.iter().map(|set| set.parameters.get(symbol));
     symbol != Symbol::Seed && values().any(|value| Some(value) != values().next())
 }
 
 /// A set of A and one of B, with the seeds that both have, in order.
 struct Pair<'a> {
-    a: &'a Set,
-    b: &'a Set,
+    a: &'a SetJobs,
+    b: &'a SetJobs,
     seeds: Vec<u64>,
 }
 
-/// A set of some seeds: its row, and its jobs in the order of these.
+/// A set of some seeds: its row, and for each statistic the sums of its jobs in the order of these.
 struct Found {
     row: SetRow,
-    jobs: Vec<JobSums>,
+    sums: [Vec<Sum>; STATISTICS.len()],
 }
 
-impl JobSums {
-    fn of(set: &Gathered, seed: u64) -> Self {
-        let mut sums = Self::default();
-        if let Some(job) = set.jobs.averages.get(&seed) {
-            sums.friction.push([job.time * job.friction, 0.0], job.time);
-        }
-        for slip in set.slips.of_job(seed) {
-            if let Some(interval) = non_nan(slip.interval) {
-                sums.interval.push([interval, 0.0], 1.0);
+impl Found {
+    fn of(set: Gathered, seeds: &[u64]) -> Self {
+        let mut sums = [const { Vec::new() }; STATISTICS.len()];
+        for seed in seeds {
+            let slips = set.slips.of_job(*seed).iter();
+            let intervals = slips.clone().filter_map(|slip| non_nan(slip.interval));
+            let intervals = Sum::of(intervals.map(|interval| [interval, 0.0]));
+            let mut friction = Sum::default();
+            if let Some(job) = set.jobs.averages.get(seed) {
+                friction.push([job.time * job.friction, 0.0], job.time);
             }
-            if let Some(angle) = non_nan(slip.phase) {
-                sums.phase.push(unit(angle), 1.0);
+            let phases = slips.filter_map(|slip| non_nan(slip.phase));
+            let of_job = [intervals, friction, Sum::of(phases.map(unit))];
+            for (sums, sum) in sums.iter_mut().zip(of_job) {
+                sums.push(sum);
             }
         }
-        sums
+        let row = set.slips.finish(&set.jobs).row;
+        Self { row, sums }
     }
 }
 
-/// The interval of a difference B - A, less the difference itself.
-fn error(a: &Found, b: &Found, sum: SumOf) -> Option<Interval> {
-    let added = |found: &Found| Sum::added(&found.jobs.iter().map(sum).collect::<Vec<_>>());
-    let added = added(a).into_iter().zip(added(b));
+/// The interval of a difference B - A, less the difference itself, from the sums of jobs in A and in B.
+fn error(a: &[Sum], b: &[Sum]) -> Option<Interval> {
+    let added = Sum::added(a).into_iter().zip(Sum::added(b));
     let added = added.map(|(a, b)| [b - a]).collect();
     Sequences::independent(added).estimate().interval()
 }
@@ -118,27 +86,29 @@ fn found_in(
     let mut found = HashMap::new();
     Gathering::of_jobs(results, &is_wanted)?.each_set(MAX_SLIPS, u64::MAX, |set, _| {
         let id = set.jobs.set_id.clone();
-        let seeds = wanted[&*id].iter();
-        let jobs = seeds.map(|&seed| JobSums::of(&set, seed)).collect();
-        let row = set.slips.finish(&set.jobs).row;
-        found.insert(id, Found { row, jobs });
+        let seeds = wanted[&*id];
+        found.insert(id, Found::of(set, seeds));
         Ok(())
     })?;
     Ok(found)
 }
 
 /// Sets of A and B that agree in these parameters and have seeds in common.
-fn pairs<'a>(a: &'a [Set], b: &'a [Set], keys: &[Symbol]) -> Vec<Pair<'a>> {
-    let key = |set: &Set| {
+fn pairs<'a>(a: &'a [SetJobs], b: &'a [SetJobs], keys: &[Symbol]) -> Vec<Pair<'a>> {
+    let key = |set: &SetJobs| {
         let values = keys
             .iter()
             .map(|&symbol| set.parameters.get(symbol).to_string());
         values.collect::<Vec<_>>()
     };
-    let of_b: BTreeMap<Vec<String>, &Set> = b.iter().map(|set| (key(set), set)).collect();
-    let pair = |set: &'a Set| {
+    let of_b: BTreeMap<Vec<String>, &SetJobs> = b.iter().map(|set| (key(set), set)).collect();
+    let pair = |set: &'a SetJobs| {
         let other = of_b.get(&key(set)).copied()?;
-        let seeds: Vec<u64> = set.seeds.intersection(&other.seeds).copied().collect();
+        let seeds: Vec<u64> = set
+            .finished
+            .intersection(&other.finished)
+            .copied()
+            .collect();
         (!seeds.is_empty()).then_some(Pair {
             a: set,
             b: other,
@@ -151,26 +121,27 @@ fn pairs<'a>(a: &'a [Set], b: &'a [Set], keys: &[Symbol]) -> Vec<Pair<'a>> {
 /// Sets of two directories A and B that agree in all parameters that either varies: these parameters, the common seeds,
 /// and mean interval, mean friction and resultant length in A, in B, and their differences B - A with 95 % intervals.
 pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsError> {
-    let sets_of_a = sets_of(a)?;
-    let sets_of_b = sets_of(b)?;
+    let sets_of_a = sets_in(a)?;
+    let sets_of_b = sets_in(b)?;
     let is_varied = |key: &Symbol| varies(&sets_of_a, *key) || varies(&sets_of_b, *key);
     let keys: Vec<Symbol> = Symbol::ALL.into_iter().filter(is_varied).collect();
     let pairs = pairs(&sets_of_a, &sets_of_b, &keys);
-    let of_a = pairs.iter().map(|pair| (&*pair.a.id, &*pair.seeds));
+    let of_a = pairs.iter().map(|pair| (&*pair.a.set_id, &*pair.seeds));
     let found_in_a = found_in(a, &of_a.collect())?;
-    let of_b = pairs.iter().map(|pair| (&*pair.b.id, &*pair.seeds));
+    let of_b = pairs.iter().map(|pair| (&*pair.b.set_id, &*pair.seeds));
     let found_in_b = found_in(b, &of_b.collect())?;
 
     let seeds = pairs
         .iter()
         .map(|pair| (Some(pair.seeds.len() as f64), None));
     let mut found = vec![Values::computed("seeds", Kind::Count, seeds)];
-    for (name, sum) in STATISTICS {
-        let of_a = |pair: &Pair<'_>| found_in_a[&pair.a.id].row.number(name);
-        let of_b = |pair: &Pair<'_>| found_in_b[&pair.b.id].row.number(name);
+    for (statistic, name) in STATISTICS.into_iter().enumerate() {
+        let of_a = |pair: &Pair<'_>| found_in_a[&pair.a.set_id].row.number(name);
+        let of_b = |pair: &Pair<'_>| found_in_b[&pair.b.set_id].row.number(name);
         let difference = |pair: &Pair<'_>| {
             let whole = of_b(pair).zip(of_a(pair)).map(|(b, a)| b - a);
-            let errors = error(&found_in_a[&pair.a.id], &found_in_b[&pair.b.id], sum);
+            let sums_in_a = &found_in_a[&pair.a.set_id].sums[statistic];
+            let errors = error(sums_in_a, &found_in_b[&pair.b.set_id].sums[statistic]);
             let interval = whole.zip(errors);
             let interval = interval.map(|(whole, error)| (whole + error.low, whole + error.high));
             (whole, interval)
@@ -186,7 +157,9 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
         ]);
     }
     found.retain(|values| values.numbers.iter().any(Option::is_some));
-    let rows = pairs.iter().map(|pair| found_in_a[&pair.a.id].row.clone());
+    let rows = pairs
+        .iter()
+        .map(|pair| found_in_a[&pair.a.set_id].row.clone());
     let rows: Vec<SetRow> = rows.collect();
     let column = |symbol: &Symbol| match symbol {
         Symbol::T => FREQUENCY,

@@ -64,7 +64,7 @@ impl Estimate<1> {
     pub(super) fn interval_with(&self, unseen: Unseen) -> Option<Interval> {
         let [mean] = self.mean()?;
         let half = self.half()?;
-        let n = self.count() as f64;
+        let n = self.count as f64;
         let [skew] = self.rare.map(|rare| RARE * rare / n);
         let wide = skew.abs() + libm::hypot(half, skew);
         let error = |is_skewed: bool, unseen: f64| {
@@ -80,11 +80,11 @@ impl Estimate<1> {
     /// Standard deviation (n - 1) of the values whose squared deviations from their mean these are, and its interval;
     /// `None` for fewer than two values, and no interval for fewer than [`MIN_VALUES`].
     pub(super) fn deviation(&self, unseen: Unseen) -> (Option<f64>, Option<Interval>) {
-        let n = self.count() as f64;
+        let n = self.count as f64;
         let of_sample = |square: f64| (square.max(0.0) * n / (n - 1.0)).sqrt();
         let square = self.value().filter(|_| n > 1.0);
         let squares = self.interval_with(unseen);
-        let ends = squares.filter(|_| self.count() >= MIN_VALUES);
+        let ends = squares.filter(|_| self.count >= MIN_VALUES);
         let ends = ends.map(|squares| Interval {
             low: of_sample(squares.low),
             high: of_sample(squares.high),
@@ -96,7 +96,7 @@ impl Estimate<1> {
     /// exceeding it (Woodruff, J. Am. Stat. Assoc. 47, 635 (1952)).
     pub(super) fn shares_about_median(&self) -> Option<[f64; 2]> {
         // A value more or less is the least that a share can be off.
-        let half = self.half()?.max(1.0 / self.count() as f64);
+        let half = self.half()?.max(1.0 / self.count as f64);
         Some([0.5 - half, 0.5 + half])
     }
 }
@@ -148,7 +148,7 @@ impl Centred<2> {
     /// resultant longer. Long ones are the mean of the components along their direction.
     pub(super) fn length_interval(&self, unseen: f64) -> Option<Interval> {
         let mean = &self.mean;
-        if mean.count() < MIN_VALUES {
+        if mean.count < MIN_VALUES {
             return None;
         }
         let Polar {

@@ -13,16 +13,14 @@
 
 use super::confidence::student;
 use super::drive_alone::Explained;
-use super::gather::{Gathered, each_chosen};
-use crate::model::Parameters;
-use crate::model::Selected;
+use super::gather::{Gathered, of_chosen};
+use crate::model::{Parameters, Selected};
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, Digits, Statistic, label};
 use crate::sweep::{Refinement, Sweep};
 use crate::table::columns::{Interval, columns};
 use crate::table::tables;
-use crate::table::value::floored;
-use crate::table::value::words;
+use crate::table::value::{floored, words};
 use std::collections::BTreeMap;
 
 /// Groups of seeds, so that the cost of leaving them out is bounded.
@@ -482,11 +480,9 @@ pub fn sets_of_edges(
     results: &Results<'_>,
     refinement: &Refinement,
 ) -> Result<BTreeMap<u64, SetOfEdges>, ResultsError> {
-    let mut sets = BTreeMap::new();
-    each_chosen(results, |number, set, explained| {
-        drop(sets.insert(number, of_set(&set, explained, refinement)));
-    })?;
-    Ok(sets)
+    of_chosen(results, |set, explained| {
+        of_set(&set, explained, refinement)
+    })
 }
 
 fn of_set(set: &Gathered, explained: &Explained, refinement: &Refinement) -> SetOfEdges {
@@ -518,7 +514,7 @@ fn of_set(set: &Gathered, explained: &Explained, refinement: &Refinement) -> Set
     SetOfEdges {
         set_id: set.jobs.set_id.clone(),
         parameters: set.jobs.parameters.clone(),
-        seeds: set.jobs.finished + set.jobs.failed,
+        seeds: set.jobs.finished.len() as u64 + set.jobs.failed,
         samples: (0..refinement.by.len()).map(sample).collect(),
     }
 }

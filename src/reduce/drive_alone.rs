@@ -135,16 +135,10 @@ impl Beyond {
             let Some(passage) = passages.get(seed) else {
                 continue;
             };
-            let mut of_job = Sum::default();
-            for [from_x, from_y] in deviations {
-                of_job.push([from_x + x, from_y + y], 1.0);
-            }
-            let mut of_control = Sum::default();
-            for &vector in passage {
-                of_control.push(vector, 1.0);
-            }
-            of_jobs.push(of_job);
-            of_controls.push(of_control);
+            let of_job = deviations.iter();
+            let of_job = of_job.map(|[from_x, from_y]| [from_x + x, from_y + y]);
+            of_jobs.push(Sum::of(of_job));
+            of_controls.push(Sum::of(passage.iter().copied()));
         }
         if of_jobs.is_empty() {
             let alone = Sequences::of(passages.values().map(|job| job.iter().copied())).centred();

@@ -3,7 +3,7 @@
 //! Contract: a function of the wanted jobs and their rows alone. Sums over the jobs of a set are taken in the order of
 //! their seeds, in whatever files they lie, so that no digit depends on what was run earlier in the directory.
 //!
-//! Memory: 5 kB per set with its row and histogram, 40 bytes per job, 24 per slip of a control, 50 more for the jobs of
+//! Memory: 5 kB per set with its row and histogram, 50 bytes per job, 24 per slip of a control, 50 more for the jobs of
 //! [`MAX_SLIPS`] slips and 48 to 96 for each of these, and as much again for those of the set at hand; where the tables
 //! hold more, the slips are read again for the next sets.
 //!
@@ -11,8 +11,7 @@
 
 use super::drive_alone::{Controls, Explained};
 use super::set::{FinishedSet, JobFacts, SetJobs, SetSlips};
-use crate::model::{Parameters, Symbol, Value};
-use crate::model::{Selected, Selection as _};
+use crate::model::{Parameters, Selected, Selection as _, Symbol, Value};
 use crate::observe::Slip;
 use crate::results::tables::{All, JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
@@ -39,18 +38,15 @@ type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 
 /// The sets that the rounds of a directory have chosen, by their numbers, controls left out: of the chosen jobs alone.
 pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, ResultsError> {
-    let mut rows = BTreeMap::new();
-    each_chosen(results, |number, set, explained| {
-        drop(rows.insert(number, set.finish_with(explained).0.row));
-    })?;
-    Ok(rows)
+    of_chosen(results, |set, explained| set.finish_with(explained).0.row)
 }
 
-/// Hands on these sets before anything is computed, each with what the drive alone explains.
-pub(super) fn each_chosen(
+/// What a function makes of each of these sets, before anything is computed, and of what the drive alone explains.
+pub(super) fn of_chosen<T>(
     results: &Results<'_>,
-    mut gathered: impl FnMut(u64, Gathered, &Explained),
-) -> Result<(), ResultsError> {
+    of_set: impl Fn(Gathered, &Explained) -> T,
+) -> Result<BTreeMap<u64, T>, ResultsError> {
+    let mut found = BTreeMap::new();
     let sweep = results.sweep();
     let chosen = results.chosen();
     let is_chosen = |parameters: &Parameters| {
@@ -61,10 +57,11 @@ pub(super) fn each_chosen(
     Gathering::of_jobs(results, &is_chosen)?.each_set(MAX_SLIPS, u64::MAX, |set, explained| {
         let number = sweep.set_with(&set.jobs.parameters);
         if let Some(number) = number.filter(is_of_grid) {
-            gathered(number, set, explained);
+            found.insert(number, of_set(set, explained));
         }
         Ok(())
-    })
+    })?;
+    Ok(found)
 }
 
 /// The jobs of a directory, whose slips are still to be gathered.
@@ -86,20 +83,7 @@ impl<'a> Gathering<'a> {
         // Listed once: what other runs commit meanwhile is left out as a whole.
         let jobs = results.dataset(JOBS)?;
         let slips = results.committed_files(SLIPS, &jobs)?;
-        let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
-        each_job(&jobs, is_wanted, |job, parameters| {
-            let seed = parameters.seed;
-            let new = |set_id: &String| SetJobs {
-                set_id: set_id.clone(),
-                parameters,
-                ..SetJobs::default()
-            };
-            let set = sets.entry(job.set_id).or_insert_with_key(new);
-            set.push(seed, &job.facts);
-        })?;
-        let mut sets: Vec<SetJobs> = sets.into_values().collect();
-        // From a map: sets that agree in all parameters stay in the order of their ids.
-        sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
+        let sets = sets_of(&jobs, is_wanted)?;
         let controls = Controls::read(slips.clone(), plan, sets.iter().map(|set| &set.parameters))?;
         Ok(Self {
             sets,
@@ -165,6 +149,28 @@ impl<'a> Gathering<'a> {
     }
 }
 
+/// The sets of the wanted jobs, in the order of their parameters.
+pub(super) fn sets_of(
+    jobs: &Dataset<'_>,
+    is_wanted: Wanted<'_>,
+) -> Result<Vec<SetJobs>, ResultsError> {
+    let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
+    each_job(jobs, is_wanted, |job, parameters| {
+        let seed = parameters.seed;
+        let new = |set_id: &String| SetJobs {
+            set_id: set_id.clone(),
+            parameters,
+            ..SetJobs::default()
+        };
+        let set = sets.entry(job.set_id).or_insert_with_key(new);
+        set.push(seed, &job.facts);
+    })?;
+    let mut sets: Vec<SetJobs> = sets.into_values().collect();
+    // From a map: sets that agree in all parameters stay in the order of their ids.
+    sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
+    Ok(sets)
+}
+
 pub(super) fn each_job(
     files: &Dataset<'_>,
     is_wanted: Wanted<'_>,
@@ -181,7 +187,7 @@ pub(super) fn each_job(
 }
 
 /// The order of sets in every table.
-pub(super) fn by_parameters(left: &Parameters, right: &Parameters) -> Ordering {
+fn by_parameters(left: &Parameters, right: &Parameters) -> Ordering {
     let order = |&symbol: &Symbol| {
         let values = (left.get(symbol), right.get(symbol));
         match values {

@@ -92,7 +92,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let slips = all_jobs.iter().map(|set| set.slips);
     let total = slips.fold(0, u64::saturating_add);
     let mut summary = ReductionSummary {
-        jobs: all_jobs.iter().map(|set| set.finished).sum(),
+        jobs: all_jobs.iter().map(|set| set.finished.len() as u64).sum(),
         failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
         ..ReductionSummary::default()
     };
@@ -213,10 +213,7 @@ impl<'a> RoundsOfSets<'a> {
     fn left_out(&self) -> Vec<Cow<'static, str>> {
         match self.sweep.rounds() {
             Some(_) => Vec::new(),
-            None => RoundOfSet::columns()
-                .into_iter()
-                .map(|column| column.name)
-                .collect(),
+            None => RoundOfSet::names(),
         }
     }
 
@@ -370,15 +367,12 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
 
 /// Whether something failed because writing is not permitted.
 fn is_read_only(error: &anyhow::Error) -> bool {
+    use io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
     let of_storage = error.downcast_ref().map(StorageError::kind);
     let of_results = error.downcast_ref().map(|error: &ResultsError| error.kind);
-    let kind = of_storage.map(ErrorKind::Disk).or(of_results);
-    let Some(ErrorKind::Disk(kind)) = kind else {
-        return false;
-    };
     matches!(
-        kind,
-        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
+        of_storage.map(ErrorKind::Disk).or(of_results),
+        Some(ErrorKind::Disk(PermissionDenied | ReadOnlyFilesystem))
     )
 }
 

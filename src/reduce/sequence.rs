@@ -151,7 +151,7 @@ fn rare<const D: usize>(deviations: &[[f64; D]]) -> [f64; D] {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate<const D: usize> {
-    count: u64,
+    pub(super) count: u64,
     pub(super) total: [f64; D],
     /// Of the sum.
     covariance: [[f64; D]; D],
@@ -190,10 +190,6 @@ impl<const D: usize> Estimate<D> {
             freedom,
             rare: [0.0; D],
         }
-    }
-
-    pub(super) const fn count(&self) -> u64 {
-        self.count
     }
 
     /// Their mean; `None` without values.
@@ -258,6 +254,13 @@ pub(super) struct Sum {
 }
 
 impl Sum {
+    /// Of vectors of weight 1.
+    pub(super) fn of(vectors: impl Iterator<Item = [f64; 2]>) -> Self {
+        let mut sum = Self::default();
+        vectors.for_each(|vector| sum.push(vector, 1.0));
+        sum
+    }
+
     pub(super) fn push(&mut self, vector: [f64; 2], weight: f64) {
         add(&mut self.vector, &vector);
         self.weight += weight;

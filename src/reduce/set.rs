@@ -1,17 +1,16 @@
 //! The table of sets, a row for each with all seeds together: what the jobs table says (outcomes, averages over the
 //! time of each job), and from the slips, statistics of intervals, locking and phases.
 
-use super::confidence::{OF_INTERVALS, OF_PHASES, Tongue};
+use super::confidence::{OF_INTERVALS, OF_PHASES, Tongue, Unseen};
 use super::sequence::{Centred, Estimate, Sequences, at_rank, unit};
 use super::top_of_phases;
-use crate::model::Parameters;
-use crate::model::Selected;
+use crate::model::{Parameters, Selected};
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
 use crate::sets::SetRow;
 use crate::table::columns::{Interval, columns};
 use crate::table::value::floored;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
 
 /// Width from which an interval of a mean phase counts as the whole turn, in rad: others are half a turn wide at most.
@@ -116,9 +115,7 @@ impl SetSlips {
 fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) {
     let drops = estimate(jobs, |slip| Some([slip.drop]));
     // A longer interval ends at a force that is higher by the additional drop.
-    let unseen = tongue
-        .map(|tongue| tongue.of_mean(&drops))
-        .unwrap_or_default();
+    let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_mean(&drops));
     row.drop_mean = drops.value();
     row.drop_interval = drops.interval_with(unseen);
     let peak_forces = estimate(jobs, |slip| Some([slip.peak_force]));
@@ -126,9 +123,7 @@ fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongu
     row.peak_force_interval = peak_forces.interval_with(unseen);
     let square = drops.square_of_deviation();
     let squares = estimate(jobs, |slip| Some([square(slip.drop)]));
-    let unseen = tongue
-        .map(|tongue| tongue.of_squares(&drops))
-        .unwrap_or_default();
+    let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&drops));
     (row.drop_deviation, row.drop_deviation_interval) = squares.deviation(unseen);
 }
 
@@ -267,16 +262,12 @@ impl<'a> Intervals<'a> {
     fn describe(&self, row: &mut SetRow, cut: u64, tongue: Option<Tongue>) {
         row.intervals = self.sorted.len() as u64;
         let mean = self.estimate(|interval| [interval]);
-        let unseen = tongue
-            .map(|tongue| tongue.of_mean(&mean))
-            .unwrap_or_default();
+        let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_mean(&mean));
         row.tau_mean = mean.value();
         row.tau_interval = mean.interval_with(unseen);
         let square = mean.square_of_deviation();
         let squares = self.estimate(|interval| [square(interval)]);
-        let unseen = tongue
-            .map(|tongue| tongue.of_squares(&mean))
-            .unwrap_or_default();
+        let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&mean));
         (row.tau_deviation, row.tau_deviation_interval) = squares.deviation(unseen);
         if !self.running.is_empty() {
             let waited = self.running.iter().map(|(_, interval)| interval);
@@ -345,8 +336,8 @@ pub(super) struct SetJobs {
     pub set_id: String,
     /// Its parameters; the seed is that of any of its jobs.
     pub parameters: Parameters,
-    /// Jobs that were run to an end.
-    pub finished: u64,
+    /// Seeds of the jobs that were run to an end.
+    pub finished: BTreeSet<u64>,
     pub failed: u64,
     /// Slips that the jobs recorded.
     pub slips: u64,
@@ -378,7 +369,7 @@ impl SetJobs {
             self.failed += 1;
             return;
         }
-        self.finished += 1;
+        self.finished.insert(seed);
         self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
         self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
         self.cut += u64::from(job.outcome == JobOutcome::TimeLimit);
@@ -405,7 +396,7 @@ impl SetJobs {
             parameters: Selected::new(self.parameters.clone()),
             frequency: self.parameters.frequency(),
             eta: self.parameters.eta(),
-            finished_jobs: self.finished,
+            finished_jobs: self.finished.len() as u64,
             failed_jobs: self.failed,
             jobs_without_slips: self.without_slips,
             jobs_cut: Some(self.cut),
@@ -455,7 +446,7 @@ pub(super) mod tests {
         SetJobs {
             set_id: format!("{amplitude:e} {period}"),
             parameters,
-            finished: 1,
+            finished: [0].into(),
             ..SetJobs::default()
         }
     }

@@ -5,8 +5,7 @@ mod label;
 
 pub use label::{Digits, Label, label, power_of_ten, symbol_of, with_decimals};
 
-use crate::model::Symbol;
-use crate::model::{Selected, Selection};
+use crate::model::{Selected, Selection, Symbol};
 use crate::observe::Regime;
 use crate::table::columns::{Column, Interval, Kind, Row, columns};
 use crate::table::tables;

@@ -10,6 +10,7 @@
 //! a shorter one. Logarithms and exponentials come from `libm`: the same bits on every machine.
 
 use super::quantity::{Point, Quantity};
+use crate::model::theory::to_twelve_digits;
 use crate::model::{Parameters, Symbol, Value};
 use std::cmp::Ordering;
 
@@ -26,11 +27,10 @@ pub(super) struct Column {
 /// An axis of a sweep. Has at least one row.
 #[derive(Clone, Debug)]
 pub(super) enum Axis {
-    /// The whole numbers from `first` on.
+    /// Whole numbers, one after the other.
     Counted {
         symbol: Symbol,
-        first: u64,
-        count: u64,
+        values: std::ops::Range<u64>,
     },
     Table(Table),
 }
@@ -95,15 +95,16 @@ impl Axis {
 
     pub fn len(&self) -> u64 {
         match self {
-            Self::Counted { count, .. } => *count,
+            Self::Counted { values, .. } => values.end - values.start,
             Self::Table(table) => table.sorted.len() as u64,
         }
     }
 
     pub fn apply(&self, row: u64, point: &mut Point) {
         match self {
-            Self::Counted { symbol, first, .. } => {
-                point.set(Quantity::Parameter(*symbol), Value::Count(first + row));
+            Self::Counted { symbol, values } => {
+                let value = Value::Count(values.start + row);
+                point.set(Quantity::Parameter(*symbol), value);
             }
             Self::Table(table) => {
                 for column in &table.columns {
@@ -131,45 +132,33 @@ impl Axis {
         Some(&column.values)
     }
 
-    /// The seeds of the rows that can lead to these parameters but for the seed; `None` if it does not move the seed.
-    pub fn seeds<'a>(
-        &'a self,
-        wanted: &'a Parameters,
-    ) -> Option<Box<dyn Iterator<Item = u64> + 'a>> {
+    /// The first seeds, `most` at most, of the rows that can lead to these parameters but for the seed; `None` if it
+    /// does not move the seed.
+    pub fn seeds(&self, wanted: &Parameters, most: usize) -> Option<Vec<u64>> {
         let table = match self {
-            Self::Counted {
-                symbol,
-                first,
-                count,
-            } => {
-                let seeds = *first..first + count;
-                return (*symbol == Symbol::Seed)
-                    .then(|| Box::new(seeds) as Box<dyn Iterator<Item = u64>>);
+            Self::Counted { symbol, values } => {
+                return (*symbol == Symbol::Seed).then(|| values.clone().take(most).collect());
             }
             Self::Table(table) => table,
         };
         let seeds = table.columns.iter().find(|column| column.is_seed())?;
-        let order = move |row: &u32| table.compare_but_seed(*row, wanted);
+        let order = |row: &u32| table.compare_but_seed(*row, wanted);
         let begin = table.sorted.partition_point(|row| order(row).is_lt());
         let found = table.sorted[begin..].iter();
-        let found = found.take_while(move |row| order(row).is_eq());
+        let found = found.take_while(|row| order(row).is_eq());
         let seed = |row: &u32| match seeds.values[*row as usize] {
             Value::Count(seed) => Some(seed),
             _ => None,
         };
-        Some(Box::new(found.filter_map(seed)))
+        Some(found.filter_map(seed).take(most).collect())
     }
 
     /// The only row that can lead to these parameters; without modulation the first of those that differ in the period
     /// alone.
     pub fn find(&self, wanted: &Parameters) -> Option<u64> {
         match self {
-            Self::Counted {
-                symbol,
-                first,
-                count,
-            } => match wanted.get(*symbol) {
-                Value::Count(value) => value.checked_sub(*first).filter(|row| row < count),
+            Self::Counted { symbol, values } => match wanted.get(*symbol) {
+                Value::Count(value) if values.contains(&value) => Some(value - values.start),
                 _ => None,
             },
             Self::Table(table) => {
@@ -251,9 +240,6 @@ const fn index(row: u64) -> usize {
 
 /// Length of the Sobol sequence.
 pub(super) const MAX_SAMPLE: u64 = 1 << 16;
-/// Significant digits of a value between the ends of a range: 1e-4 as people write it, not what a logarithm makes of
-/// it.
-const DIGITS: usize = 12;
 
 /// A range of a quantity, low < high.
 #[derive(Clone, Copy, Debug)]
@@ -267,7 +253,8 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// The value at a fraction of the way, 0 to 1, rounded; the ends are exact.
+    /// The value at a fraction of the way, 0 to 1, rounded: 1e-4 as people write it, not what a logarithm makes of it.
+    /// The ends are exact.
     pub fn at(&self, fraction: f64) -> f64 {
         if fraction <= 0.0 {
             return self.low;
@@ -286,7 +273,7 @@ impl Range {
         let rounded = if self.whole {
             value.round()
         } else {
-            significant(value)
+            to_twelve_digits(value)
         };
         rounded.clamp(self.low, self.high)
     }
@@ -296,11 +283,6 @@ impl Range {
         let last = (points - 1) as f64;
         (0..points).map(move |point| self.at(point as f64 / last))
     }
-}
-
-/// The double that is nearest to a value in [`DIGITS`].
-fn significant(value: f64) -> f64 {
-    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }
 
 /// The coordinates of the first Sobol points in one dimension, each in [0, 1).

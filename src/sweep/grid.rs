@@ -137,13 +137,14 @@ impl Sweep {
     pub(super) fn find_set_in_grid(&self, parameters: &Parameters) -> Option<u64> {
         // Where no condition reads the seed, all seeds are jobs or none is.
         let tried = if self.reads_seed() { usize::MAX } else { 1 };
-        let seeds = self.axes.iter().find_map(|axis| axis.seeds(parameters));
-        let seeds = seeds.unwrap_or_else(|| Box::new(std::iter::once(self.base.seed)));
+        let mut axes = self.axes.iter();
+        let seeds = axes.find_map(|axis| axis.seeds(parameters, tried));
+        let seeds = seeds.unwrap_or_else(|| vec![self.base.seed]);
         let with_seed = |seed| Parameters {
             seed,
             ..parameters.clone()
         };
-        let mut jobs = seeds.take(tried).map(with_seed);
+        let mut jobs = seeds.into_iter().map(with_seed);
         jobs.find_map(|job| self.find_in_grid(&job))
     }
 

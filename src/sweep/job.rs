@@ -4,8 +4,7 @@
 //! recording and parameters that is not at its default, parameters with their exact bits: never over the place in a
 //! grid. So keys that are added later change no id. Contract: pinned by known-answer tests, and so are the defaults.
 
-use crate::model::Selection;
-use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Symbol, Value};
+use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Selection, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::sets::AllButSeed;
 use crate::solver::{Solver, SolverKey};

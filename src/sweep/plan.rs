@@ -248,11 +248,8 @@ impl<'a> Plan<'a> {
     pub fn totals(self) -> Totals {
         self.parts().fold(Totals::default(), |totals, part| {
             let recording = self.extensions[part.name.extension].sweep.recording();
-            let jobs = part.jobs.iter();
-            let intervals = jobs.map(|job| typical_interval(&job.parameters));
-            let slips: f64 = intervals
-                .map(|interval| recording.expected_slips(interval))
-                .sum();
+            let slips = |job: &Job| recording.expected_slips(typical_interval(&job.parameters));
+            let slips: f64 = part.jobs.iter().map(slips).sum();
             let memory_of_slips = MEMORY_OF_A_SLIP * slips;
             Totals {
                 jobs: totals.jobs + part.job_count as u64,

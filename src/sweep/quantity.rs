@@ -108,7 +108,7 @@ impl Quantity {
 }
 
 /// A point of a sweep: parameters under construction, and η or the frequency where it fixes their period.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Point {
     pub parameters: Parameters,
     pub fixes_period: Option<(Quantity, f64)>,

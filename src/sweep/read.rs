@@ -10,7 +10,7 @@ use super::expression::Expression;
 use super::grid::Sweep;
 use super::job::Identity;
 use super::plan::PLAN_VERSION;
-use super::quantity::Quantity;
+use super::quantity::{Point, Quantity};
 use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{Goal, Rounds};
@@ -32,10 +32,8 @@ impl Sweep {
             source: error.source,
         })?;
         let text = String::from_utf8(bytes);
-        Self::parse(
-            &text.map_err(|_| SweepError::NotUtf8(path.to_owned()))?,
-            path,
-        )
+        let text = text.map_err(|_| SweepError::NotUtf8(path.to_owned()))?;
+        Self::parse(&text, path)
     }
 
     /// Reads the text of a sweep file; the path is for messages only.
@@ -199,27 +197,19 @@ fn read_model(
     places: &mut Places<'_>,
 ) -> Result<(Parameters, Option<Axis>), Refused> {
     let keys: Vec<&str> = Quantity::all().map(Quantity::key).collect();
-    let mut parameters = Parameters::default();
-    let mut period = None;
+    let mut given = Point::default();
     all(model.entries().iter().map(|entry| {
         let quantity =
             Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
         places.set(quantity, entry.at, model.title);
-        let value = read_axes::read_value(entry, quantity)?;
-        match quantity {
-            Quantity::Parameter(symbol) => {
-                parameters
-                    .put(symbol, value)
-                    .ok_or_else(|| entry.must_be(&symbol.description().allowed()))?;
-            }
-            Quantity::Eta | Quantity::Frequency => {
-                let values = vec![value];
-                period = Axis::table(vec![Column { quantity, values }]).ok();
-            }
-        }
+        given.set(quantity, read_axes::read_value(entry, quantity)?);
         Ok(())
     }))?;
-    Ok((parameters, period))
+    let period = given.fixes_period.and_then(|(quantity, value)| {
+        let values = vec![Value::Real(value)];
+        Axis::table(vec![Column { quantity, values }]).ok()
+    });
+    Ok((given.parameters, period))
 }
 
 /// Reads the conditions; `rounds` is the section that chooses the seeds, if there is one.

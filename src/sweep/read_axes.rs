@@ -65,14 +65,8 @@ fn known(
 
 fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
     let quantity = known(entry, "[axes]", &["zip", "sobol"], places)?;
-    if let (Some((first, count)), Quantity::Parameter(symbol)) =
-        (read_count(entry, quantity)?, quantity)
-    {
-        return Ok(Axis::Counted {
-            symbol,
-            first,
-            count,
-        });
+    if let (Some(values), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
+        return Ok(Axis::Counted { symbol, values });
     }
     let values = read_values(entry, quantity)?;
     let column = Column {
@@ -105,14 +99,14 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
         let read = |value: &Entry<'_>| Ok((read_value(value, quantity)?, value.at));
         return list.iter().map(read).collect();
     }
-    if let Some((first, count)) = read_count(entry, quantity)? {
-        if count > MAX_ROWS {
+    if let Some(values) = read_count(entry, quantity)? {
+        if values.end - values.start > MAX_ROWS {
             let key = quantity.key();
             return Err(entry.refuse(format!(
                 "a zip has at most {MAX_ROWS} rows; make {key} a separate axis"
             )));
         }
-        let values = (first..first + count).map(Value::Count);
+        let values = values.map(Value::Count);
         return Ok(values.map(|value| (value, entry.at)).collect());
     }
     let (range, points) = read_spaced(entry, quantity)?;
@@ -144,8 +138,11 @@ pub(super) fn spaced(range: &Range, points: u64, quantity: Quantity) -> Option<A
     Axis::table(vec![Column { quantity, values }]).ok()
 }
 
-/// Reads the first of counted values and their number; `None` if the entry has another form.
-fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)>, Refused> {
+/// Reads counted values; `None` if the entry has another form.
+fn read_count(
+    entry: &Entry<'_>,
+    quantity: Quantity,
+) -> Result<Option<std::ops::Range<u64>>, Refused> {
     let Some(table) = entry.section("an axis") else {
         return Ok(None);
     };
@@ -173,7 +170,7 @@ fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)
             return Err(entry.source.refuse(entry.at, problem));
         }
     }
-    Ok(Some((first, count)))
+    Ok(Some(first..first + count))
 }
 
 /// Reads one value of a quantity, as a list or `[model]` gives it.

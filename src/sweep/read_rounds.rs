@@ -66,8 +66,7 @@ pub(super) fn read_seeds(
     if let Ok(axes) = axes {
         axes.push(Axis::Counted {
             symbol: Symbol::Seed,
-            first,
-            count: max,
+            values: first..first + max,
         });
     }
     Ok(Rounds {

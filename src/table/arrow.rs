@@ -240,7 +240,7 @@ pub fn rows<R: Row>(batch: &RecordBatch) -> Result<Vec<R>, String> {
     let arrays = arrays.collect::<Result<Vec<Option<&ArrayRef>>, String>>()?;
     let row = |row: usize| {
         let mut columns = arrays.iter().copied();
-        R::from_cells(&mut || {
+        R::from_cells("", &mut || {
             let column = columns.next().flatten();
             column.map_or(Value::Null, |array| cell(array, row))
         })

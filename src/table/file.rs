@@ -306,8 +306,7 @@ impl<'a> Dataset<'a> {
 
     /// The same, as rows of one type.
     pub fn rows<R: Row>(self) -> impl Iterator<Item = Result<Vec<R>, ResultsError>> + use<'a, R> {
-        self.read(R::columns().into_iter().map(|column| column.name).collect())
-            .map(|batch| batch?.rows_of())
+        self.read(R::names()).map(|batch| batch?.rows_of())
     }
 
     /// The same, of the columns with these names alone, of which there is at least one; in the order of the file.

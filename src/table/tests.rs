@@ -83,7 +83,7 @@ fn a_column_has_its_name_unit_meaning_and_kind() {
 
 #[test]
 fn a_cell_that_a_column_cannot_hold_is_named() {
-    let error = Reading::from_cells(&mut || Value::Null).unwrap_err();
+    let error = Reading::from_cells("", &mut || Value::Null).unwrap_err();
     assert!(error.contains("column force cannot hold Null"), "{error}");
     let period = |value: f64| {
         let mut cells = [
@@ -92,7 +92,7 @@ fn a_cell_that_a_column_cannot_hold_is_named() {
             Value::Text("magnitude"),
         ]
         .into_iter();
-        Selected::<PeriodAndRule>::from_cells(&mut || cells.next().unwrap())
+        Selected::<PeriodAndRule>::from_cells("", &mut || cells.next().unwrap())
     };
     assert!(period(-1.0).unwrap_err().contains("T = -1"));
 }

@@ -27,7 +27,7 @@ const REDRAW_STRIDE: u128 = 1 << 40;
 const UNIFORM_STEP: f64 = 1.0 / 9_007_199_254_740_992.0;
 
 /// One life of a contact, as drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact {
     /// Threshold `f_i`, in N.
     pub threshold: f64,

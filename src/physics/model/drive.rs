@@ -65,10 +65,6 @@ impl Ramp {
         let between = |[start, turning]: [f64; 2]| (1.0 - fraction) * start + fraction * turning;
         (between(self.period), between(self.amplitude))
     }
-
-    fn is_over(&self, time: f64) -> bool {
-        time >= 2.0 * self.time
-    }
 }
 
 impl Drive {
@@ -101,7 +97,7 @@ impl Drive {
         self.angular_frequency = TAU / self.period;
         self.eta = eta(self.angular_frequency, self.amplitude, self.velocity);
         self.cycle_start = start;
-        self.cycle_end = if ramp.is_over(start) {
+        self.cycle_end = if start >= 2.0 * ramp.time {
             f64::INFINITY
         } else {
             start + self.period

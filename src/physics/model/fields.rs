@@ -30,46 +30,32 @@
 //! [`Parameters`](super::Parameters), in `parameters.rs`.
 
 use crate::columns::Column;
-use crate::value::Kind;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
+use std::ops::Deref;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Description {
-    /// Key in files, flags and tables.
+    /// The name of the column.
     pub key: &'static str,
-    /// Symbol in the paper; empty if it has none.
-    pub symbol: &'static str,
-    /// What axes of figures call it; empty if the meaning begins so.
-    pub words: &'static str,
-    /// SI unit; empty for a pure number, a flag or a word.
-    pub unit: &'static str,
-    /// One line, without a full stop.
-    pub meaning: &'static str,
+    /// The field as a column of a table.
+    pub column: Column,
     /// The values that the field can take by itself.
     pub range: Range,
     /// What else must hold, beside other fields; empty for nothing.
     pub rule: &'static str,
-    pub kind: Kind,
-    /// Whether it may be missing.
-    pub nullable: bool,
     /// The words that it can be, if it is one.
     pub choices: &'static [&'static str],
 }
 
-impl Description {
-    /// The field as a column of a table.
-    pub fn column(&self) -> Column {
-        Column {
-            name: self.key.into(),
-            unit: self.unit,
-            meaning: self.meaning,
-            symbol: self.symbol,
-            words: self.words,
-            kind: self.kind,
-            nullable: self.nullable,
-        }
-    }
+impl Deref for Description {
+    type Target = Column;
 
+    fn deref(&self) -> &Column {
+        &self.column
+    }
+}
+
+impl Description {
     /// The values that the field can take by itself, with their unit.
     pub fn allowed(&self) -> String {
         let words = self.range.words;
@@ -98,44 +84,34 @@ pub struct Range {
 }
 
 impl Range {
-    pub const SIZE: Self = Self::new(
-        "a whole number from 1 to 100000",
-        Included(1.0),
-        Included(1e5),
-    );
-    pub const HELD: Self = Self::new(
+    pub const SIZE: Self = Self::from_to("a whole number from 1 to 100000", 1.0, 1e5);
+    pub const HELD: Self = Self::from_to(
         "a whole number from 1 to 10000000: a job holds them in memory, 320 bytes each",
-        Included(1.0),
-        Included(1e7),
+        1.0,
+        1e7,
     );
-    pub const COUNT: Self = Self::new(
-        "a whole number from 1 to 2^53 - 1",
-        Included(1.0),
-        Excluded(TOO_LARGE),
-    );
-    pub const COUNT_OR_ZERO: Self = Self::new(
-        "a whole number from 0 to 2^53 - 1",
-        Included(0.0),
-        Excluded(TOO_LARGE),
-    );
+    pub const COUNT: Self = Self::below("a whole number from 1 to 2^53 - 1", 1.0, TOO_LARGE);
+    pub const COUNT_OR_ZERO: Self =
+        Self::below("a whole number from 0 to 2^53 - 1", 0.0, TOO_LARGE);
     pub const POSITIVE: Self = Self::new(
         "a finite number > 0",
         Excluded(0.0),
         Excluded(f64::INFINITY),
     );
-    pub const NOT_NEGATIVE: Self = Self::new(
-        "a finite number >= 0",
-        Included(0.0),
-        Excluded(f64::INFINITY),
-    );
+    pub const NOT_NEGATIVE: Self = Self::below("a finite number >= 0", 0.0, f64::INFINITY);
     pub const FLAG: Self = Self::new("true or false", Unbounded, Unbounded);
-    pub const TOLERANCE: Self = Self::new(
-        "a number from 1e-12 to 1e-2, relative to fs/k",
-        Included(1e-12),
-        Included(1e-2),
-    );
+    pub const TOLERANCE: Self =
+        Self::from_to("a number from 1e-12 to 1e-2, relative to fs/k", 1e-12, 1e-2);
     /// Of a field that is one of several words, which its type lists.
     pub const WORD: Self = Self::new("", Unbounded, Unbounded);
+
+    const fn from_to(words: &'static str, low: f64, high: f64) -> Self {
+        Self::new(words, Included(low), Included(high))
+    }
+
+    const fn below(words: &'static str, low: f64, end: f64) -> Self {
+        Self::new(words, Included(low), Excluded(end))
+    }
 
     const fn new(words: &'static str, low: Bound<f64>, high: Bound<f64>) -> Self {
         Self {
@@ -179,19 +155,21 @@ macro_rules! fields {
         }
 
         impl $Key {
-            /// Key, unit, meaning and range.
             pub const fn description(self) -> $crate::model::Description {
                 match self {$(
                     Self::$variant => $crate::model::Description {
                         key: $key,
-                        symbol: concat!($($symbol)?),
-                        words: concat!($($($words)?)?),
-                        unit: $unit,
-                        meaning: $meaning,
+                        column: $crate::columns::Column {
+                            name: std::borrow::Cow::Borrowed($key),
+                            unit: $unit,
+                            meaning: $meaning,
+                            symbol: concat!($($symbol)?),
+                            words: concat!($($($words)?)?),
+                            kind: <$type as $crate::value::Field>::KIND,
+                            nullable: <$type as $crate::value::Field>::NULLABLE,
+                        },
                         range: $crate::model::fields::Range::$range,
                         rule: concat!($($rule)?),
-                        kind: <$type as $crate::value::Field>::KIND,
-                        nullable: <$type as $crate::value::Field>::NULLABLE,
                         choices: <$type as $crate::value::Field>::WORDS,
                     },
                 )+}

@@ -127,7 +127,7 @@ struct ContactRow {
 }
 
 /// The lives of eight contacts, apart from their rows: of these all are read at every break, of lives one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Lives {
     /// The present life, or, while detached, the next.
     life: [Contact; LANES],
@@ -176,23 +176,13 @@ impl Interface {
             upper: Row::filled(f64::INFINITY),
             lower: Row::filled(f64::NEG_INFINITY),
         };
-        let none = Contact {
-            threshold: 0.0,
-            stiffness: 0.0,
-            reach: 0.0,
-            delay: 0.0,
-        };
-        let unborn = Lives {
-            life: [none; LANES],
-            generation: [0; LANES],
-        };
         let mut interface = Self {
             contacts_per_block: parameters.contacts_per_block,
             rows_per_block,
             break_on: parameters.break_on,
             disorder: Disorder::new(parameters),
             rows: vec![detached; blocks * rows_per_block],
-            lives: vec![unborn; blocks * rows_per_block],
+            lives: vec![Lives::default(); blocks * rows_per_block],
             reattachments: Reattachments::new(
                 blocks,
                 parameters.contacts_per_block,
@@ -222,14 +212,13 @@ impl Interface {
 
     /// The initial attachment of every contact as events at time 0, in order.
     pub fn initial_attachments(&self) -> impl Iterator<Item = ContactEvent> {
-        (0..self.block_stiffness.len())
-            .flat_map(move |block| {
-                (0..self.contacts_per_block).map(move |contact| (block, contact))
-            })
-            .map(|(block, contact)| {
-                let what = self.change(block, contact, 0.0, 0.0, Change::Attach);
-                ContactEvent::new(what, (self.attached.count, 0.0), 0.0)
-            })
+        let contacts = 0..self.block_stiffness.len() * self.contacts_per_block;
+        contacts.map(|index| {
+            let block = index / self.contacts_per_block;
+            let contact = index % self.contacts_per_block;
+            let what = self.change(block, contact, 0.0, 0.0, Change::Attach);
+            ContactEvent::new(what, (self.attached.count, 0.0), 0.0)
+        })
     }
 
     /// Time of the next reattachment, in s; infinite when no contact is detached.

@@ -5,7 +5,7 @@
 
 use super::fields::fields;
 use super::theory::{eta, to_twelve_digits, typical_interval};
-use crate::columns::{Column, Part, Row};
+use crate::columns::{Column, Row};
 use crate::value::{Value, words};
 use std::f64::consts::TAU;
 use std::marker::PhantomData;
@@ -120,11 +120,9 @@ impl Parameters {
     pub fn check_rules(&self) -> Result<(), ParameterError> {
         let is_modulated = self.modulation_amplitude > 0.0;
         let can_ramp = is_modulated && self.ramp_time > 0.0;
+        let contacts = self.blocks * self.contacts_per_block;
         let rules = [
-            (
-                Symbol::Ns,
-                self.blocks * self.contacts_per_block <= MAX_CONTACTS,
-            ),
+            (Symbol::Ns, contacts <= MAX_CONTACTS),
             (Symbol::Dfs, self.threshold_deviation <= self.mean_threshold),
             (Symbol::V0, typical_interval(self) <= MAX_INTERVAL),
             (Symbol::T, self.modulation_period.is_some() || !is_modulated),
@@ -259,21 +257,19 @@ impl<S> Deref for Selected<S> {
     }
 }
 
-impl<S: Selection> Part for Selected<S> {
+impl<S: Selection> Row for Selected<S> {
     fn columns_as(_: Column) -> Vec<Column> {
         let columns = S::SYMBOLS.iter();
-        columns
-            .map(|symbol| symbol.description().column())
-            .collect()
+        columns.map(|symbol| symbol.description().column).collect()
     }
 
-    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
         for &symbol in S::SYMBOLS {
             give(self.parameters.get(symbol));
         }
     }
 
-    fn take<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+    fn from_cells<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         let mut parameters = Parameters::default();
         for &symbol in S::SYMBOLS {
             parameters
@@ -286,8 +282,6 @@ impl<S: Selection> Part for Selected<S> {
             .map_err(|error| error.to_string())
     }
 }
-
-impl<S: Selection> Row for Selected<S> {}
 
 #[cfg(test)]
 mod tests {

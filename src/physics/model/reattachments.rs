@@ -164,19 +164,13 @@ impl Reattachments {
 
     /// Moves the origin of time: subtracts `shift` s from every one.
     pub fn shift(&mut self, shift: f64) {
-        let mut all: Vec<Due> = self
-            .next
-            .take()
-            .into_iter()
-            .chain(self.present.drain(..))
-            .collect();
+        let mut all = Vec::from_iter(self.next.take());
+        all.append(&mut self.present);
         all.append(&mut self.beyond);
         for word in 0..BINS / BITS {
             while self.occupied[word] != 0 {
-                self.empty(
-                    word * BITS + self.occupied[word].trailing_zeros() as usize,
-                    |due| all.push(due),
-                );
+                let bin = word * BITS + self.occupied[word].trailing_zeros() as usize;
+                self.empty(bin, |due| all.push(due));
             }
         }
         self.present_bin = 0;

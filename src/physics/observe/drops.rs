@@ -23,7 +23,7 @@ columns! {
 }
 
 /// The shear force, in N, and the displacement of the driven end, in m, at a time in s.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Instant {
     time: f64,
     force: f64,
@@ -52,15 +52,10 @@ pub(super) struct DropDetector {
 impl DropDetector {
     /// Finds drops of at least `least` newtons.
     pub(super) fn new(parameters: &Parameters, least: f64) -> Self {
-        let top = Instant {
-            time: 0.0,
-            force: 0.0,
-            driven: 0.0,
-        };
         Self {
             drive: Drive::new(parameters),
             least,
-            top,
+            top: Instant::default(),
             bottom: None,
             drops: Vec::new(),
         }

@@ -17,6 +17,5 @@ pub use recording::{Recording, RecordingKey};
 pub use records::{
     AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow,
 };
-pub use rupture::{Rupture, advance_speed};
 pub use slip::{Energies, Modulation, OVERSHOOT, Precursor, Slip, phase};
 pub use slip_observer::SlipObserver;

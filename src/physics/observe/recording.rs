@@ -75,14 +75,9 @@ impl Recording {
 
     /// Names of the columns of slips that are not recorded.
     pub fn left_out(&self) -> Vec<Cow<'static, str>> {
-        let energies = (!self.energies).then(Energies::columns);
-        let drops = self.drop_size.is_none().then(Drops::columns);
-        energies
-            .into_iter()
-            .chain(drops)
-            .flatten()
-            .map(|column| column.name)
-            .collect()
+        let energies = (!self.energies).then(Energies::names);
+        let drops = self.drop_size.is_none().then(Drops::names);
+        energies.into_iter().chain(drops).flatten().collect()
     }
 }
 

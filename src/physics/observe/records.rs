@@ -79,9 +79,8 @@ pub struct Trace {
 impl Trace {
     pub fn new(parameters: &Parameters, spacing: f64) -> Self {
         let contacts = (parameters.blocks * parameters.contacts_per_block) as f64;
-        let drive = Drive::new(parameters);
         Self {
-            drive,
+            drive: Drive::new(parameters),
             contacts,
             attached: 0,
             sampling: Sampling { spacing, next: 0 },
@@ -143,16 +142,13 @@ impl AttachedMap {
 impl Observer for AttachedMap {
     fn advance(&mut self, segment: &Segment<'_>) {
         while let Some(time) = self.sampling.within(segment) {
-            let cells = self
-                .attached
-                .iter()
-                .zip(1..)
-                .map(|(&attached, block)| MapRow {
+            for (block, &attached) in (1..).zip(&self.attached) {
+                self.rows.push(MapRow {
                     time,
                     block,
                     attached_fraction: f64::from(attached) / self.contacts_per_block,
                 });
-            self.rows.extend(cells);
+            }
         }
     }
 
@@ -194,15 +190,13 @@ impl Profile {
 
 impl Observer for Profile {
     fn end(&mut self, time: f64, displacement: &[f64]) {
-        self.rows = (1..)
-            .zip(displacement)
-            .map(|(block, &displacement)| ProfileRow {
-                time,
-                block,
-                position: block as f64 * self.spacing,
-                displacement,
-            })
-            .collect();
+        let row = |(block, &displacement): (u64, &f64)| ProfileRow {
+            time,
+            block,
+            position: block as f64 * self.spacing,
+            displacement,
+        };
+        self.rows = (1..).zip(displacement).map(row).collect();
     }
 }
 

@@ -4,9 +4,9 @@
 use crate::model::{ContactEvent, Parameters};
 use crate::solver::Spent;
 
-/// A rupture in progress or just ended.
+/// A rupture in progress or just ended, with what is measured on its force.
 #[derive(Clone, Debug)]
-pub struct Rupture {
+pub(super) struct Rupture {
     /// Block of the first break, from 0.
     pub first_block: usize,
     pub size: u64,
@@ -18,22 +18,38 @@ pub struct Rupture {
     pub attached_before: u64,
     /// Fewest contacts attached so far.
     pub least_attached: u64,
+    /// Peak since the last slip, when the rupture reached the leading edge.
+    pub onset: Option<Peak>,
+    /// Peak since the last precursor, when the rupture began.
+    pub precursor_onset: Peak,
+    /// Least force so far, and up to the last break, in N.
+    pub least: f64,
+    pub least_at_last_break: f64,
+    pub first: Instant,
+    pub last: Instant,
+    /// Whether the shear force was rising at the onset.
+    pub onset_cut: bool,
 }
 
 impl Rupture {
-    /// The rupture that begins with this break, on a slider of `blocks` blocks.
-    pub fn new(first: &ContactEvent, blocks: usize) -> Self {
-        let mut rupture = Self {
-            first_block: first.block,
+    /// The rupture that begins with this break, not included yet, on a slider of `blocks` blocks.
+    pub fn new(event: &ContactEvent, first: Instant, precursor_onset: Peak, blocks: usize) -> Self {
+        Self {
+            first_block: event.block,
             size: 0,
-            reach: first.block,
+            reach: event.block,
             fronts: Vec::new(),
             broken: vec![false; blocks],
-            attached_before: first.attached + 1,
-            least_attached: first.attached,
-        };
-        rupture.include(first);
-        rupture
+            attached_before: event.attached + 1,
+            least_attached: event.attached,
+            onset: None,
+            precursor_onset,
+            least: first.force,
+            least_at_last_break: first.force,
+            first,
+            last: first,
+            onset_cut: false,
+        }
     }
 
     pub fn include(&mut self, event: &ContactEvent) {
@@ -67,14 +83,12 @@ impl Rupture {
             .fronts
             .iter()
             .map(|&(block, time)| (time, spacing * block.abs_diff(self.first_block) as f64));
-        (self.extent() >= 3)
-            .then(|| advance_speed(points))
-            .flatten()
+        advance_speed(&points).filter(|_| self.extent() >= 3)
     }
 }
 
 /// A largest shear force, in N, and its time, in s.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Peak {
     pub time: f64,
     pub force: f64,
@@ -106,23 +120,6 @@ pub(super) struct Instant {
     pub spent: Spent,
 }
 
-/// A rupture in progress, with what is measured on its force.
-#[derive(Clone, Debug)]
-pub(super) struct Active {
-    pub rupture: Rupture,
-    /// Peak since the last slip, when the rupture reached the leading edge.
-    pub onset: Option<Peak>,
-    /// Peak since the last precursor, when the rupture began.
-    pub precursor_onset: Peak,
-    /// Least force so far, and up to the last break, in N.
-    pub least: f64,
-    pub least_at_last_break: f64,
-    pub first: Instant,
-    pub last: Instant,
-    /// Whether the shear force was rising at the onset.
-    pub onset_cut: bool,
-}
-
 /// What makes a rupture a slip or a precursor, and when it and the job end.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Criteria {
@@ -140,20 +137,13 @@ impl Criteria {
 }
 
 /// Slope of position against time by least squares; `None` unless it is positive and finite.
-pub fn advance_speed(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<f64> {
+pub(super) fn advance_speed(points: &(impl Iterator<Item = (f64, f64)> + Clone)) -> Option<f64> {
     let count = points.clone().count() as f64;
-    let (time, position) = points
-        .clone()
-        .fold((0.0, 0.0), |(t, p), point| (t + point.0, p + point.1));
-    let time = time / count;
-    let position = position / count;
-    let (covariance, variance) = points.fold((0.0, 0.0), |(covariance, variance), point| {
-        let late = point.0 - time;
-        (
-            covariance + late * (point.1 - position),
-            variance + late * late,
-        )
-    });
+    let sum = |of: &dyn Fn((f64, f64)) -> f64| points.clone().map(of).sum::<f64>();
+    let mean_time = sum(&|(time, _)| time) / count;
+    let mean_position = sum(&|(_, position)| position) / count;
+    let covariance = sum(&|(time, position)| (time - mean_time) * (position - mean_position));
+    let variance = sum(&|(time, _)| (time - mean_time) * (time - mean_time));
     let speed = covariance / variance;
     (speed.is_finite() && speed > 0.0).then_some(speed)
 }

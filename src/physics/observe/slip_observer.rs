@@ -6,14 +6,14 @@
 //! its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::drops::{DropDetector, Drops};
-use super::rupture::{Active, Criteria, Instant, Peak, Rupture, advance_speed};
+use super::rupture::{Criteria, Instant, Peak, Rupture, advance_speed};
 use super::slip::{Energies, Modulation, Precursor, Slip, phase};
 use super::{Averages, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
 
 /// Largest shear forces since the last slip's end, the last rupture of precursor size, and the last break.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct PeaksSince {
     slip: Peak,
     precursor: Peak,
@@ -29,19 +29,18 @@ struct Pending {
     last_onset: Option<f64>,
     /// Those that advanced the reach: time and position.
     advances: Vec<(f64, f64)>,
-    /// The furthest block that they reach, from 0.
-    furthest: Option<usize>,
+    /// Blocks up to the furthest that they reach.
+    furthest: usize,
 }
 
 /// The instants between which averages over time are taken.
 #[derive(Clone, Debug, Default)]
 struct Span {
     start_up_end: Option<Instant>,
-    last_slip_end: Option<Instant>,
+    /// The start, as long as there is no slip.
+    last_slip_end: Instant,
     /// Halfway from the last slip to where the job gives up.
     settled: Option<Instant>,
-    /// Time within slips that have ended, in s.
-    slipping: f64,
 }
 
 /// The drive in its cycle at an instant of a slip or precursor.
@@ -66,7 +65,7 @@ pub struct SlipObserver {
     at_event: Instant,
     attached: u64,
     peaks_since: PeaksSince,
-    rupture: Option<Active>,
+    rupture: Option<Rupture>,
     slips_seen: u64,
     last_onset: Option<f64>,
     /// Onsets of the slips of start-up, in s.
@@ -85,10 +84,6 @@ pub struct SlipObserver {
 
 impl SlipObserver {
     pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
-        let start = Peak {
-            time: 0.0,
-            force: 0.0,
-        };
         let contacts = (parameters.blocks * parameters.contacts_per_block) as u64;
         let criteria = Criteria {
             precursor_size: recording
@@ -112,11 +107,7 @@ impl SlipObserver {
             now: Instant::default(),
             at_event: Instant::default(),
             attached: contacts,
-            peaks_since: PeaksSince {
-                slip: start,
-                precursor: start,
-                last_break: start,
-            },
+            peaks_since: PeaksSince::default(),
             rupture: None,
             slips_seen: 0,
             last_onset: None,
@@ -139,14 +130,10 @@ impl SlipObserver {
         self.precursors.retain(|precursor| precursor.slip < slips);
         if let Some(drops) = self.drops {
             let discarded = self.breaks_of_slips.len() - self.slips.len();
-            let of_slips = drops
-                .of_slips(&self.breaks_of_slips)
-                .into_iter()
-                .skip(discarded);
-            self.slips
-                .iter_mut()
-                .zip(of_slips)
-                .for_each(|(slip, drops)| slip.drops = drops);
+            let of_slips = drops.of_slips(&self.breaks_of_slips).into_iter();
+            for (slip, drops) in self.slips.iter_mut().zip(of_slips.skip(discarded)) {
+                slip.drops = drops;
+            }
         }
         (self.slips, self.precursors)
     }
@@ -160,7 +147,7 @@ impl SlipObserver {
                 let start_up_end = self.span.start_up_end.filter(|_| !self.slips.is_empty());
                 (start_up_end.unwrap_or(settled), self.sliding())
             }
-            None => self.span.start_up_end.zip(self.span.last_slip_end)?,
+            None => (self.span.start_up_end?, self.span.last_slip_end),
         };
         let time = end.time - start.time;
         (time > 0.0).then(|| Averages {
@@ -194,8 +181,8 @@ impl SlipObserver {
         Instant {
             attached_time: self.at_event.attached_time
                 + self.attached as f64 * (self.now.time - self.at_event.time),
-            slipping: self.span.slipping + self.now.time
-                - self.span.last_slip_end.map_or(0.0, |end| end.time),
+            slipping: self.span.last_slip_end.slipping + self.now.time
+                - self.span.last_slip_end.time,
             ..self.now
         }
     }
@@ -211,27 +198,16 @@ impl SlipObserver {
         };
         self.at_event = here;
         self.attached = event.attached;
-        let active = if let Some(active) = &mut self.rupture {
-            active.rupture.include(event);
-            active
-        } else {
-            self.rupture.insert(Active {
-                rupture: Rupture::new(event, blocks),
-                onset: None,
-                precursor_onset: self.peaks_since.precursor,
-                least: self.now.force,
-                least_at_last_break: self.now.force,
-                first: here,
-                last: here,
-                onset_cut: false,
-            })
-        };
-        if event.block + 1 == blocks && active.onset.is_none() {
-            active.onset = Some(self.peaks_since.slip);
-            active.onset_cut = self.now.force >= self.peaks_since.slip.force;
+        let precursor_onset = self.peaks_since.precursor;
+        let begin = || Rupture::new(event, here, precursor_onset, blocks);
+        let rupture = self.rupture.get_or_insert_with(begin);
+        rupture.include(event);
+        if event.block + 1 == blocks && rupture.onset.is_none() {
+            rupture.onset = Some(self.peaks_since.slip);
+            rupture.onset_cut = self.now.force >= self.peaks_since.slip.force;
         }
-        active.least_at_last_break = active.least;
-        active.last = here;
+        rupture.least_at_last_break = rupture.least;
+        rupture.last = here;
         self.peaks_since.last_break = Peak {
             time: event.time,
             force: self.now.force,
@@ -242,36 +218,33 @@ impl SlipObserver {
     #[inline(always)]
     fn finish_rupture_before(&mut self, time: f64) {
         let crossing_time = self.criteria.crossing_time;
-        let is_over = |active: &Active| time - active.last.time > crossing_time;
+        let is_over = |rupture: &Rupture| time - rupture.last.time > crossing_time;
         if self.rupture.as_ref().is_some_and(is_over) {
             self.finish_rupture();
         }
     }
 
     fn finish_rupture(&mut self) {
-        let Some(active) = self.rupture.take() else {
+        let Some(rupture) = self.rupture.take() else {
             return;
         };
         self.ruptures += 1;
-        if !self.criteria.is_recorded(&active.rupture) {
-            return;
-        }
-        if active.rupture.is_slip(self.criteria.contacts) {
-            self.record_slip(&active);
-        } else {
-            self.record_precursor(&active);
+        if rupture.is_slip(self.criteria.contacts) {
+            self.record_slip(&rupture);
+        } else if self.criteria.is_recorded(&rupture) {
+            self.record_precursor(&rupture);
         }
     }
 
-    fn record_slip(&mut self, active: &Active) {
+    fn record_slip(&mut self, rupture: &Rupture) {
         // A slip has reached the leading edge.
-        let onset = active.onset.unwrap_or(self.peaks_since.slip);
-        let first = active.first;
-        let last = active.last;
+        let onset = rupture.onset.unwrap_or(self.peaks_since.slip);
+        let first = rupture.first;
+        let last = rupture.last;
         let discard = self.recording.discard;
         self.drive_at.slip_onset.advance_to(onset.time);
         if self.slips_seen >= discard {
-            let slip = self.slip(active, onset);
+            let slip = self.slip(rupture, onset);
             self.slips.push(slip);
         } else {
             self.start_up.push(onset.time);
@@ -280,15 +253,14 @@ impl SlipObserver {
             self.breaks_of_slips.push((first.time, last.time));
         }
         self.slips_seen += 1;
-        self.span.slipping += last.time - first.time;
         let end = Instant {
-            slipping: self.span.slipping,
+            slipping: self.span.last_slip_end.slipping + (last.time - first.time),
             ..last
         };
         if self.slips_seen == discard.max(1) {
             self.span.start_up_end = Some(end);
         }
-        self.span.last_slip_end = Some(end);
+        self.span.last_slip_end = end;
         self.span.settled = None;
         self.last_onset = Some(onset.time);
         self.peaks_since.slip = self.peaks_since.last_break;
@@ -297,18 +269,14 @@ impl SlipObserver {
     }
 
     /// The row of a slip; drops are found at the end.
-    fn slip(&mut self, active: &Active, onset: Peak) -> Slip {
-        let rupture = &active.rupture;
-        let first = active.first;
-        let last = active.last;
+    fn slip(&mut self, rupture: &Rupture, onset: Peak) -> Slip {
+        let first = rupture.first;
+        let last = rupture.last;
         let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
         let drive = &self.drive_at.slip_onset;
         let modulation = Modulation::of(drive);
         let interval = self.last_onset.map(|last| onset.time - last);
-        let spent = self
-            .span
-            .last_slip_end
-            .map_or(Spent::default(), |end| end.spent);
+        let spent = self.span.last_slip_end.spent;
         let has_energies = self.recording.energies;
         let energies = has_energies.then(|| Energies::between(spent, last.spent));
         let contacts = self.criteria.contacts as f64;
@@ -323,7 +291,7 @@ impl SlipObserver {
                 .period
                 .map(|period| phase(since_cycle, period, drive.eta)),
             peak_force: onset.force,
-            drop: onset.force - active.least_at_last_break,
+            drop: onset.force - rupture.least_at_last_break,
             nucleation: first.time,
             nucleation_block: rupture.first_block as u64 + 1,
             duration: last.time - first.time,
@@ -332,11 +300,11 @@ impl SlipObserver {
             least_attached: rupture.least_attached as f64 / contacts,
             distance: last.mean_displacement - first.mean_displacement,
             edge_distance,
-            onset_cut: active.onset_cut,
+            onset_cut: rupture.onset_cut,
             front_speed: rupture.front_speed(&self.parameters),
             precursors: self.pending.count,
             largest_precursor: self.pending.largest,
-            slow_front_speed: advance_speed(self.pending.advances.iter().copied()),
+            slow_front_speed: advance_speed(&self.pending.advances.iter().copied()),
             energies: energies.unwrap_or_default(),
             drops: Drops::default(),
         }
@@ -348,11 +316,10 @@ impl SlipObserver {
         self.drive_at.slip_break.motion(at.time).0 - at.force / self.drive_at.slip_break.stiffness
     }
 
-    fn record_precursor(&mut self, active: &Active) {
-        let rupture = &active.rupture;
-        let first = active.first;
-        let last = active.last;
-        let onset = active.precursor_onset.time;
+    fn record_precursor(&mut self, rupture: &Rupture) {
+        let first = rupture.first;
+        let last = rupture.last;
+        let onset = rupture.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
             self.drive_at.precursor_onset.advance_to(onset);
             self.precursors.push(Precursor {
@@ -372,15 +339,12 @@ impl SlipObserver {
                 front_speed: rupture.front_speed(&self.parameters),
             });
         }
-        if self
-            .pending
-            .furthest
-            .is_none_or(|furthest| rupture.reach > furthest)
-        {
-            let position = (rupture.reach + 1) as f64 * self.parameters.slider_length
-                / self.parameters.blocks as f64;
+        let reach = rupture.reach + 1;
+        if reach > self.pending.furthest {
+            let position =
+                reach as f64 * self.parameters.slider_length / self.parameters.blocks as f64;
             self.pending.advances.push((first.time, position));
-            self.pending.furthest = Some(rupture.reach);
+            self.pending.furthest = reach;
         }
         self.pending.count += 1;
         self.pending.largest = self.pending.largest.max(rupture.size);
@@ -396,7 +360,7 @@ impl Observer for SlipObserver {
         let recordable = self
             .rupture
             .as_ref()
-            .is_some_and(|active| self.criteria.is_recorded(&active.rupture));
+            .is_some_and(|rupture| self.criteria.is_recorded(rupture));
         let floor = if recordable {
             self.peaks_since.last_break.force
         } else {
@@ -408,10 +372,10 @@ impl Observer for SlipObserver {
             self.peaks_since.precursor.raise(peak);
             self.peaks_since.slip.raise(peak);
         }
-        if let Some(active) = &mut self.rupture
-            && let Some((_, force)) = segment.minimum_below(active.least)
+        if let Some(rupture) = &mut self.rupture
+            && let Some((_, force)) = segment.minimum_below(rupture.least)
         {
-            active.least = force;
+            rupture.least = force;
         }
         if let Some(drops) = &mut self.drops {
             drops.advance(segment);
@@ -424,7 +388,7 @@ impl Observer for SlipObserver {
             ..self.now
         };
         self.finish_rupture_before(self.now.time);
-        let since_slip = self.now.time - self.span.last_slip_end.map_or(0.0, |end| end.time);
+        let since_slip = self.now.time - self.span.last_slip_end.time;
         if self.span.settled.is_none() && since_slip >= 0.5 * self.criteria.give_up_time {
             self.span.settled = Some(self.sliding());
         }
