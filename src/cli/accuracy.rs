@@ -111,7 +111,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
     let files = accuracy::write(&study, &findings, &out, catch_signals)?;
     if arguments.json {
-        output::plain_json(&accuracy::to_json(&study, &findings))?;
+        output::print(&format!("{:#}\n", accuracy::to_json(&study, &findings)))?;
     } else {
         output::print(&study_text(&study, &findings))?;
         output::lines(files.iter().map(|file| shown(file).to_string()))?;

@@ -54,12 +54,8 @@ pub fn json(format: u32, value: &impl Serialize) -> Result<()> {
         #[serde(flatten)]
         value: &'a T,
     }
-    plain_json(&Versioned { format, value })
-}
-
-/// Prints a value as JSON that has its version, or needs none.
-pub fn plain_json(value: &impl Serialize) -> Result<()> {
-    print(&format!("{}\n", serde_json::to_string_pretty(value)?))
+    let versioned = Versioned { format, value };
+    print(&format!("{}\n", serde_json::to_string_pretty(&versioned)?))
 }
 
 /// Prints labels and values in two columns.
