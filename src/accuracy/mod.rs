@@ -18,6 +18,7 @@ pub use verdict::{shows_bias, verdict};
 
 use self::comparison::{Bias, BreakErrors};
 use crate::model::{Description, Parameters, Selected, Selection, Symbol, Value};
+use crate::results::tables::DriveAndSeed;
 use crate::solver::{Method, Resolve, Solver};
 use crate::table::columns::columns;
 use std::fmt;
@@ -162,16 +163,9 @@ pub fn set_in_words(parameters: &Parameters) -> String {
 /// Keys and values of what differs from the defaults, but for the drive and the seed.
 fn other_settings(parameters: &Parameters) -> impl Iterator<Item = (&'static str, Value)> {
     let defaults = Parameters::default();
-    let others = |symbol: &Symbol| {
-        !matches!(
-            symbol,
-            Symbol::V0 | Symbol::Delta | Symbol::T | Symbol::Seed
-        )
-    };
-    let settings = Symbol::ALL
-        .into_iter()
-        .filter(others)
-        .map(|symbol| (symbol, parameters.get(symbol)));
+    let others = |symbol: &Symbol| !DriveAndSeed::SYMBOLS.contains(symbol);
+    let settings = Symbol::ALL.into_iter().filter(others);
+    let settings = settings.map(|symbol| (symbol, parameters.get(symbol)));
     let settings = settings.filter(move |(symbol, value)| *value != defaults.get(*symbol));
     settings.map(|(symbol, value)| (symbol.key(), value))
 }
