@@ -156,20 +156,13 @@ fn points(
     set: &Parameters,
     error: impl Fn(&MethodRow) -> Option<(f64, (f64, f64))>,
 ) -> Vec<WorkPrecision> {
-    let rows: Vec<&MethodRow> = rows
-        .iter()
-        .filter(|row| row.parameters.without_modulation() == *set)
-        .collect();
-    let modulations = || {
-        rows.iter()
-            .filter(|row| row.parameters.modulation_amplitude > 0.0)
-    };
-    let is_one = modulations().all(|row| {
-        modulations()
-            .next()
-            .is_some_and(|first| first.parameters == row.parameters)
-    });
-    let point = |row: &&MethodRow| {
+    let rows = rows.iter();
+    let rows = rows.filter(|row| row.parameters.without_modulation() == *set);
+    let modulated = rows.clone().map(|row| &row.parameters);
+    let mut modulated = modulated.filter(|set| set.modulation_amplitude > 0.0);
+    let first = modulated.next();
+    let is_one = modulated.all(|other| Some(other) == first);
+    let point = |row: &MethodRow| {
         let (error, uncertainty) = error(row)?;
         let drive = match row.parameters.frequency() {
             None => "Δ = 0".to_owned(),
@@ -189,7 +182,7 @@ fn points(
             work: row.cost.per_slip,
         })
     };
-    rows.iter().filter_map(point).collect()
+    rows.filter_map(point).collect()
 }
 
 #[cfg(test)]
