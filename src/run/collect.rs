@@ -90,7 +90,7 @@ impl Out {
 }
 
 /// A part of which some jobs are still out.
-struct OpenPart {
+pub(super) struct OpenPart {
     of: Arc<Taken>,
     outcomes: Outcomes,
     failed_before: u64,
@@ -99,32 +99,16 @@ struct OpenPart {
 }
 
 pub(super) struct Collector<'a, 'e> {
-    joined: &'a Joined<'a>,
-    pending: &'a Pending<'a>,
-    events: &'a mut Events<'e>,
-    report: &'a mut RunReport,
-    open: BTreeMap<PartName, OpenPart>,
+    pub joined: &'a Joined<'a>,
+    pub pending: &'a Pending<'a>,
+    pub events: &'a mut Events<'e>,
+    pub report: &'a mut RunReport,
+    pub open: BTreeMap<PartName, OpenPart>,
     /// Number and predicted cost of the jobs of the parts that it has committed, spilled ones included.
-    own: (u64, f64),
+    pub own: (u64, f64),
 }
 
-impl<'a, 'e> Collector<'a, 'e> {
-    pub fn new(
-        joined: &'a Joined<'a>,
-        pending: &'a Pending<'a>,
-        events: &'a mut Events<'e>,
-        report: &'a mut RunReport,
-    ) -> Self {
-        Self {
-            joined,
-            pending,
-            events,
-            report,
-            open: BTreeMap::new(),
-            own: (0, 0.0),
-        }
-    }
-
+impl Collector<'_, '_> {
     /// Runs pending jobs until none is left for this worker, the flag turns true, the time is over, or something other
     /// than a job fails. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {

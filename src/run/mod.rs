@@ -39,6 +39,7 @@ use crate::sweep::{Job, Outline, Sweep};
 use crate::table::file::PROGRAM;
 use crate::table::storage::StorageError;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -224,7 +225,14 @@ impl Joined<'_> {
             predicted_cost,
             events,
         )?;
-        let mut collector = Collector::new(self, pending, events, report);
+        let mut collector = Collector {
+            joined: self,
+            pending,
+            events,
+            report,
+            open: BTreeMap::new(),
+            own: (0, 0.0),
+        };
         let ended = self.collect(&mut collector, pending, kernel);
         report.wall = self.begin.elapsed().as_secs_f64();
         let left = ended.inspect_err(|error| {
