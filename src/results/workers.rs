@@ -170,8 +170,6 @@ pub struct Living {
 pub struct Member<'a> {
     layout: Layout<'a>,
     name: String,
-    /// A number that no other worker has.
-    number: u64,
     worker: Worker,
     begin: Instant,
     jobs: AtomicU64,
@@ -260,7 +258,6 @@ impl<'a> Member<'a> {
         let member = Self {
             layout: layout.clone(),
             name,
-            number,
             worker,
             begin: Instant::now(),
             jobs: AtomicU64::new(0),
@@ -280,10 +277,6 @@ impl<'a> Member<'a> {
 
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    pub const fn number(&self) -> u64 {
-        self.number
     }
 
     pub fn staging(&self) -> PathBuf {
