@@ -12,6 +12,7 @@
 //! and changes nothing that was dealt before; no two shards differ by more than the costliest part.
 
 use crate::results::claims::{ClaimState, Claims};
+use crate::results::commit::own_number;
 use crate::results::layout::shorter_in_tests;
 use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
@@ -136,11 +137,10 @@ impl<'a> Work<'a> {
     ) -> Result<Self, ResultsError> {
         let others = member.others()?;
         let claims = Claims::list(member)?;
-        let is_left =
-            |part: &&Outline| !pending.done.contains(&part.name) || pending.may_run_again(part);
-        let mut pass: Vec<&Outline> = pending.parts.iter().filter(is_left).collect();
+        let parts = pending.parts.iter();
+        let mut pass: Vec<&Outline> = parts.filter(|part| pending.may_run(part)).collect();
         if !others.is_empty() && !pass.is_empty() {
-            let place = member.number() % pass.len() as u64;
+            let place = own_number() % pass.len() as u64;
             pass.rotate_left(usize::try_from(place).unwrap_or_default());
         }
         pass.sort_by_key(|part| {
