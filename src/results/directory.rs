@@ -5,7 +5,7 @@ use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden};
-use crate::results::tables::{TABLES, tables_of};
+use crate::results::tables::{JOBS, TABLES, tables_of};
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
@@ -314,12 +314,11 @@ impl<'a> Results<'a> {
             return Ok(BTreeSet::new());
         }
         // The jobs first: a part that has its jobs had its other files before.
-        let mut done: Option<BTreeSet<PartName>> = None;
-        for table in self.tables().rev() {
-            let parts = self.parts_of(table)?;
-            done = Some(done.map_or(parts.clone(), |done| &done & &parts));
+        let mut done = self.parts_of(JOBS)?;
+        for table in self.tables().filter(|table| *table != JOBS) {
+            done = &done & &self.parts_of(table)?;
         }
-        Ok(done.unwrap_or_default())
+        Ok(done)
     }
 
     /// Removes what earlier runs left of unfinished parts: files of some of their tables, and spilled jobs.
