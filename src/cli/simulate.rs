@@ -8,21 +8,21 @@ use super::plot::picture_file;
 use super::sweep::{self, PresetFlag, Variation, changes};
 use super::{Exit, UsageError, catch_signals};
 use crate::figure::simulation;
-use crate::model::{Parameters, Symbol};
+use crate::model::{Parameters, Selected, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
 use crate::results::destination::{Destination, Kind};
-use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
+use crate::results::tables::{self, All, DriveAndSeed, JobOutcome, SlipRow};
 use crate::sets::Digits;
 use crate::single_job::{self, Records, Request};
 use crate::solver::{Method, SolverKey};
 use crate::sweep::{Change, Sweep};
 use crate::table::Table;
+use crate::table::arrow;
 use crate::table::file::{Footer, TableWriter};
 use crate::table::shown::shown;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use serde_json::json;
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -218,9 +218,10 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let slips = (measured.slips.iter())
         .map(|slip| -> SlipRow<'_> { (Cow::Borrowed(&label), Cow::Borrowed(slip)) });
     let contacts = records.contacts.iter().map(ContactRow::from);
+    let all = arrow::json(&Selected::<All>::new(parameters.clone()));
     let footer = Footer::default()
         .with_sweep(sweep.name(), sweep.text())
-        .with("parameters", &as_json(parameters));
+        .with("parameters", &all.to_string());
     let tables = Tables {
         footer: &footer,
         left_out: &sweep.recording().left_out(),
@@ -359,12 +360,6 @@ impl JobFlags {
             axes: Vec::new(),
         })
     }
-}
-
-/// The parameters as JSON, under their keys.
-fn as_json(parameters: &Parameters) -> String {
-    let entry = |symbol: Symbol| (symbol.key().to_owned(), json!(parameters.get(symbol)));
-    serde_json::Value::Object(Symbol::ALL.map(entry).into_iter().collect()).to_string()
 }
 
 /// What is printed of a job.
