@@ -216,15 +216,30 @@ impl Joined<'_> {
         if report.jobs_left == 0 {
             return Ok(());
         }
-        let there = overview.jobs_done + overview.jobs_spilled + overview.jobs_failed - jobs_again;
+        let jobs_there =
+            overview.jobs_done + overview.jobs_spilled + overview.jobs_failed - jobs_again;
         let predicted_cost = overview.predicted_cost_missing + cost_again;
-        self.report_begin(
-            pending.results,
-            report.jobs_left,
-            there,
-            predicted_cost,
-            events,
-        )?;
+        match (&events.log, pending.results.rounds_so_far()) {
+            (Some(_), Some(rounds)) => events.send(&RunEvent::RoundBegun {
+                jobs: report.jobs_left,
+                predicted_cost,
+                rounds,
+            })?,
+            _ => {
+                events.log = Some(pending.results.begin_log()?);
+                events.send(&RunEvent::Started {
+                    host: host(),
+                    process: std::process::id(),
+                    program: PROGRAM.to_owned(),
+                    shard: self.options.shard.to_string(),
+                    others: self.member.others()?.len(),
+                    threads: self.threads,
+                    jobs: report.jobs_left,
+                    jobs_there,
+                    predicted_cost,
+                })?;
+            }
+        }
         let mut collector = Collector {
             joined: self,
             pending,
@@ -250,35 +265,6 @@ impl Joined<'_> {
             }
         }
         Ok(())
-    }
-
-    fn report_begin(
-        &self,
-        results: &Results<'_>,
-        jobs: u64,
-        jobs_there: u64,
-        predicted_cost: f64,
-        events: &mut Events<'_>,
-    ) -> Result<(), ResultsError> {
-        if let (Some(_), Some(rounds)) = (&events.log, results.rounds_so_far()) {
-            return Ok(events.send(&RunEvent::RoundBegun {
-                jobs,
-                predicted_cost,
-                rounds,
-            })?);
-        }
-        events.log = Some(results.begin_log()?);
-        Ok(events.send(&RunEvent::Started {
-            host: host(),
-            process: std::process::id(),
-            program: PROGRAM.to_owned(),
-            shard: self.options.shard.to_string(),
-            others: self.member.others()?.len(),
-            threads: self.threads,
-            jobs,
-            jobs_there,
-            predicted_cost,
-        })?)
     }
 
     /// Runs jobs until this worker has none left, and reports what other workers still run; `None` if it was stopped.
