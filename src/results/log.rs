@@ -135,11 +135,6 @@ fn now() -> f64 {
 pub struct Log(StoredFile);
 
 impl Log {
-    /// Brings what was written to the disk, where other hosts see it.
-    pub fn sync(&mut self) -> Result<(), StorageError> {
-        self.0.sync()
-    }
-
     /// Appends an event. Events of each job or second are left out: they would be millions of lines.
     pub fn write(&mut self, event: &RunEvent) -> Result<(), StorageError> {
         if matches!(
