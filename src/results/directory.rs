@@ -10,7 +10,7 @@ use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::{DataFile, Dataset, Footer};
-use crate::table::storage::StorageError;
+use crate::table::storage::{StorageError, gone_is_fine};
 use std::collections::BTreeSet;
 use std::io;
 use std::ops::RangeInclusive;
@@ -394,11 +394,6 @@ impl<'a> Results<'a> {
         Plan::new(&self.extensions)
     }
 
-    /// What the footer of this file of an extension's part holds.
-    pub(super) fn footer(&self, extension: usize, file: &Path) -> Footer {
-        Footer::default().and(&self.footers[extension]).at(file)
-    }
-
     /// The footer of files that are made from all tables: it has the current sweep.
     pub fn footer_of_all(&self) -> Footer {
         Footer::default().with_sweep(self.sweep().name(), self.sweep().text())
@@ -430,10 +425,7 @@ impl<'a> Results<'a> {
         ];
         folders.extend(TABLES.map(|table| layout.table(table)));
         for folder in folders {
-            match layout.storage.sync_folder(&folder) {
-                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                synced => synced?,
-            }
+            gone_is_fine(layout.storage.sync_folder(&folder))?;
         }
         Ok(())
     }

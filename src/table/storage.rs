@@ -173,7 +173,7 @@ pub trait Storage: Sync {
     }
 }
 
-/// Ignores that a file to be removed or moved is gone: another process was first.
+/// Ignores that what is to be removed, moved or synced is gone: another process was first.
 pub fn gone_is_fine(ended: Result<(), StorageError>) -> Result<(), StorageError> {
     match ended {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -354,10 +354,8 @@ impl Storage for Disk {
     }
 
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        match fs::remove_dir_all(folder) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            removed => removed.map_err(StorageError::at("remove", folder)),
-        }
+        let removed = fs::remove_dir_all(folder);
+        gone_is_fine(removed.map_err(StorageError::at("remove", folder)))
     }
 
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
