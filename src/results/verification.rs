@@ -303,12 +303,7 @@ fn check_counts(
 }
 
 /// What a check found of a file that must be there.
-fn damage_in<T>(checked: Result<T, ResultsError>) -> Result<Option<Problem>, ResultsError> {
-    checked.map_or_else(
-        |error| {
-            let (path, problem) = error.damage()?;
-            Ok(Some(Problem::new(path, problem)))
-        },
-        |_| Ok(None),
-    )
+fn damage_in(checked: Result<(), ResultsError>) -> Result<Option<Problem>, ResultsError> {
+    let damage = checked.err().map(ResultsError::damage).transpose()?;
+    Ok(damage.map(|(path, problem)| Problem::new(path, problem)))
 }
