@@ -143,21 +143,19 @@ impl Findings {
 
 /// The drive of a set in words, and what else differs from the defaults.
 pub fn set_in_words(parameters: &Parameters) -> String {
-    let modulation = parameters.frequency().map_or_else(
-        || "Delta = 0".to_owned(),
-        |frequency| {
-            format!(
-                "Delta = {:e} m, 1/T = {frequency} Hz",
-                parameters.modulation_amplitude
-            )
-        },
-    );
+    let velocity = parameters.drive_velocity;
+    let amplitude = parameters.modulation_amplitude;
+    let modulation = match parameters.frequency() {
+        None => "Delta = 0".to_owned(),
+        Some(frequency) => format!("Delta = {amplitude:e} m, 1/T = {frequency} Hz"),
+    };
+    let others = others_in_words(parameters);
+    format!("V0 = {velocity:e} m/s, {modulation}{others}")
+}
+
+fn others_in_words(parameters: &Parameters) -> String {
     let others = other_settings(parameters).map(|(key, value)| format!(", {key} = {value}"));
-    format!(
-        "V0 = {:e} m/s, {modulation}{}",
-        parameters.drive_velocity,
-        others.collect::<String>()
-    )
+    others.collect()
 }
 
 /// Keys and values of what differs from the defaults, but for the drive and the seed.
