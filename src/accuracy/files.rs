@@ -27,7 +27,6 @@ pub fn processor() -> String {
     format!("{name} ({}{clock})", std::env::consts::ARCH)
 }
 
-/// What a study found, as JSON.
 pub fn to_json(study: &Study, findings: &Findings) -> Value {
     json!({
         "format": FORMAT,

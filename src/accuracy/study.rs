@@ -22,7 +22,6 @@ const MODULATION: (f64, f64) = (1e-6, 58.0);
 const DISCARD: u64 = 5;
 /// Tolerance of the reference of break times, the tightest that there is.
 const TIGHTEST_TOLERANCE: f64 = 1e-12;
-/// Tolerance of the reference ensemble.
 const ENSEMBLE_TOLERANCE: f64 = 1e-10;
 /// Seeds of the reference ensemble are so far from those of the methods: the samples are independent.
 const REFERENCE_SEEDS: u64 = 1_000_000;
@@ -38,7 +37,6 @@ pub struct Study {
     pub own: Solver,
     /// Slips that the sweep records of each set; none without a sweep.
     pub slips_of_sets: Vec<u64>,
-    /// Seed of the first realisation.
     pub first_seed: u64,
     /// Realisations of each ensemble, each timed once, in turn with those of the other solvers.
     pub seeds: u64,

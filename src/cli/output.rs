@@ -41,7 +41,6 @@ pub fn warn(warnings: &[String]) {
     }
 }
 
-/// Writes bytes to a file.
 pub fn write(file: &Destination, bytes: &[u8]) -> Result<()> {
     file.write(catch_signals, |mut file| Ok(file.write(bytes)?))
 }
@@ -77,12 +76,10 @@ struct TextColumn {
 }
 
 impl TextTable {
-    /// Adds a column of words, with a cell for each row.
     pub fn words<R>(&mut self, head: impl Into<String>, rows: &[R], cell: impl Fn(&R) -> String) {
         self.add(true, head.into(), rows.iter().map(cell));
     }
 
-    /// Adds a column of numbers, with a cell for each row.
     pub fn numbers<R>(&mut self, head: impl Into<String>, rows: &[R], cell: impl Fn(&R) -> String) {
         self.add(false, head.into(), rows.iter().map(cell));
     }

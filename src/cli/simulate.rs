@@ -251,7 +251,6 @@ struct Tables<'a> {
 }
 
 impl Tables<'_> {
-    /// Writes a table, if there is a file for it.
     fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
         Destination::new(path, Kind::PARQUET)?.write(catch_signals, |file| {
@@ -293,7 +292,6 @@ impl Arguments {
         Ok(Destination::refuse_same(&all)?)
     }
 
-    /// Draws the plot into each of its files.
     fn write_plots(
         &self,
         parameters: &Parameters,

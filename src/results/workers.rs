@@ -42,7 +42,6 @@ const CLAIM: &str = "claim";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Worker {
     pub host: String,
-    /// Id of the process there.
     pub process: u32,
     /// Boot and name space of its processes, within which it can look them up. Empty if unknown.
     system: String,

@@ -17,7 +17,6 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often the collector looks at the stop flag.
 const STOP_POLL: Duration = Duration::from_millis(if cfg!(test) { 2 } else { 20 });
 /// Time between two ticks for the display.
 const TICK: Duration = shorter_in_tests(Duration::from_secs(1), Duration::from_millis(20));
@@ -50,7 +49,6 @@ struct UnderWay {
     long_after: Duration,
 }
 
-/// The jobs under way, by part and position.
 type AllUnderWay = Mutex<BTreeMap<(PartName, usize), UnderWay>>;
 
 /// The jobs that were handed out and have not ended.

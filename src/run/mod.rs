@@ -189,7 +189,6 @@ impl Joined<'_> {
         self.allowed_memory.min(limits::available_memory())
     }
 
-    /// Runs the parts of the rounds so far.
     fn run_parts(
         &self,
         pending: &Pending<'_>,

@@ -284,7 +284,6 @@ impl<'a> Work<'a> {
         Ok(false)
     }
 
-    /// Takes what is to be run of a part.
     fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
         if !self.pending.done.contains(&outline.name) {
             let spilled = self.pending.spilled(outline)?;

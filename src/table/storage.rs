@@ -181,7 +181,6 @@ pub fn gone_is_fine(ended: Result<(), StorageError>) -> Result<(), StorageError>
     }
 }
 
-/// The answer to a request for a lock.
 pub enum Lock {
     /// The caller has the lock until this value is dropped or the process ends.
     Ours(Box<dyn Send + Sync>),
