@@ -58,19 +58,6 @@ impl Results<'_> {
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
         let folder = NewFolder::new(path)?;
-        let exported = self.write_all(&folder, format, stop, progress)?;
-        refuse_stopped(stop, &folder.place)?;
-        folder.publish(self.layout().storage)?;
-        Ok(exported)
-    }
-
-    fn write_all(
-        &self,
-        to: &NewFolder,
-        format: Format,
-        stop: &AtomicBool,
-        progress: &mut dyn FnMut(u64, u64),
-    ) -> Result<Exported, ResultsError> {
         let storage = self.layout().storage;
         let parts = self.parts_of(JOBS)?;
         let overview = self.overview()?;
@@ -85,13 +72,13 @@ impl Results<'_> {
         let mut done = 0;
         for table in self.tables() {
             let name = format!("{table}.{}", format.word());
-            let path = to.draft.path().join(&name);
+            let path = folder.draft.path().join(&name);
             let joined = JoinedTable::new(self, table, &self.exported_columns(table));
             let file = storage.create(&path)?;
             let mut writer = RowWriter::new(file, format, joined.schema(), &self.footer_of_all())?;
             let mut rows = 0;
             for &part in &parts {
-                refuse_stopped(stop, &to.place)?;
+                refuse_stopped(stop, &folder.place)?;
                 progress(done, total);
                 joined.visit(part, |batch| {
                     rows += batch.num_rows() as u64;
@@ -107,6 +94,8 @@ impl Results<'_> {
             exported.files.push(ExportedFile { name, rows, bytes });
         }
         progress(total, total);
+        refuse_stopped(stop, &folder.place)?;
+        folder.publish(storage)?;
         Ok(exported)
     }
 
