@@ -24,7 +24,6 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::borrow::Cow;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -312,7 +311,9 @@ impl Arguments {
             ))
             .into());
         }
-        let shown = self.shown_times();
+        // The sample at an end is shown, however its time is rounded.
+        let slack = 1e-6 * self.tables.sample;
+        let shown = from - slack..=self.plot.until.unwrap_or(f64::INFINITY) + slack;
         let trace = records.trace.iter().filter(|row| shown.contains(&row.time));
         let trace: Vec<(f64, f64)> = trace.map(|row| (row.time, row.force)).collect();
         let map = records.map.iter().filter(|row| shown.contains(&row.time));
@@ -327,12 +328,6 @@ impl Arguments {
             output::write(&destination, &picture.encoded(format)?)?;
         }
         Ok(())
-    }
-
-    /// The times of the plot. The sample at an end is shown, however its time is rounded.
-    fn shown_times(&self) -> RangeInclusive<f64> {
-        let slack = 1e-6 * self.tables.sample;
-        self.plot.from - slack..=self.plot.until.unwrap_or(f64::INFINITY) + slack
     }
 }
 
