@@ -313,15 +313,12 @@ impl Results<'_> {
         for batch in jobs.rows::<OutcomeRow>() {
             for row in batch? {
                 let is_cut_off = row.simulated_time.is_some_and(is_cut_off);
-                match row.outcome {
-                    JobOutcome::Failed => {
-                        again.insert(rows, Again::Failed(row.reason.unwrap_or_default()));
-                    }
-                    JobOutcome::TimeLimit if is_cut_off => {
-                        again.insert(rows, Again::CutOff);
-                    }
-                    _ => (),
-                }
+                let why = match row.outcome {
+                    JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
+                    JobOutcome::TimeLimit if is_cut_off => Some(Again::CutOff),
+                    _ => None,
+                };
+                again.extend(why.map(|why| (rows, why)));
                 rows += 1;
             }
         }

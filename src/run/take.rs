@@ -251,12 +251,8 @@ impl<'a> Work<'a> {
         let done = self.pending.results.done_parts()?;
         let mut is_certain = true;
         let mut free = Vec::new();
-        for part in self
-            .pending
-            .parts
-            .iter()
-            .filter(|part| !done.contains(&part.name))
-        {
+        let parts = self.pending.parts.iter();
+        for part in parts.filter(|part| !done.contains(&part.name)) {
             let name = part.name.to_string();
             match self.claims.standing(&name, &others)? {
                 ClaimState::Own => (),
