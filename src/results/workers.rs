@@ -346,11 +346,8 @@ impl<'a> Member<'a> {
             "is being run by process {process} on {host}, for another sweep file; wait for it or stop it, or choose \
              another directory with --out"
         );
-        Err(ResultsError::new(
-            ErrorKind::Busy,
-            self.layout.root(),
-            problem,
-        ))
+        let root = self.layout.root();
+        Err(ResultsError::new(ErrorKind::Busy, root, problem))
     }
 
     /// Why it can commit nothing any more, if others took it for dead. A listing is true also on a network disk.

@@ -111,12 +111,7 @@ impl Collector<'_, '_> {
     /// than a job fails. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let mut threads = self.joined.threads;
-        let work = Work::new(
-            self.pending,
-            self.joined.member,
-            &self.joined.walltime,
-            threads,
-        )?;
+        let work = Work::new(self.pending, self.joined)?;
         if work.is_all_alone() {
             // Each thread takes address space.
             threads = 1;
