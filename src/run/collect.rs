@@ -5,7 +5,7 @@ use crate::results::ResultsError;
 use crate::results::layout::shorter_in_tests;
 use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
-use crate::run::take::{PartJob, Taken, Work};
+use crate::run::take::{LOOK, Left, PartJob, Taken, Work};
 use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, limits};
 use crate::solver::SimulationError;
 use crate::sweep::{Job, PartName};
@@ -107,9 +107,35 @@ pub(super) struct Collector<'a, 'e> {
 }
 
 impl Collector<'_, '_> {
+    /// Runs jobs until this worker has none left, and reports what other workers still run; `None` if it was stopped.
+    pub fn run_all(&mut self, kernel: &Kernel<'_>) -> Result<Option<Left>, ResultsError> {
+        let has_rounds = self.pending.results.round().is_some();
+        while self.run(kernel)? {
+            loop {
+                let left = self.pending.left(self.joined.member)?;
+                if left.has_abandoned {
+                    // Their worker has died meanwhile.
+                    break;
+                }
+                if left.jobs == 0 {
+                    return Ok(Some(left));
+                }
+                if self.joined.must_end() {
+                    return Ok(None);
+                }
+                if !has_rounds {
+                    return Ok(Some(left));
+                }
+                // The next round may have jobs for this worker.
+                std::thread::sleep(LOOK);
+            }
+        }
+        Ok(None)
+    }
+
     /// Runs pending jobs until none is left for this worker, the flag turns true, the time is over, or something other
     /// than a job fails. Returns whether it took all that it could.
-    pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
+    fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let mut threads = self.joined.threads;
         let work = Work::new(self.pending, self.joined)?;
         if work.is_all_alone() {

@@ -33,7 +33,6 @@ use crate::results::{Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
 use crate::run::limits::Walltime;
-use crate::run::take::{LOOK, Left};
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
 use crate::table::file::PROGRAM;
@@ -247,7 +246,7 @@ impl Joined<'_> {
             open: BTreeMap::new(),
             own: (0, 0.0),
         };
-        let ended = self.collect(&mut collector, pending, kernel);
+        let ended = collector.run_all(kernel);
         report.wall = self.begin.elapsed().as_secs_f64();
         let left = ended.inspect_err(|error| {
             // The disk may be what failed: the first error counts.
@@ -264,37 +263,6 @@ impl Joined<'_> {
             }
         }
         Ok(())
-    }
-
-    /// Runs jobs until this worker has none left, and reports what other workers still run; `None` if it was stopped.
-    fn collect(
-        &self,
-        collector: &mut Collector<'_, '_>,
-        pending: &Pending<'_>,
-        kernel: &Kernel<'_>,
-    ) -> Result<Option<Left>, ResultsError> {
-        let has_rounds = pending.results.round().is_some();
-        while collector.run(kernel)? {
-            loop {
-                let left = pending.left(self.member)?;
-                if left.has_abandoned {
-                    // Their worker has died meanwhile.
-                    break;
-                }
-                if left.jobs == 0 {
-                    return Ok(Some(left));
-                }
-                if self.must_end() {
-                    return Ok(None);
-                }
-                if !has_rounds {
-                    return Ok(Some(left));
-                }
-                // The next round may have jobs for this worker.
-                std::thread::sleep(LOOK);
-            }
-        }
-        Ok(None)
     }
 
     /// Reduces with `body`, once every job is done; `None` if another worker does so, or has.
