@@ -217,26 +217,25 @@ impl Joined<'_> {
         let jobs_there =
             overview.jobs_done + overview.jobs_spilled + overview.jobs_failed - jobs_again;
         let predicted_cost = overview.predicted_cost_missing + cost_again;
-        match (&events.log, pending.results.rounds_so_far()) {
-            (Some(_), Some(rounds)) => events.send(&RunEvent::RoundBegun {
+        if let (Some(_), Some(rounds)) = (&events.log, pending.results.rounds_so_far()) {
+            events.send(&RunEvent::RoundBegun {
                 jobs: report.jobs_left,
                 predicted_cost,
                 rounds,
-            })?,
-            _ => {
-                events.log = Some(pending.results.begin_log()?);
-                events.send(&RunEvent::Started {
-                    host: host(),
-                    process: std::process::id(),
-                    program: PROGRAM.to_owned(),
-                    shard: self.options.shard.to_string(),
-                    others: self.member.others()?.len(),
-                    threads: self.threads,
-                    jobs: report.jobs_left,
-                    jobs_there,
-                    predicted_cost,
-                })?;
-            }
+            })?;
+        } else {
+            events.log = Some(pending.results.begin_log()?);
+            events.send(&RunEvent::Started {
+                host: host(),
+                process: std::process::id(),
+                program: PROGRAM.to_owned(),
+                shard: self.options.shard.to_string(),
+                others: self.member.others()?.len(),
+                threads: self.threads,
+                jobs: report.jobs_left,
+                jobs_there,
+                predicted_cost,
+            })?;
         }
         let mut collector = Collector {
             joined: self,
