@@ -57,7 +57,6 @@ pub fn sweep_text(changes: &[Change]) -> String {
     format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
 }
 
-/// The job of a sweep that has one.
 pub fn only_job(sweep: &Sweep) -> Result<Job, RequestError> {
     let mut jobs = sweep.jobs_of_grid();
     match (jobs.next(), jobs.count()) {
@@ -118,7 +117,6 @@ pub struct Records {
     /// Cells of the map, instant by instant.
     pub map: Vec<MapRow>,
     pub profile: Vec<ProfileRow>,
-    /// Contact events, in order.
     pub contacts: Vec<ContactEvent>,
 }
 

@@ -35,7 +35,6 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Keeps this number of breaks.
     pub fn new(parameters: &Parameters, wanted: usize) -> Self {
         Self {
             wanted,

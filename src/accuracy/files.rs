@@ -1,6 +1,6 @@
 //! The files of a study: everything as JSON, and figures.
 
-use super::{Findings, MethodRow, Study, other_settings, verdict};
+use super::{Findings, MethodRow, Study, other_settings, others_in_words, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::destination::{Destination, Kind, refuse_reserved};
@@ -27,7 +27,6 @@ pub fn processor() -> String {
     format!("{name} ({}{clock})", std::env::consts::ARCH)
 }
 
-/// What a study found, as JSON.
 pub fn to_json(study: &Study, findings: &Findings) -> Value {
     json!({
         "format": FORMAT,
@@ -44,9 +43,6 @@ pub fn to_json(study: &Study, findings: &Findings) -> Value {
     })
 }
 
-/// What says whether a signal came to stop the command.
-type Stop = fn() -> Result<&'static AtomicBool>;
-
 /// Refuses a folder in which something would be lost.
 pub fn check(folder: &Path) -> Result<()> {
     refuse_reserved(folder)?;
@@ -60,12 +56,12 @@ pub fn check(folder: &Path) -> Result<()> {
 }
 
 /// Writes what a study found into a folder, over what an earlier one left there, with a figure for the sets that differ
-/// in the modulation alone; returns the files.
+/// in the modulation alone; returns the files. `stop` says whether a signal came to stop the command.
 pub fn write(
     study: &Study,
     findings: &Findings,
     folder: &Path,
-    stop: Stop,
+    stop: fn() -> Result<&'static AtomicBool>,
 ) -> Result<Vec<PathBuf>> {
     let mut sets: Vec<Parameters> = Vec::new();
     for set in study.sets.iter().map(Parameters::without_modulation) {
@@ -79,11 +75,8 @@ pub fn write(
     )];
     for set in sets {
         let others = other_settings(&set).map(|(key, value)| format!("-{key}-{value}"));
-        let name = format!(
-            "work-precision-V0-{:e}{}",
-            set.drive_velocity,
-            others.collect::<String>()
-        );
+        let others: String = others.collect();
+        let name = format!("work-precision-V0-{:e}{others}", set.drive_velocity);
         let picture = work_precision_figure(&set, findings)?;
         documents.push((format!("{name}.svg"), picture.svg().into_bytes()));
         documents.push((format!("{name}.png"), picture.png()?));
@@ -129,7 +122,7 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
         });
     }
     panels.retain(|panel| !panel.points.is_empty());
-    let others = other_settings(set).map(|(key, value)| format!(", {key} = {value}"));
+    let others = others_in_words(set);
     let mut mine = findings
         .methods
         .iter()
@@ -139,12 +132,9 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     } else {
         ""
     };
+    let velocity = set.drive_velocity;
     let look = Look {
-        note: format!(
-            "V0 = {:e} m/s{}. {NOTE}{extrapolated}",
-            set.drive_velocity,
-            others.collect::<String>()
-        ),
+        note: format!("V0 = {velocity:e} m/s{others}. {NOTE}{extrapolated}"),
         ..Look::default()
     };
     work_precision(WORK, &panels, &look)
@@ -156,28 +146,19 @@ fn points(
     set: &Parameters,
     error: impl Fn(&MethodRow) -> Option<(f64, (f64, f64))>,
 ) -> Vec<WorkPrecision> {
-    let rows: Vec<&MethodRow> = rows
-        .iter()
-        .filter(|row| row.parameters.without_modulation() == *set)
-        .collect();
-    let modulations = || {
-        rows.iter()
-            .filter(|row| row.parameters.modulation_amplitude > 0.0)
-    };
-    let is_one = modulations().all(|row| {
-        modulations()
-            .next()
-            .is_some_and(|first| first.parameters == row.parameters)
-    });
-    let point = |row: &&MethodRow| {
+    let rows = rows.iter();
+    let rows = rows.filter(|row| row.parameters.without_modulation() == *set);
+    let modulated = rows.clone().map(|row| &row.parameters);
+    let mut modulated = modulated.filter(|set| set.modulation_amplitude > 0.0);
+    let first = modulated.next();
+    let is_one = modulated.all(|other| Some(other) == first);
+    let point = |row: &MethodRow| {
         let (error, uncertainty) = error(row)?;
+        let amplitude = row.parameters.modulation_amplitude;
         let drive = match row.parameters.frequency() {
             None => "Δ = 0".to_owned(),
             Some(_) if is_one => "Δ > 0".to_owned(),
-            Some(frequency) => format!(
-                "Δ = {:e} m, {frequency} Hz",
-                row.parameters.modulation_amplitude
-            ),
+            Some(frequency) => format!("Δ = {amplitude:e} m, {frequency} Hz"),
         };
         let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         let method = format!("{}{mark}", row.solver.name());
@@ -189,7 +170,7 @@ fn points(
             work: row.cost.per_slip,
         })
     };
-    rows.iter().filter_map(point).collect()
+    rows.filter_map(point).collect()
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ pub use verdict::{shows_bias, verdict};
 
 use self::comparison::{Bias, BreakErrors};
 use crate::model::{Description, Parameters, Selected, Selection, Symbol, Value};
+use crate::results::tables::DriveAndSeed;
 use crate::solver::{Method, Resolve, Solver};
 use crate::table::columns::columns;
 use std::fmt;
@@ -143,36 +144,27 @@ impl Findings {
 
 /// The drive of a set in words, and what else differs from the defaults.
 pub fn set_in_words(parameters: &Parameters) -> String {
-    let modulation = parameters.frequency().map_or_else(
-        || "Delta = 0".to_owned(),
-        |frequency| {
-            format!(
-                "Delta = {:e} m, 1/T = {frequency} Hz",
-                parameters.modulation_amplitude
-            )
-        },
-    );
+    let velocity = parameters.drive_velocity;
+    let amplitude = parameters.modulation_amplitude;
+    let modulation = match parameters.frequency() {
+        None => "Delta = 0".to_owned(),
+        Some(frequency) => format!("Delta = {amplitude:e} m, 1/T = {frequency} Hz"),
+    };
+    let others = others_in_words(parameters);
+    format!("V0 = {velocity:e} m/s, {modulation}{others}")
+}
+
+fn others_in_words(parameters: &Parameters) -> String {
     let others = other_settings(parameters).map(|(key, value)| format!(", {key} = {value}"));
-    format!(
-        "V0 = {:e} m/s, {modulation}{}",
-        parameters.drive_velocity,
-        others.collect::<String>()
-    )
+    others.collect()
 }
 
 /// Keys and values of what differs from the defaults, but for the drive and the seed.
 fn other_settings(parameters: &Parameters) -> impl Iterator<Item = (&'static str, Value)> {
     let defaults = Parameters::default();
-    let others = |symbol: &Symbol| {
-        !matches!(
-            symbol,
-            Symbol::V0 | Symbol::Delta | Symbol::T | Symbol::Seed
-        )
-    };
-    let settings = Symbol::ALL
-        .into_iter()
-        .filter(others)
-        .map(|symbol| (symbol, parameters.get(symbol)));
+    let others = |symbol: &Symbol| !DriveAndSeed::SYMBOLS.contains(symbol);
+    let settings = Symbol::ALL.into_iter().filter(others);
+    let settings = settings.map(|symbol| (symbol, parameters.get(symbol)));
     let settings = settings.filter(move |(symbol, value)| *value != defaults.get(*symbol));
     settings.map(|(symbol, value)| (symbol.key(), value))
 }

@@ -22,7 +22,6 @@ const MODULATION: (f64, f64) = (1e-6, 58.0);
 const DISCARD: u64 = 5;
 /// Tolerance of the reference of break times, the tightest that there is.
 const TIGHTEST_TOLERANCE: f64 = 1e-12;
-/// Tolerance of the reference ensemble.
 const ENSEMBLE_TOLERANCE: f64 = 1e-10;
 /// Seeds of the reference ensemble are so far from those of the methods: the samples are independent.
 const REFERENCE_SEEDS: u64 = 1_000_000;
@@ -38,7 +37,6 @@ pub struct Study {
     pub own: Solver,
     /// Slips that the sweep records of each set; none without a sweep.
     pub slips_of_sets: Vec<u64>,
-    /// Seed of the first realisation.
     pub first_seed: u64,
     /// Realisations of each ensemble, each timed once, in turn with those of the other solvers.
     pub seeds: u64,
@@ -236,22 +234,13 @@ impl Study {
                 errors.push(self.break_times(&of_first, solver, &first_breaks)?);
             }
             report("timed ensembles");
-            let mut ensembles = self.ensembles(parameters)?;
+            let ensembles = self.ensembles(parameters)?;
             let seeds = self.seeds * if set == 0 { self.first_set_multiple } else { 1 };
             report("reference ensemble, and realisations that are not timed");
             let reference = taylor(ENSEMBLE_TOLERANCE);
             let others = first + REFERENCE_SEEDS;
             let others = others..others + REFERENCE_SHARE * seeds;
             let reference = self.slips_of(parameters, reference, others)?;
-            for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
-                if !self.is_stretch_only(parameters, solver) {
-                    ensemble.slips.extend(self.slips_of(
-                        parameters,
-                        solver,
-                        first + self.seeds..first + seeds,
-                    )?);
-                }
-            }
             if reference.is_empty() {
                 let case = set_in_words(parameters);
                 bail!(
@@ -260,20 +249,20 @@ impl Study {
             }
             let intervals: Vec<f64> = reference.iter().filter_map(|slip| slip.interval).collect();
             let mean_interval = intervals.iter().sum::<f64>() / intervals.len() as f64;
-            let pairs: Vec<(Solver, &Ensemble)> =
-                self.solvers.iter().copied().zip(&ensembles).collect();
-            for (&(solver, ensemble), break_times) in pairs.iter().zip(errors) {
-                let case = set_in_words(parameters);
-                let parameters = parameters.clone();
+            let ensembles = ensembles.into_iter().zip(errors);
+            for (&solver, (mut ensemble, break_times)) in self.solvers.iter().zip(ensembles) {
                 findings.methods.push(MethodRow {
-                    parameters: Selected::new(parameters),
-                    case,
+                    parameters: Selected::new(parameters.clone()),
+                    case: set_in_words(parameters),
                     solver: solver.into(),
                     cost: ensemble.cost(mean_interval),
                     break_times,
                 });
-            }
-            for (solver, ensemble) in pairs {
+                if !self.is_stretch_only(parameters, solver) {
+                    let untimed = first + self.seeds..first + seeds;
+                    let slips = self.slips_of(parameters, solver, untimed)?;
+                    ensemble.slips.extend(slips);
+                }
                 let biases = bias_rows(parameters, solver, &ensemble.slips, &reference);
                 findings.biases.extend(biases);
             }

@@ -11,7 +11,6 @@ const MIN_SLIPS: u64 = 100;
 /// A tighter setting is one whose breaks are off by less than this share.
 const TIGHTER: f64 = 0.5;
 
-/// Whether a row shows a bias among so many comparisons.
 pub fn shows_bias(row: &BiasRow, comparisons: usize) -> bool {
     let by_chance = row.bias.half_width_among(comparisons);
     can_tell(row) && by_chance.is_some_and(|by_chance| row.bias.of_mean.abs() > by_chance)

@@ -111,7 +111,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
     let files = accuracy::write(&study, &findings, &out, catch_signals)?;
     if arguments.json {
-        output::plain_json(&accuracy::to_json(&study, &findings))?;
+        output::print(&format!("{:#}\n", accuracy::to_json(&study, &findings)))?;
     } else {
         output::print(&study_text(&study, &findings))?;
         output::lines(files.iter().map(|file| shown(file).to_string()))?;
@@ -121,6 +121,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
 
 /// The sets of a sweep, with seed 0, and the slips that the jobs of each are expected to record.
 fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, f64)>> {
+    let name = sweep.name();
     let mut sets: Vec<(Parameters, f64)> = Vec::new();
     for job in sweep.jobs_of_grid() {
         let slips = sweep
@@ -136,18 +137,14 @@ fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, f64)>> {
         }
         if sets.len() > MAX_SETS {
             let problem = format!(
-                "sweep {} has more than {MAX_SETS} sets; choose one by the values of its axes, such as --set V0=1e-5 --set N=35",
-                sweep.name()
+                "sweep {name} has more than {MAX_SETS} sets; choose one by the values of its axes, such as --set V0=1e-5 --set N=35"
             );
             return Err(UsageError(problem).into());
         }
     }
     if sets.is_empty() {
-        return Err(UsageError(format!(
-            "sweep {} has no jobs: its conditions drop all points",
-            sweep.name()
-        ))
-        .into());
+        let problem = format!("sweep {name} has no jobs: its conditions drop all points");
+        return Err(UsageError(problem).into());
     }
     Ok(sets)
 }

@@ -41,7 +41,6 @@ pub fn warn(warnings: &[String]) {
     }
 }
 
-/// Writes bytes to a file.
 pub fn write(file: &Destination, bytes: &[u8]) -> Result<()> {
     file.write(catch_signals, |mut file| Ok(file.write(bytes)?))
 }
@@ -54,12 +53,8 @@ pub fn json(format: u32, value: &impl Serialize) -> Result<()> {
         #[serde(flatten)]
         value: &'a T,
     }
-    plain_json(&Versioned { format, value })
-}
-
-/// Prints a value as JSON that has its version, or needs none.
-pub fn plain_json(value: &impl Serialize) -> Result<()> {
-    print(&format!("{}\n", serde_json::to_string_pretty(value)?))
+    let versioned = Versioned { format, value };
+    print(&format!("{}\n", serde_json::to_string_pretty(&versioned)?))
 }
 
 /// Prints labels and values in two columns.
@@ -81,12 +76,10 @@ struct TextColumn {
 }
 
 impl TextTable {
-    /// Adds a column of words, with a cell for each row.
     pub fn words<R>(&mut self, head: impl Into<String>, rows: &[R], cell: impl Fn(&R) -> String) {
         self.add(true, head.into(), rows.iter().map(cell));
     }
 
-    /// Adds a column of numbers, with a cell for each row.
     pub fn numbers<R>(&mut self, head: impl Into<String>, rows: &[R], cell: impl Fn(&R) -> String) {
         self.add(false, head.into(), rows.iter().map(cell));
     }

@@ -39,7 +39,6 @@ pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     })
 }
 
-/// Reports how many jobs are missing, and how to continue.
 pub fn report_missing(results: &Results<'_>) -> Result<()> {
     if let Some(unfinished) = output::unfinished(results)? {
         output::report(&format!("reduced what is there: {unfinished}"));

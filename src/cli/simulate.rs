@@ -8,23 +8,22 @@ use super::plot::picture_file;
 use super::sweep::{self, PresetFlag, Variation, changes};
 use super::{Exit, UsageError, catch_signals};
 use crate::figure::simulation;
-use crate::model::{Parameters, Symbol};
+use crate::model::{Parameters, Selected, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
 use crate::results::destination::{Destination, Kind};
-use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
+use crate::results::tables::{self, All, DriveAndSeed, JobOutcome, SlipRow};
 use crate::sets::Digits;
 use crate::single_job::{self, Records, Request};
 use crate::solver::{Method, SolverKey};
 use crate::sweep::{Change, Sweep};
 use crate::table::Table;
+use crate::table::arrow;
 use crate::table::file::{Footer, TableWriter};
 use crate::table::shown::shown;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use serde_json::json;
 use std::borrow::Cow;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -218,9 +217,10 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let slips = (measured.slips.iter())
         .map(|slip| -> SlipRow<'_> { (Cow::Borrowed(&label), Cow::Borrowed(slip)) });
     let contacts = records.contacts.iter().map(ContactRow::from);
+    let all = arrow::json(&Selected::<All>::new(parameters.clone()));
     let footer = Footer::default()
         .with_sweep(sweep.name(), sweep.text())
-        .with("parameters", &as_json(parameters));
+        .with("parameters", &all.to_string());
     let tables = Tables {
         footer: &footer,
         left_out: &sweep.recording().left_out(),
@@ -250,7 +250,6 @@ struct Tables<'a> {
 }
 
 impl Tables<'_> {
-    /// Writes a table, if there is a file for it.
     fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
         Destination::new(path, Kind::PARQUET)?.write(catch_signals, |file| {
@@ -292,7 +291,6 @@ impl Arguments {
         Ok(Destination::refuse_same(&all)?)
     }
 
-    /// Draws the plot into each of its files.
     fn write_plots(
         &self,
         parameters: &Parameters,
@@ -313,7 +311,9 @@ impl Arguments {
             ))
             .into());
         }
-        let shown = self.shown_times();
+        // The sample at an end is shown, however its time is rounded.
+        let slack = 1e-6 * self.tables.sample;
+        let shown = from - slack..=self.plot.until.unwrap_or(f64::INFINITY) + slack;
         let trace = records.trace.iter().filter(|row| shown.contains(&row.time));
         let trace: Vec<(f64, f64)> = trace.map(|row| (row.time, row.force)).collect();
         let map = records.map.iter().filter(|row| shown.contains(&row.time));
@@ -328,12 +328,6 @@ impl Arguments {
             output::write(&destination, &picture.encoded(format)?)?;
         }
         Ok(())
-    }
-
-    /// The times of the plot. The sample at an end is shown, however its time is rounded.
-    fn shown_times(&self) -> RangeInclusive<f64> {
-        let slack = 1e-6 * self.tables.sample;
-        self.plot.from - slack..=self.plot.until.unwrap_or(f64::INFINITY) + slack
     }
 }
 
@@ -359,12 +353,6 @@ impl JobFlags {
             axes: Vec::new(),
         })
     }
-}
-
-/// The parameters as JSON, under their keys.
-fn as_json(parameters: &Parameters) -> String {
-    let entry = |symbol: Symbol| (symbol.key().to_owned(), json!(parameters.get(symbol)));
-    serde_json::Value::Object(Symbol::ALL.map(entry).into_iter().collect()).to_string()
 }
 
 /// What is printed of a job.

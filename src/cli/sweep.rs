@@ -187,7 +187,6 @@ pub fn warn_of_partitions(root: &Path, sweep: &Sweep) {
     }
 }
 
-/// A sweep as varied.
 pub fn vary(sweep: Sweep, changes: &[Change]) -> Result<Sweep> {
     if changes.is_empty() {
         Ok(sweep)

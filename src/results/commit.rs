@@ -96,7 +96,7 @@ impl Drop for Commit<'_> {
 
 /// A number that no other process or commit has.
 #[cfg(not(test))]
-pub(super) fn own_number() -> u64 {
+pub(crate) fn own_number() -> u64 {
     use std::hash::{BuildHasher, RandomState};
     RandomState::new().hash_one(std::process::id())
 }

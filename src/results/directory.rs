@@ -5,12 +5,12 @@ use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden};
-use crate::results::tables::{TABLES, tables_of};
+use crate::results::tables::{JOBS, TABLES, tables_of};
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::{DataFile, Dataset, Footer};
-use crate::table::storage::StorageError;
+use crate::table::storage::{StorageError, gone_is_fine};
 use std::collections::BTreeSet;
 use std::io;
 use std::ops::RangeInclusive;
@@ -314,12 +314,11 @@ impl<'a> Results<'a> {
             return Ok(BTreeSet::new());
         }
         // The jobs first: a part that has its jobs had its other files before.
-        let mut done: Option<BTreeSet<PartName>> = None;
-        for table in self.tables().rev() {
-            let parts = self.parts_of(table)?;
-            done = Some(done.map_or(parts.clone(), |done| &done & &parts));
+        let mut done = self.parts_of(JOBS)?;
+        for table in self.tables().filter(|table| *table != JOBS) {
+            done = &done & &self.parts_of(table)?;
         }
-        Ok(done.unwrap_or_default())
+        Ok(done)
     }
 
     /// Removes what earlier runs left of unfinished parts: files of some of their tables, and spilled jobs.
@@ -395,11 +394,6 @@ impl<'a> Results<'a> {
         Plan::new(&self.extensions)
     }
 
-    /// What the footer of this file of an extension's part holds.
-    pub(super) fn footer(&self, extension: usize, file: &Path) -> Footer {
-        Footer::default().and(&self.footers[extension]).at(file)
-    }
-
     /// The footer of files that are made from all tables: it has the current sweep.
     pub fn footer_of_all(&self) -> Footer {
         Footer::default().with_sweep(self.sweep().name(), self.sweep().text())
@@ -431,10 +425,7 @@ impl<'a> Results<'a> {
         ];
         folders.extend(TABLES.map(|table| layout.table(table)));
         for folder in folders {
-            match layout.storage.sync_folder(&folder) {
-                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                synced => synced?,
-            }
+            gone_is_fine(layout.storage.sync_folder(&folder))?;
         }
         Ok(())
     }

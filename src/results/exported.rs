@@ -221,29 +221,21 @@ impl<'a> JoinedTable<'a> {
     pub fn visit(
         &self,
         part: PartName,
-        visit: impl FnMut(RecordBatch) -> Result<(), ResultsError>,
-    ) -> Result<(), ResultsError> {
-        self.visit_batches(part, visit)
-            .map_err(|error| match error.damage() {
-                Ok((path, problem)) => ResultsError::damaged(&path, problem),
-                Err(error) => error,
-            })
-    }
-
-    fn visit_batches(
-        &self,
-        part: PartName,
         mut visit: impl FnMut(RecordBatch) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
+        let unread = |error: ResultsError| match error.damage() {
+            Ok((path, problem)) => ResultsError::damaged(&path, problem),
+            Err(error) => error,
+        };
         let layout = self.results.layout();
-        let jobs = self.read_jobs(part)?;
+        let jobs = self.read_jobs(part).map_err(unread)?;
         let mut file = (self.results).file_in(&layout.tables(), self.table, part);
         if self.table != JOBS {
             let jobs = self.results.dataset_of(JOBS, part);
-            file.rows = Some(row_count(jobs, self.table)?);
+            file.rows = Some(row_count(jobs, self.table).map_err(unread)?);
         }
         for batch in Dataset::of(layout.storage, vec![file]).columns(&self.own) {
-            let Batch { path, rows } = batch?;
+            let Batch { path, rows } = batch.map_err(unread)?;
             let joined = self.join(&rows, jobs.as_ref());
             visit(joined.map_err(ResultsError::damage_at(&path))?)?;
         }

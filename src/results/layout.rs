@@ -1,19 +1,8 @@
-//! Layout of a results directory: where everything lies, and which parts its names say are done.
+//! Layout of a results directory: where everything lies, and which parts its names say are done. `docs/internals.md`
+//! shows it.
 //!
-//! ```text
-//! results/<name>/tables/{slips,precursors,jobs}/part-EEE-FFFFFF.parquet   committed files only, at every instant
-//!                reduced/  figures/  report.html                         made from the tables
-//!                run/extension-EEE.json                                  what the tables belong to; written once
-//!                run/copies/extension-EEE.json                           the same once more
-//!                run/{workers,claims,staging,lock,log}/                  of no use once nothing runs
-//!                run/deaths/                                             parts at which workers died
-//!                run/spill/{slips,precursors,jobs}/                      finished jobs of parts that are not done
-//!                run/quarantine/                                         damaged files that a repair took away
-//! ```
-//!
-//! EEE is the number of the extension, FFFFFF that of the part in it. Staging lies on the same file system as the
-//! tables, so that a rename moves a whole file at once, but outside their folders: a stray file there breaks some
-//! reader.
+//! Staging lies on the same file system as the tables, so that a rename moves a whole file at once, but outside their
+//! folders: a stray file there breaks some reader.
 
 use crate::sweep::{PartName, Sweep};
 use crate::table::error::ResultsError;

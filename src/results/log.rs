@@ -101,7 +101,6 @@ pub struct RunReport {
     pub parts_committed: u64,
     /// Whether a signal or the walltime stopped the run before all was done.
     pub stopped: bool,
-    /// Unfinished parts at which workers died.
     #[serde(default)]
     pub marked: Vec<Marked>,
     /// Hosts of the workers that run the jobs which are left.
@@ -135,11 +134,6 @@ fn now() -> f64 {
 pub struct Log(StoredFile);
 
 impl Log {
-    /// Brings what was written to the disk, where other hosts see it.
-    pub fn sync(&mut self) -> Result<(), StorageError> {
-        self.0.sync()
-    }
-
     /// Appends an event. Events of each job or second are left out: they would be millions of lines.
     pub fn write(&mut self, event: &RunEvent) -> Result<(), StorageError> {
         if matches!(

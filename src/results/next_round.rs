@@ -43,9 +43,7 @@ impl Results<'_> {
 
     /// The round that was begun last; `None` if the sweep has none.
     pub fn round(&self) -> Option<&Round> {
-        self.extensions()
-            .last()
-            .and_then(|extension| extension.round.as_ref())
+        self.extensions().last()?.round.as_ref()
     }
 
     /// How far the rounds are; `None` if the sweep has none.
@@ -79,13 +77,12 @@ impl Results<'_> {
             return Err(ResultsError::refused(layout.root(), problem));
         }
         let done = current.done_parts()?;
+        let is_done = current
+            .plan()
+            .outlines()
+            .all(|part| done.contains(&part.name));
         // Another worker was first, or a repair has moved a part away.
-        if current.extensions().len() > self.extensions().len()
-            || current
-                .plan()
-                .outlines()
-                .any(|part| !done.contains(&part.name))
-        {
+        if current.extensions().len() > self.extensions().len() || !is_done {
             return Ok(Some(current));
         }
         let round = decide(&current)?;

@@ -16,7 +16,7 @@ use crate::sweep::{Outline, Part, PartName};
 use crate::table::Table;
 use crate::table::columns::columns;
 use crate::table::error::ResultsError;
-use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
+use crate::table::file::{Batch, Dataset, Footer, RowCount, TableWriter};
 use crate::table::storage::StorageError;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -175,7 +175,7 @@ impl<'a> Results<'a> {
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
         let file = |place: &PathBuf| self.file_in(place, R::NAME, part.name);
-        let target = file(to).path;
+        let target = file(to);
         // A run makes the folder of the tables when it begins.
         let top = if *to == self.layout().spill() {
             &self.layout().run()
@@ -186,8 +186,8 @@ impl<'a> Results<'a> {
         let kept = KeptRows::read(Dataset::of(storage, from.map(file).into_iter().collect()))?;
         let sweep = &self.extensions()[part.name.extension].sweep;
         let left_out = sweep.recording().left_out();
-        let footer = self.footer(part.name.extension, &target);
-        let mut writer = TableWriter::new(&left_out, commit.stage(&target)?, &footer)?;
+        let footer = Footer::default().and(&target.footer).at(&target.path);
+        let mut writer = TableWriter::new(&left_out, commit.stage(&target.path)?, &footer)?;
         for (job, outcome) in jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,

@@ -139,11 +139,12 @@ impl<'a> Pending<'a> {
         self.results.plan().part(outline)
     }
 
-    /// Whether a finished part may have jobs to run: failed jobs, or jobs that a shorter time cut off.
-    pub fn may_run_again(&self, part: &Outline) -> bool {
+    /// Whether a part may have jobs to run: it is not done, or has failed jobs, or jobs that a shorter time cut off.
+    pub fn may_run(&self, part: &Outline) -> bool {
         let max_time = |extension: &Extension| extension.sweep.recording().max_time;
         let mut pairs = self.results.extensions().windows(2);
-        self.retry.all
+        !self.done.contains(&part.name)
+            || self.retry.all
             || part.memory >= LARGE
             || pairs.any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
     }
@@ -171,13 +172,21 @@ impl<'a> Pending<'a> {
         })
     }
 
-    /// Positions of the finished jobs of an unfinished part.
-    pub fn spilled(&self, part: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
-        if self.spilled.borrow().contains(&part.name) {
-            self.results.spilled(part)
-        } else {
-            Ok(BTreeSet::new())
+    /// Positions of the finished jobs of an unfinished part: none if a file is damaged or gone, and they then run again.
+    pub fn spilled(&self, outline: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
+        if !self.spilled.borrow().contains(&outline.name) {
+            return Ok(BTreeSet::new());
         }
+        let mut ids = HashSet::new();
+        for table in self.results.tables() {
+            match settled(|| self.results.spilled_ids(outline, table))? {
+                Some(Ok(of_table)) => ids = of_table,
+                Some(Err(Lost)) | None => return Ok(BTreeSet::new()),
+            }
+        }
+        let part = self.part(outline);
+        let is_spilled = |position: &usize| ids.contains(&self.results.job_id(&part, *position));
+        Ok((0..part.jobs.len()).filter(is_spilled).collect())
     }
 
     /// How far the parts are. Reads finished parts only if jobs of them may run again, or, with `looks`, all of them.
@@ -193,7 +202,7 @@ impl<'a> Pending<'a> {
                 overview.parts_done += 1;
                 overview.jobs_done += outline.job_count as u64;
                 overview.predicted_cost_done += outline.cost;
-                if looks || self.may_run_again(outline) {
+                if looks || self.may_run(outline) {
                     self.count_again(outline, &mut overview, &mut visit)?;
                 }
             } else {
@@ -251,8 +260,7 @@ impl<'a> Pending<'a> {
 
     /// The missing parts with the most deaths.
     pub fn marked(&self) -> Vec<Marked> {
-        let may_run = |part: &Outline| !self.done.contains(&part.name) || self.may_run_again(part);
-        let is_marked = |part: &&Outline| self.deaths(part) > 0 && may_run(part);
+        let is_marked = |part: &&Outline| self.deaths(part) > 0 && self.may_run(part);
         let mut parts: Vec<&Outline> = self.parts.iter().filter(is_marked).collect();
         parts.sort_by_key(|part| Reverse(self.deaths(part)));
         parts.truncate(MAX_MARKED);
@@ -305,15 +313,12 @@ impl Results<'_> {
         for batch in jobs.rows::<OutcomeRow>() {
             for row in batch? {
                 let is_cut_off = row.simulated_time.is_some_and(is_cut_off);
-                match row.outcome {
-                    JobOutcome::Failed => {
-                        again.insert(rows, Again::Failed(row.reason.unwrap_or_default()));
-                    }
-                    JobOutcome::TimeLimit if is_cut_off => {
-                        again.insert(rows, Again::CutOff);
-                    }
-                    _ => (),
-                }
+                let why = match row.outcome {
+                    JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
+                    JobOutcome::TimeLimit if is_cut_off => Some(Again::CutOff),
+                    _ => None,
+                };
+                again.extend(why.map(|why| (rows, why)));
                 rows += 1;
             }
         }
@@ -332,22 +337,6 @@ impl Results<'_> {
     /// The parts with spilled rows of this table.
     pub(super) fn spilled_parts(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
         Ok(self.layout().parts_in(&self.layout().spill().join(table))?)
-    }
-
-    /// Positions of the spilled jobs of a part: none if a file is damaged or gone, and they then run again.
-    fn spilled(&self, outline: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
-        let mut ids = HashSet::new();
-        for table in self.tables() {
-            match settled(|| self.spilled_ids(outline, table))? {
-                Some(Ok(of_table)) => ids = of_table,
-                Some(Err(Lost)) | None => return Ok(BTreeSet::new()),
-            }
-        }
-        let part = self.plan().part(outline);
-        let positions = 0..part.jobs.len();
-        Ok(positions
-            .filter(|&position| ids.contains(&self.job_id(&part, position)))
-            .collect())
     }
 
     /// The ids in a file of the spill; `None` if this host does not see it yet.

@@ -3,8 +3,7 @@
 //!
 //! Quantities are SI. Nothing in a table says when, where or how fast it was computed.
 
-use crate::model::{Parameters, Symbol};
-use crate::model::{Selected, Selection};
+use crate::model::{Parameters, Selected, Selection, Symbol};
 use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
 use crate::sweep::Sweep;
 use crate::table::arrow::RowBuffer;

@@ -16,7 +16,7 @@ use crate::table::file::{DataFile, Footer};
 use crate::table::shown::{serialize_path, shown};
 use crate::table::storage::StorageError;
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 const WRITER: &str = "repair";
@@ -155,23 +155,19 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
         }
     }
     // In this order: a part that has its jobs had its other files before.
-    let mut there: BTreeMap<&str, BTreeSet<PathBuf>> = BTreeMap::new();
+    let mut there: BTreeSet<PathBuf> = BTreeSet::new();
     for table in results.tables().rev() {
-        let files = table_files(layout, &layout.table(table), found)?;
-        there.insert(table, files.into_iter().collect());
+        there.extend(table_files(layout, &layout.table(table), found)?);
     }
-    let mut planned = BTreeSet::new();
     let mut sound: Vec<Outline> = Vec::new();
     let mut done = BTreeSet::new();
     for part in results.plan().parts() {
-        let name = part.name;
-        planned.insert(name);
-        let is_there = |table: &&str| there[table].contains(&results.part_file(table, &part));
+        let is_there = |table: &&str| there.remove(&results.part_file(table, &part));
         let tables: Vec<&'static str> = results.tables().filter(is_there).collect();
         if verify_part(results, &part, &tables, found)? {
             sound.push((*part).clone());
             if tables.contains(&tables::JOBS) {
-                done.insert(name);
+                done.insert(part.name);
             }
         }
     }
@@ -179,9 +175,8 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
     let overview = pending.overview(false, |_, _, _| ())?;
     found.jobs_missing = overview.jobs_missing;
     found.jobs_spilled = overview.jobs_spilled;
-    let is_planned = |path: &Path| PartName::of_path(path).is_some_and(|it| planned.contains(&it));
-    let strangers = there.into_values().flatten();
-    let strangers = strangers.filter(|path| !is_planned(path));
+    // What is left belongs to no part.
+    let strangers = there.into_iter();
     found
         .problems
         .extend(strangers.map(|path| Problem::new(path, STRANGER)));
@@ -308,12 +303,7 @@ fn check_counts(
 }
 
 /// What a check found of a file that must be there.
-fn damage_in<T>(checked: Result<T, ResultsError>) -> Result<Option<Problem>, ResultsError> {
-    checked.map_or_else(
-        |error| {
-            let (path, problem) = error.damage()?;
-            Ok(Some(Problem::new(path, problem)))
-        },
-        |_| Ok(None),
-    )
+fn damage_in(checked: Result<(), ResultsError>) -> Result<Option<Problem>, ResultsError> {
+    let damage = checked.err().map(ResultsError::damage).transpose()?;
+    Ok(damage.map(|(path, problem)| Problem::new(path, problem)))
 }

@@ -42,7 +42,6 @@ const CLAIM: &str = "claim";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Worker {
     pub host: String,
-    /// Id of the process there.
     pub process: u32,
     /// Boot and name space of its processes, within which it can look them up. Empty if unknown.
     system: String,
@@ -170,8 +169,6 @@ pub struct Living {
 pub struct Member<'a> {
     layout: Layout<'a>,
     name: String,
-    /// A number that no other worker has.
-    number: u64,
     worker: Worker,
     begin: Instant,
     jobs: AtomicU64,
@@ -260,7 +257,6 @@ impl<'a> Member<'a> {
         let member = Self {
             layout: layout.clone(),
             name,
-            number,
             worker,
             begin: Instant::now(),
             jobs: AtomicU64::new(0),
@@ -280,10 +276,6 @@ impl<'a> Member<'a> {
 
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    pub const fn number(&self) -> u64 {
-        self.number
     }
 
     pub fn staging(&self) -> PathBuf {
@@ -354,11 +346,8 @@ impl<'a> Member<'a> {
             "is being run by process {process} on {host}, for another sweep file; wait for it or stop it, or choose \
              another directory with --out"
         );
-        Err(ResultsError::new(
-            ErrorKind::Busy,
-            self.layout.root(),
-            problem,
-        ))
+        let root = self.layout.root();
+        Err(ResultsError::new(ErrorKind::Busy, root, problem))
     }
 
     /// Why it can commit nothing any more, if others took it for dead. A listing is true also on a network disk.

@@ -5,7 +5,7 @@ use crate::results::ResultsError;
 use crate::results::layout::shorter_in_tests;
 use crate::results::parts::{Outcome, Outcomes};
 use crate::results::pending::Pending;
-use crate::run::take::{PartJob, Taken, Work};
+use crate::run::take::{LOOK, Left, PartJob, Taken, Work};
 use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, limits};
 use crate::solver::SimulationError;
 use crate::sweep::{Job, PartName};
@@ -17,7 +17,6 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often the collector looks at the stop flag.
 const STOP_POLL: Duration = Duration::from_millis(if cfg!(test) { 2 } else { 20 });
 /// Time between two ticks for the display.
 const TICK: Duration = shorter_in_tests(Duration::from_secs(1), Duration::from_millis(20));
@@ -50,7 +49,6 @@ struct UnderWay {
     long_after: Duration,
 }
 
-/// The jobs under way, by part and position.
 type AllUnderWay = Mutex<BTreeMap<(PartName, usize), UnderWay>>;
 
 /// The jobs that were handed out and have not ended.
@@ -90,7 +88,7 @@ impl Out {
 }
 
 /// A part of which some jobs are still out.
-struct OpenPart {
+pub(super) struct OpenPart {
     of: Arc<Taken>,
     outcomes: Outcomes,
     failed_before: u64,
@@ -99,42 +97,47 @@ struct OpenPart {
 }
 
 pub(super) struct Collector<'a, 'e> {
-    joined: &'a Joined<'a>,
-    pending: &'a Pending<'a>,
-    events: &'a mut Events<'e>,
-    report: &'a mut RunReport,
-    open: BTreeMap<PartName, OpenPart>,
+    pub joined: &'a Joined<'a>,
+    pub pending: &'a Pending<'a>,
+    pub events: &'a mut Events<'e>,
+    pub report: &'a mut RunReport,
+    pub open: BTreeMap<PartName, OpenPart>,
     /// Number and predicted cost of the jobs of the parts that it has committed, spilled ones included.
-    own: (u64, f64),
+    pub own: (u64, f64),
 }
 
-impl<'a, 'e> Collector<'a, 'e> {
-    pub fn new(
-        joined: &'a Joined<'a>,
-        pending: &'a Pending<'a>,
-        events: &'a mut Events<'e>,
-        report: &'a mut RunReport,
-    ) -> Self {
-        Self {
-            joined,
-            pending,
-            events,
-            report,
-            open: BTreeMap::new(),
-            own: (0, 0.0),
+impl Collector<'_, '_> {
+    /// Runs jobs until this worker has none left, and reports what other workers still run; `None` if it was stopped.
+    pub fn run_all(&mut self, kernel: &Kernel<'_>) -> Result<Option<Left>, ResultsError> {
+        let has_rounds = self.pending.results.round().is_some();
+        while self.run(kernel)? {
+            loop {
+                let left = self.pending.left(self.joined.member)?;
+                if left.has_abandoned {
+                    // Their worker has died meanwhile.
+                    break;
+                }
+                if left.jobs == 0 {
+                    return Ok(Some(left));
+                }
+                if self.joined.must_end() {
+                    return Ok(None);
+                }
+                if !has_rounds {
+                    return Ok(Some(left));
+                }
+                // The next round may have jobs for this worker.
+                std::thread::sleep(LOOK);
+            }
         }
+        Ok(None)
     }
 
     /// Runs pending jobs until none is left for this worker, the flag turns true, the time is over, or something other
     /// than a job fails. Returns whether it took all that it could.
-    pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
+    fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let mut threads = self.joined.threads;
-        let work = Work::new(
-            self.pending,
-            self.joined.member,
-            &self.joined.walltime,
-            threads,
-        )?;
+        let work = Work::new(self.pending, self.joined)?;
         if work.is_all_alone() {
             // Each thread takes address space.
             threads = 1;

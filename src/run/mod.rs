@@ -33,12 +33,12 @@ use crate::results::{Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
 use crate::run::limits::Walltime;
-use crate::run::take::{LOOK, Left};
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
 use crate::table::file::PROGRAM;
 use crate::table::storage::StorageError;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -188,7 +188,6 @@ impl Joined<'_> {
         self.allowed_memory.min(limits::available_memory())
     }
 
-    /// Runs the parts of the rounds so far.
     fn run_parts(
         &self,
         pending: &Pending<'_>,
@@ -215,17 +214,38 @@ impl Joined<'_> {
         if report.jobs_left == 0 {
             return Ok(());
         }
-        let there = overview.jobs_done + overview.jobs_spilled + overview.jobs_failed - jobs_again;
+        let jobs_there =
+            overview.jobs_done + overview.jobs_spilled + overview.jobs_failed - jobs_again;
         let predicted_cost = overview.predicted_cost_missing + cost_again;
-        self.report_begin(
-            pending.results,
-            report.jobs_left,
-            there,
-            predicted_cost,
+        if let (Some(_), Some(rounds)) = (&events.log, pending.results.rounds_so_far()) {
+            events.send(&RunEvent::RoundBegun {
+                jobs: report.jobs_left,
+                predicted_cost,
+                rounds,
+            })?;
+        } else {
+            events.log = Some(pending.results.begin_log()?);
+            events.send(&RunEvent::Started {
+                host: host(),
+                process: std::process::id(),
+                program: PROGRAM.to_owned(),
+                shard: self.options.shard.to_string(),
+                others: self.member.others()?.len(),
+                threads: self.threads,
+                jobs: report.jobs_left,
+                jobs_there,
+                predicted_cost,
+            })?;
+        }
+        let mut collector = Collector {
+            joined: self,
+            pending,
             events,
-        )?;
-        let mut collector = Collector::new(self, pending, events, report);
-        let ended = self.collect(&mut collector, pending, kernel);
+            report,
+            open: BTreeMap::new(),
+            own: (0, 0.0),
+        };
+        let ended = collector.run_all(kernel);
         report.wall = self.begin.elapsed().as_secs_f64();
         let left = ended.inspect_err(|error| {
             // The disk may be what failed: the first error counts.
@@ -242,66 +262,6 @@ impl Joined<'_> {
             }
         }
         Ok(())
-    }
-
-    fn report_begin(
-        &self,
-        results: &Results<'_>,
-        jobs: u64,
-        jobs_there: u64,
-        predicted_cost: f64,
-        events: &mut Events<'_>,
-    ) -> Result<(), ResultsError> {
-        if let (Some(_), Some(rounds)) = (&events.log, results.rounds_so_far()) {
-            return Ok(events.send(&RunEvent::RoundBegun {
-                jobs,
-                predicted_cost,
-                rounds,
-            })?);
-        }
-        events.log = Some(results.begin_log()?);
-        Ok(events.send(&RunEvent::Started {
-            host: host(),
-            process: std::process::id(),
-            program: PROGRAM.to_owned(),
-            shard: self.options.shard.to_string(),
-            others: self.member.others()?.len(),
-            threads: self.threads,
-            jobs,
-            jobs_there,
-            predicted_cost,
-        })?)
-    }
-
-    /// Runs jobs until this worker has none left, and reports what other workers still run; `None` if it was stopped.
-    fn collect(
-        &self,
-        collector: &mut Collector<'_, '_>,
-        pending: &Pending<'_>,
-        kernel: &Kernel<'_>,
-    ) -> Result<Option<Left>, ResultsError> {
-        let has_rounds = pending.results.round().is_some();
-        while collector.run(kernel)? {
-            loop {
-                let left = pending.left(self.member)?;
-                if left.has_abandoned {
-                    // Their worker has died meanwhile.
-                    break;
-                }
-                if left.jobs == 0 {
-                    return Ok(Some(left));
-                }
-                if self.must_end() {
-                    return Ok(None);
-                }
-                if !has_rounds {
-                    return Ok(Some(left));
-                }
-                // The next round may have jobs for this worker.
-                std::thread::sleep(LOOK);
-            }
-        }
-        Ok(None)
     }
 
     /// Reduces with `body`, once every job is done; `None` if another worker does so, or has.

@@ -30,7 +30,6 @@ pub struct Status {
     pub failures: Vec<Failure>,
     pub failure_reasons: Reasons,
     pub cut: Cut,
-    /// Unfinished parts at which workers died.
     pub marked: Vec<Marked>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rounds: Option<RoundsSoFar>,
@@ -50,7 +49,6 @@ pub struct Present {
 pub struct Failure {
     pub job_id: String,
     pub reason: String,
-    /// The command that does the same, to look at it alone.
     pub command: String,
 }
 

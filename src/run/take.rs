@@ -12,11 +12,13 @@
 //! and changes nothing that was dealt before; no two shards differ by more than the costliest part.
 
 use crate::results::claims::{ClaimState, Claims};
+use crate::results::commit::own_number;
 use crate::results::layout::shorter_in_tests;
 use crate::results::pending::{Again, Pending};
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
-use crate::run::limits::{Walltime, beside_threads};
+use crate::run::Joined;
+use crate::run::limits::beside_threads;
 use crate::sweep::{Job, Outline, Part, predicted_memory};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap, HashMap, VecDeque};
@@ -113,8 +115,7 @@ impl Pending<'_> {
 /// Takes pending parts, and gives their jobs one by one.
 pub(super) struct Work<'a> {
     pending: &'a Pending<'a>,
-    member: &'a Member<'a>,
-    walltime: &'a Walltime,
+    joined: &'a Joined<'a>,
     claims: Claims<'a>,
     others: BTreeMap<String, Living>,
     pass: IntoIter<&'a Outline>,
@@ -128,34 +129,24 @@ pub(super) struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    pub fn new(
-        pending: &'a Pending<'a>,
-        member: &'a Member<'a>,
-        walltime: &'a Walltime,
-        threads: usize,
-    ) -> Result<Self, ResultsError> {
-        let others = member.others()?;
-        let claims = Claims::list(member)?;
-        let is_left =
-            |part: &&Outline| !pending.done.contains(&part.name) || pending.may_run_again(part);
-        let mut pass: Vec<&Outline> = pending.parts.iter().filter(is_left).collect();
+    pub fn new(pending: &'a Pending<'a>, joined: &'a Joined<'a>) -> Result<Self, ResultsError> {
+        let others = joined.member.others()?;
+        let claims = Claims::list(joined.member)?;
+        let parts = pending.parts.iter();
+        let mut pass: Vec<&Outline> = parts.filter(|part| pending.may_run(part)).collect();
         if !others.is_empty() && !pass.is_empty() {
-            let place = member.number() % pass.len() as u64;
+            let place = own_number() % pass.len() as u64;
             pass.rotate_left(usize::try_from(place).unwrap_or_default());
         }
         pass.sort_by_key(|part| {
-            let needed = beside_threads(part.memory, threads);
+            let needed = beside_threads(part.memory, joined.threads);
             let may_not_fit = needed > pending.retry.memory;
-            (
-                pending.deaths(part),
-                may_not_fit,
-                pending.done.contains(&part.name),
-            )
+            let is_done = pending.done.contains(&part.name);
+            (pending.deaths(part), may_not_fit, is_done)
         });
         Ok(Self {
             pending,
-            member,
-            walltime,
+            joined,
             claims,
             others,
             pass: pass.into_iter(),
@@ -198,7 +189,7 @@ impl<'a> Work<'a> {
     }
 
     fn take_next(&mut self, is_busy: bool, is_ahead: bool) -> Result<(), ResultsError> {
-        while !self.walltime.has_refused() {
+        while !self.joined.walltime.has_refused() {
             if self.must_wait(is_busy, is_ahead) {
                 return Ok(());
             }
@@ -210,7 +201,7 @@ impl<'a> Work<'a> {
             }
         }
         let last_look = *self.last_look.get_or_insert_with(Instant::now);
-        if self.walltime.has_refused() {
+        if self.joined.walltime.has_refused() {
             self.has_ended = true;
         } else if last_look.elapsed() >= self.pause(is_busy) {
             self.last_look = Some(Instant::now());
@@ -245,18 +236,14 @@ impl<'a> Work<'a> {
     /// Takes a part of a dead worker. Returns whether there is none, and the owners of all other parts certainly live.
     fn take_abandoned(&mut self) -> Result<bool, ResultsError> {
         // In this order: a worker that has ended committed or spilled before.
-        let others = self.member.others()?;
+        let others = self.joined.member.others()?;
         self.claims.refresh()?;
         self.pending.look_at_spill()?;
         let done = self.pending.results.done_parts()?;
         let mut is_certain = true;
         let mut free = Vec::new();
-        for part in self
-            .pending
-            .parts
-            .iter()
-            .filter(|part| !done.contains(&part.name))
-        {
+        let parts = self.pending.parts.iter();
+        for part in parts.filter(|part| !done.contains(&part.name)) {
             let name = part.name.to_string();
             match self.claims.standing(&name, &others)? {
                 ClaimState::Own => (),
@@ -272,11 +259,11 @@ impl<'a> Work<'a> {
             return Ok(is_certain);
         }
         // Their owners may be suspended, and must not commit them later.
-        self.member.tidy()?;
+        self.joined.member.tidy()?;
         self.pending.look_at_deaths()?;
         free.sort_by_key(|(part, _)| self.pending.deaths(part));
         for (part, generation) in free {
-            if self.take_part(part, generation)? || self.walltime.has_refused() {
+            if self.take_part(part, generation)? || self.joined.walltime.has_refused() {
                 break;
             }
         }
@@ -284,7 +271,6 @@ impl<'a> Work<'a> {
         Ok(false)
     }
 
-    /// Takes what is to be run of a part.
     fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
         if !self.pending.done.contains(&outline.name) {
             let spilled = self.pending.spilled(outline)?;
@@ -312,7 +298,7 @@ impl<'a> Work<'a> {
         jobs: Vec<(usize, bool)>,
         generation: u64,
     ) -> Result<bool, ResultsError> {
-        if !self.walltime.admits_part() {
+        if !self.joined.walltime.admits_part() {
             return Ok(false);
         }
         let name = part.name;
@@ -324,7 +310,7 @@ impl<'a> Work<'a> {
             }
             return Ok(false);
         }
-        self.member.begin_part(name)?;
+        self.joined.member.begin_part(name)?;
         let is_alone = self.pending.deaths(&part) >= DEATHS;
         let again = self.pending.done.contains(&part.name);
         let taken = Arc::new(Taken {

@@ -177,7 +177,6 @@ impl<R: Row> TableWriter<R> {
     }
 
     /// Writes what is left and the footer, brings the file to the disk.
-    /// Without it, the file is unreadable.
     pub fn finish(mut self) -> Result<(), ResultsError> {
         if !self.buffer.is_empty() {
             self.flush()?;

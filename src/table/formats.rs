@@ -1,5 +1,5 @@
-//! Rows of any schema, in the formats of other programs. A format is a variant of [`Format`], its description, its arm
-//! in [`RowWriter::new`], and an `Encoder`.
+//! Rows of any schema, in the formats of other programs. A format is a variant of [`Format`], its description, a variant of
+//! `Encoder`, and an arm in each function of [`RowWriter`].
 
 use crate::table::arrow;
 use crate::table::error::ResultsError;
@@ -38,54 +38,19 @@ impl Format {
 }
 
 /// Turns rows into the bytes of a file.
-trait Encoder {
-    fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError>;
-
-    /// Writes what is left.
-    fn finish(self: Box<Self>) -> Result<StoredFile, ParquetError>;
-}
-
-impl Encoder for ArrowWriter<StoredFile> {
-    fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
-        self.write(rows)
-    }
-
-    fn finish(self: Box<Self>) -> Result<StoredFile, ParquetError> {
-        self.into_inner()
-    }
-}
-
-impl Encoder for csv::Writer<StoredFile> {
-    fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
-        arrow::texts(rows)
-            .try_for_each(|texts| self.write_record(texts))
-            .map_err(of_csv)
-    }
-
-    fn finish(self: Box<Self>) -> Result<StoredFile, ParquetError> {
-        self.into_inner()
-            .map_err(|error| of_csv(error.into_error()))
-    }
+enum Encoder {
+    Parquet(Box<ArrowWriter<StoredFile>>),
+    Csv(csv::Writer<StoredFile>),
+    Arrow(FileWriter<StoredFile>),
 }
 
 fn of_csv(error: impl Into<csv::Error>) -> ParquetError {
     ParquetError::External(error.into().into())
 }
 
-impl Encoder for FileWriter<StoredFile> {
-    fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
-        Ok(self.write(rows)?)
-    }
-
-    fn finish(mut self: Box<Self>) -> Result<StoredFile, ParquetError> {
-        FileWriter::finish(&mut self)?;
-        Ok(self.into_inner()?)
-    }
-}
-
 pub struct RowWriter {
     path: PathBuf,
-    encoder: Box<dyn Encoder>,
+    encoder: Encoder,
 }
 
 impl RowWriter {
@@ -96,19 +61,20 @@ impl RowWriter {
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
         let path = file.path().to_owned();
-        let encoder = || -> Result<Box<dyn Encoder>, ParquetError> {
+        let encoder = || -> Result<Encoder, ParquetError> {
             Ok(match format {
                 Format::Parquet => {
                     let properties = Some(footer.properties(schema)?);
-                    Box::new(ArrowWriter::try_new(file, Arc::clone(schema), properties)?)
+                    let writer = ArrowWriter::try_new(file, Arc::clone(schema), properties)?;
+                    Encoder::Parquet(Box::new(writer))
                 }
                 Format::Csv => {
                     let mut writer = csv::Writer::from_writer(file);
                     let names = schema.fields().iter().map(|field| field.name());
                     writer.write_record(names).map_err(of_csv)?;
-                    Box::new(writer)
+                    Encoder::Csv(writer)
                 }
-                Format::Arrow => Box::new(FileWriter::try_new(file, schema)?),
+                Format::Arrow => Encoder::Arrow(FileWriter::try_new(file, schema)?),
             })
         };
         let encoder = encoder().map_err(ResultsError::unwritten(&path))?;
@@ -116,13 +82,28 @@ impl RowWriter {
     }
 
     pub fn write(&mut self, rows: &RecordBatch) -> Result<(), ResultsError> {
-        let written = self.encoder.write(rows);
+        let written = match &mut self.encoder {
+            Encoder::Parquet(writer) => writer.write(rows),
+            Encoder::Csv(writer) => arrow::texts(rows)
+                .try_for_each(|texts| writer.write_record(texts))
+                .map_err(of_csv),
+            Encoder::Arrow(writer) => writer.write(rows).map_err(ParquetError::from),
+        };
         written.map_err(ResultsError::unwritten(&self.path))
     }
 
     /// Writes what is left and brings the file to the disk.
     pub fn finish(self) -> Result<(), ResultsError> {
-        let file = self.encoder.finish();
+        let file = match self.encoder {
+            Encoder::Parquet(writer) => writer.into_inner(),
+            Encoder::Csv(writer) => writer
+                .into_inner()
+                .map_err(|error| of_csv(error.into_error())),
+            Encoder::Arrow(mut writer) => writer
+                .finish()
+                .and_then(|()| writer.into_inner())
+                .map_err(ParquetError::from),
+        };
         Ok(file.map_err(ResultsError::unwritten(&self.path))?.sync()?)
     }
 }

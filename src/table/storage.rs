@@ -117,13 +117,8 @@ pub trait Storage: Sync {
     }
 
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
-        let failed = StorageError::at("read", file);
-        match self.open(file)?.metadata() {
-            Ok(metadata) if metadata.is_file() => Ok(metadata.len()),
-            // A folder has a length, too, which must not pass for that of the file.
-            Ok(_) => Err(failed(NoFile::Irregular.into())),
-            Err(error) => Err(failed(error)),
-        }
+        let metadata = self.open(file)?.metadata();
+        Ok(metadata.map_err(StorageError::at("read", file))?.len())
     }
 
     /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.
@@ -178,7 +173,7 @@ pub trait Storage: Sync {
     }
 }
 
-/// Ignores that a file to be removed or moved is gone: another process was first.
+/// Ignores that what is to be removed, moved or synced is gone: another process was first.
 pub fn gone_is_fine(ended: Result<(), StorageError>) -> Result<(), StorageError> {
     match ended {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -186,7 +181,6 @@ pub fn gone_is_fine(ended: Result<(), StorageError>) -> Result<(), StorageError>
     }
 }
 
-/// The answer to a request for a lock.
 pub enum Lock {
     /// The caller has the lock until this value is dropped or the process ends.
     Ours(Box<dyn Send + Sync>),
@@ -359,10 +353,8 @@ impl Storage for Disk {
     }
 
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        match fs::remove_dir_all(folder) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            removed => removed.map_err(StorageError::at("remove", folder)),
-        }
+        let removed = fs::remove_dir_all(folder);
+        gone_is_fine(removed.map_err(StorageError::at("remove", folder)))
     }
 
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
