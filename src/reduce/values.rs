@@ -272,11 +272,8 @@ fn unknown(name: &str, columns: &[Column]) -> String {
         None if !longer.is_empty() => Some(longer.join(", ")),
         synonym => synonym.or_else(|| nearest(name, &names)).map(str::to_owned),
     };
-    let mut problem = "no such column;".to_owned();
-    if let Some(meant) = meant {
-        problem += &format!(" did you mean {meant}?");
-    }
-    problem + " `stickslip plot --list` shows all"
+    let hint = meant.map_or_else(String::new, |meant| format!(" did you mean {meant}?"));
+    format!("no such column;{hint} `stickslip plot --list` shows all")
 }
 
 /// Each value once, in their order.
