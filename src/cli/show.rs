@@ -358,7 +358,7 @@ fn side(edge: &EdgeRow, rows: &[SetRow]) -> &'static str {
         [] => "none",
         values if values.iter().all(|value| *value > edge.threshold) => "none: all above",
         values if values.iter().all(|value| *value < edge.threshold) => "none: all below",
-        _ => "none is clear",
+        _ => "not between clear sets",
     }
 }
 
@@ -461,7 +461,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         note_on_cut_jobs(rows),
         note_on_few_cycles(rows),
         note_on_drive(rows),
-        note_on_model(rows),
+        note_on_model(sweep, rows),
         failed,
         note_on_removed_sets(sweep, rows),
     ];
@@ -550,11 +550,16 @@ const SIDE_EFFECTS: [(Symbol, &str); 3] = [
     ),
 ];
 
-fn note_on_model(rows: &[SetRow]) -> Option<String> {
+fn note_on_model(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let differing = differing(&rows.iter());
+    let applies = |symbol: &Symbol| match symbol {
+        Symbol::M => !differing.contains(&Symbol::Gamma),
+        Symbol::Ns => sweep.recording().precursor_size.is_none(),
+        _ => true,
+    };
     let notes = SIDE_EFFECTS
         .iter()
-        .filter(|(symbol, _)| differing.contains(symbol));
+        .filter(|(symbol, _)| differing.contains(symbol) && applies(symbol));
     let notes: Vec<&str> = notes.map(|(_, note)| *note).collect();
     (!notes.is_empty()).then(|| notes.join("\n"))
 }
