@@ -162,8 +162,10 @@ fn columns(slips: &[Place], per_decade: f64) -> Vec<Column> {
         let bin = (libm::log10(slip.0) * per_decade).floor() as i32;
         bins.entry(bin).or_default().push(slip);
     }
-    let values = |slips: &Vec<Place>| bounds(slips.iter().map(|slip| slip.0));
-    let values: Vec<Ends> = bins.values().filter_map(values).collect();
+    // An η that no axis can show has no column.
+    let bounded = |slips: Vec<Place>| Some((bounds(slips.iter().map(|slip| slip.0))?, slips));
+    let bins = bins.into_values().filter_map(bounded);
+    let (values, bins): (Vec<Ends>, Vec<_>) = bins.unzip();
     let column = |(index, slips): (usize, Vec<Place>)| {
         let (low, high) = values[index];
         let before = (index > 0).then(|| (low / values[index - 1].1).sqrt());
@@ -180,7 +182,7 @@ fn columns(slips: &[Place], per_decade: f64) -> Vec<Column> {
             slips,
         }
     };
-    bins.into_values().enumerate().map(column).collect()
+    bins.into_iter().enumerate().map(column).collect()
 }
 
 #[cfg(test)]
