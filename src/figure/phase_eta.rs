@@ -148,7 +148,8 @@ fn below_curve(x: &Axis, low: f64, columns: &[Column]) -> Vec<(Cell, Ink)> {
         let holds_slips = |column: &Column| {
             column.least.is_none() && start < column.edges.1 && end > column.edges.0
         };
-        let least = minimum_phase(end).filter(|_| !columns.iter().any(holds_slips));
+        let least = minimum_phase(end).filter(|least| *least > low);
+        let least = least.filter(|_| !columns.iter().any(holds_slips));
         Some((((start, end), (low, least?)), WHITE))
     };
     etas.windows(2).filter_map(part).collect()
