@@ -162,7 +162,7 @@ struct CustomFlags {
     /// Column whose values get a panel each, up to nine
     #[arg(long, value_name = "COLUMN", requires = "x")]
     panels: Option<String>,
-    /// Only sets for which a condition on their columns, by name or heading, holds, in SI
+    /// Only sets, or slips with --of slips, for which a condition on their columns, by name or heading, holds, in SI
     #[arg(
         long = "where",
         value_name = "CONDITION",

@@ -45,7 +45,7 @@ pub(super) struct Chart<'a> {
     pub(super) of: &'static str,
     /// The sets, if each has a dot.
     pub(super) sets: &'a [SetRow],
-    /// What joins and tells apart sets.
+    /// The swept parameters, by which sets are joined and told apart.
     pub(super) swept: &'a [Values],
     pub(super) x: Quantity<'a>,
     pub(super) ys: Vec<Quantity<'a>>,

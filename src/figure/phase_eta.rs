@@ -144,7 +144,8 @@ fn cells(column: &Column) -> Vec<(Cell, f64)> {
 fn below_curve(x: &Axis, low: f64, columns: &[Column]) -> Vec<(Cell, Ink)> {
     let etas = x.evenly_placed(CURVE_POINTS);
     let part = |pair: &[f64]| {
-        let (start, end) = (pair[0], pair[1]);
+        let start = pair[0];
+        let end = pair[1];
         let holds_slips = |column: &Column| {
             column.least.is_none() && start < column.edges.1 && end > column.edges.0
         };

@@ -25,7 +25,7 @@ const FACTOR: f64 = 4.0;
 /// Multiples of a half up to rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// The unit of a formula of numbers from these columns; empty for a pure number, or if there is none.
+/// The unit of a formula of these columns; empty for a pure number, and where the dimensions do not agree.
 pub(super) fn unit_of_formula(formula: &Expression<usize>, columns: &[Column]) -> &'static str {
     let value = |scaled: Option<usize>| {
         formula.evaluate(&|&place| {

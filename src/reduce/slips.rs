@@ -63,7 +63,7 @@ fn each_slip(
     Ok(())
 }
 
-/// The slips of these sets that fulfil a condition, one in so many of them, and how many fulfil it.
+/// Every k-th slip of these sets for which a condition holds, with k and the number of all such slips.
 pub fn sample_of_slips(
     results: &Results<'_>,
     sets: &[SetRow],
