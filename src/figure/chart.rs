@@ -97,6 +97,13 @@ impl<'a> Chart<'a> {
             );
             return Err(x.refuse(&problem));
         }
+        let cut = |(quantity, axis): (&Quantity<'_>, &Axis)| {
+            let bars = inside.iter().filter_map(|&set| quantity.interval(set));
+            bars.filter(|(low, high)| *low < axis.low || *high > axis.high)
+                .count()
+        };
+        let axes = ys.iter().zip(&y_axes).chain([(x, &x_axis)]);
+        let bars_cut = axes.map(cut).sum();
         let has_many = inside.len() > FEW_SETS;
         let dots = Dots {
             hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
@@ -124,7 +131,7 @@ impl<'a> Chart<'a> {
                 panels.push(panel);
             }
         }
-        let look = look.with_note(&self.note(&inside, &dots.free));
+        let look = look.with_note(&self.note(&inside, &dots.free, bars_cut));
         let legend = self.legend(&inside, &dots);
         Ok(panel::draw(name, &look, layout, &legend, panels))
     }
@@ -371,11 +378,14 @@ impl Chart<'_> {
     }
 
     /// What bars are, and what is not there.
-    fn note(&self, inside: &[usize], free: &[usize]) -> String {
+    fn note(&self, inside: &[usize], free: &[usize], bars_cut: usize) -> String {
         let mut notes = Vec::new();
         let has_bars = |y: &Quantity<'_>| inside.iter().any(|&set| y.interval(set).is_some());
         if self.ys.iter().any(has_bars) {
             notes.push("bars: 95 %".to_owned());
+        }
+        if bars_cut > 0 {
+            notes.push(format!("{bars_cut} longer bars are cut at the frame"));
         }
         let count = self.count();
         let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));

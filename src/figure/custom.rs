@@ -4,8 +4,10 @@ use super::chart::Chart;
 use super::quantity::{Limits, Quantity, parameter};
 use super::{BadOption, Look, Picture};
 use crate::model::Symbol;
-use crate::reduce::{SetRow, Values};
+use crate::reduce::{Condition, SetRow, Values};
+use crate::table::columns::Row;
 use crate::table::value::words;
+use anyhow::Result;
 
 words! {
     /// What has a dot each in a custom figure.
@@ -39,15 +41,42 @@ pub struct CustomFigure {
     pub ylabel: Option<String>,
 }
 
+impl CustomFigure {
+    /// The condition on rows of which it shows columns.
+    pub(super) fn condition<R: Row>(&self) -> Result<Option<Condition>, BadOption> {
+        let text = self.condition.as_deref();
+        let condition = text.map(|text| Condition::read(text, &R::columns()));
+        condition
+            .transpose()
+            .map_err(|problem| self.refuse(&problem))
+    }
+
+    /// That none of these rows fulfils its condition.
+    pub(super) fn unmatched<R: Row>(&self, condition: &Condition, rows: &[R]) -> BadOption {
+        self.refuse(&condition.unmatched(self.of.word(), rows))
+    }
+
+    fn refuse(&self, problem: &str) -> BadOption {
+        let text = self.condition.as_deref().unwrap_or_default();
+        BadOption::new("where", text, problem)
+    }
+
+    /// The condition, as the small print ends.
+    pub(super) fn shown_condition(&self) -> String {
+        let shown = |text| format!("; where {text}");
+        self.condition.as_ref().map_or_else(String::new, shown)
+    }
+}
+
 /// Draws a dot for each row of which there are these quantities, with the next of the swept parameters as colours. If the
 /// rows are `sets`, those that differ in one parameter of the x axis alone are joined; if they are slips, there are none.
 pub(super) fn custom<'a>(
-    quantity: &dyn Fn(&'static str, &str) -> Result<Quantity<'a>, BadOption>,
+    quantity: &dyn Fn(&'static str, &str) -> Result<Quantity<'a>>,
     sets: &[SetRow],
     swept: &[Values],
     figure: &'a CustomFigure,
     look: &Look,
-) -> Result<Picture, BadOption> {
+) -> Result<Picture> {
     let mut x = quantity("x", &figure.x)?;
     x.limits = figure.xlim;
     x.label = figure.xlabel.as_deref();
@@ -75,7 +104,7 @@ pub(super) fn custom<'a>(
     // Formulas have letters that no file name should have.
     let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';
     let name = format!("{}-{}", y.name(), x.name()).replace(|letter| !is_plain(letter), "-");
-    Chart {
+    let chart = Chart {
         of: figure.of.word(),
         sets,
         swept: if sets.is_empty() { &[] } else { swept },
@@ -83,8 +112,8 @@ pub(super) fn custom<'a>(
         panels: panels.map(|panels| panels.column),
         x,
         ys: vec![y],
-    }
-    .draw(&name, look)
+    };
+    Ok(chart.draw(&name, look)?)
 }
 
 #[cfg(test)]
@@ -129,12 +158,12 @@ pub(super) mod tests {
         }
     }
 
-    fn drawn_of(rows: &[SetRow], figure: &CustomFigure, look: &Look) -> Result<Picture, BadOption> {
-        let quantity = |option, name: &str| Quantity::of(rows, option, name);
+    fn drawn_of(rows: &[SetRow], figure: &CustomFigure, look: &Look) -> Result<Picture> {
+        let quantity = |option, name: &str| Ok(Quantity::of(rows, option, name)?);
         custom(&quantity, rows, &swept(rows), figure, look)
     }
 
-    fn drawn(count: u32, figure: &CustomFigure, look: &Look) -> Result<Picture, BadOption> {
+    fn drawn(count: u32, figure: &CustomFigure, look: &Look) -> Result<Picture> {
         drawn_of(&rows(count), figure, look)
     }
 

@@ -41,15 +41,14 @@ pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 use self::quantity::Quantity;
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
-    Condition, EdgeRow, SetRow, SlipOfSet, Values, WRITER, advise, means_of_slips, read_reduced,
-    read_sets, sample_of_slips, swept,
+    EdgeRow, SetRow, SlipOfSet, WRITER, advise, means_of_slips, read_reduced, read_sets,
+    sample_of_slips, swept,
 };
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::{Results, ResultsError};
 use crate::sets::{Digits, label, symbol_of};
 use crate::table::Table;
-use crate::table::columns::Row as _;
 use anyhow::Result;
 use std::path::PathBuf;
 
@@ -87,7 +86,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     let _alone = exclusive_lock(layout, WRITER)?;
     let points = read(layout)?;
     let sets = sets_with_results(layout).map_err(advise(ADVICE))?;
-    let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
+    let look = &look.with_note(&common_of(&sets));
     let mut pictures: Vec<Picture> = Vec::new();
     pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, look));
     pictures.extend(intervals::intervals(&points, look));
@@ -121,61 +120,56 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 /// Draws a custom figure of the sets or slips of a results directory; writes nothing.
 pub fn draw_custom(results: &Results<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
     let sets = read_sets(results.layout()).collect::<Result<Vec<_>, _>>();
-    let mut sets = sets.map_err(advise(ADVICE))?;
-    let text = figure.condition.as_deref();
-    let bad = |problem: String| BadOption::new("where", text.unwrap_or_default(), &problem);
-    let columns = match figure.of {
-        Dots::Sets => SetRow::columns(),
-        Dots::Slips => SlipOfSet::columns(),
-    };
-    let condition = text.map(|text| Condition::read(text, &columns));
-    let condition = condition.transpose().map_err(bad)?;
-    let shown = text.map_or_else(String::new, |text| format!("; where {text}"));
+    let sets = sets.map_err(advise(ADVICE))?;
     let picture = match figure.of {
-        Dots::Sets => {
-            if let Some(condition) = &condition {
-                if !sets.iter().any(|set| condition.holds(set)) {
-                    return Err(bad(condition.unmatched("sets", &sets)).into());
-                }
-                sets.retain(|set| condition.holds(set));
-            }
-            let names = [Some(&figure.x), Some(&figure.y), figure.colour.as_ref()];
-            let mut means = Vec::new();
-            for name in names.into_iter().flatten() {
-                if Values::of(&sets, name).is_err() {
-                    means.extend(means_of_slips(results, &sets, name)?);
-                }
-            }
-            let quantity = |option, name: &str| {
-                let mean = means.iter().find(|mean| mean.name() == name).cloned();
-                mean.map_or_else(
-                    || Quantity::of(&sets, option, name),
-                    |mean| Ok(Quantity::of_values(option, mean)),
-                )
-            };
-            let common = common(sets.iter().map(|set| &*set.parameters));
-            let look = look.with_note(&(common + &shown));
-            custom::custom(&quantity, &sets, &swept(&sets), figure, &look)?
-        }
-        Dots::Slips => {
-            let (slips, every, matching) = sample_of_slips(results, &sets, condition.as_ref())?;
-            if let Some(condition) = condition.filter(|_| slips.is_empty()) {
-                let (all, ..) = sample_of_slips(results, &sets, None)?;
-                return Err(bad(condition.unmatched("slips", &all)).into());
-            }
-            let common = common(slips.iter().map(|slip| &*slip.0.1));
-            let part = if every > 1 {
-                format!("one in {every} of ")
-            } else {
-                String::new()
-            };
-            let look = look.with_note(&format!("{common}{shown}; {part}{matching} slips"));
-            let quantity = |option, name: &str| Quantity::of(&slips, option, name);
-            custom::custom(&quantity, &[], &swept(&sets), figure, &look)?
-        }
-    };
+        Dots::Sets => draw_sets(results, sets, figure, look),
+        Dots::Slips => draw_slips(results, &sets, figure, look),
+    }?;
     check_size(&picture, look)?;
     Ok(picture)
+}
+
+fn draw_sets(
+    results: &Results<'_>,
+    mut sets: Vec<SetRow>,
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture> {
+    if let Some(condition) = figure.condition::<SetRow>()? {
+        if !sets.iter().any(|set| condition.holds(set)) {
+            return Err(figure.unmatched(&condition, &sets).into());
+        }
+        sets.retain(|set| condition.holds(set));
+    }
+    let quantity = |option, name: &str| {
+        Quantity::of(&sets, option, name).or_else(|unknown| {
+            let mean = means_of_slips(results, &sets, name)?.ok_or(unknown)?;
+            Ok(Quantity::of_values(option, mean))
+        })
+    };
+    let look = look.with_note(&(common_of(&sets) + &figure.shown_condition()));
+    custom::custom(&quantity, &sets, &swept(&sets), figure, &look)
+}
+
+fn draw_slips(
+    results: &Results<'_>,
+    sets: &[SetRow],
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture> {
+    let condition = figure.condition::<SlipOfSet>()?;
+    let (slips, every, matching) = sample_of_slips(results, sets, condition.as_ref())?;
+    if let Some(condition) = condition.filter(|_| slips.is_empty()) {
+        let (all, ..) = sample_of_slips(results, sets, None)?;
+        return Err(figure.unmatched(&condition, &all).into());
+    }
+    let mut note = common(slips.iter().map(|slip| &*slip.0.1)) + &figure.shown_condition() + "; ";
+    if every > 1 {
+        note += &format!("one in {every} of ");
+    }
+    let look = look.with_note(&(note + &format!("{matching} slips")));
+    let quantity = |option, name: &str| Ok(Quantity::of(&slips, option, name)?);
+    custom::custom(&quantity, &[], &swept(sets), figure, &look)
 }
 
 /// Puts a figure into `figures/`, in these formats.
@@ -256,6 +250,10 @@ fn setting(parameters: &Parameters, symbol: Symbol) -> String {
         Value::Real(real) => label(symbol.key()).setting(real, Digits::THREE),
         value => format!("{} = {value}", symbol_of(symbol)),
     }
+}
+
+fn common_of(sets: &[SetRow]) -> String {
+    common(sets.iter().map(|set| &*set.parameters))
 }
 
 /// What some parameters have in common, in symbols.

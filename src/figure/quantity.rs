@@ -14,6 +14,9 @@ const MAX_WORDS: usize = 12;
 /// Values of a statistic from which on one alone says nothing of its scale.
 const FEW_VALUES: usize = 8;
 
+/// From this multiple of the median length on, an error bar does not widen the axis.
+const FAR_LONGER: f64 = 5.0;
+
 /// The ends of an axis, in SI.
 pub type Limits = (Option<f64>, Option<f64>);
 
@@ -55,8 +58,9 @@ impl Quantity<'_> {
     ) -> Result<Self, BadOption> {
         let mut column =
             Values::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
-        let phased = Values::of(rows, "has_phase");
-        if let Some(phased) = phased.ok().filter(|_| shows_phase(column.name())) {
+        if shows_phase(column.name())
+            && let Ok(phased) = Values::of(rows, "has_phase")
+        {
             let has_phase = |word: f64| phased.word(word) == Some("yes");
             for (number, word) in column.numbers.iter_mut().zip(&phased.numbers) {
                 *number = number.filter(|_| word.is_some_and(has_phase));
@@ -217,7 +221,7 @@ impl Quantity<'_> {
         let mut lengths: Vec<f64> = bars.map(length).collect();
         lengths.sort_by(f64::total_cmp);
         // Bars that are far longer than others run out of the frame.
-        let longest = 1.5 * quantile(&lengths, 0.5).unwrap_or(0.0);
+        let longest = FAR_LONGER * quantile(&lengths, 0.5).unwrap_or(0.0);
         let shown = |&set: &usize| {
             let bar = self.interval(set).filter(|&bar| length(bar) <= longest);
             let bar = bar.map(|(low, high)| [low, high]);
