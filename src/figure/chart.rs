@@ -385,7 +385,7 @@ impl Chart<'_> {
             notes.push("bars: 95 %".to_owned());
         }
         if bars_cut > 0 {
-            notes.push(format!("{bars_cut} longer bars are cut at the frame"));
+            notes.push(format!("bars cut at the frame: {bars_cut}"));
         }
         let count = self.count();
         let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));

@@ -15,7 +15,7 @@ const MAX_WORDS: usize = 12;
 const FEW_VALUES: usize = 8;
 
 /// From this multiple of the median length on, an error bar does not widen the axis.
-const FAR_LONGER: f64 = 5.0;
+const FAR_LONGER: f64 = 3.0;
 
 /// The ends of an axis, in SI.
 pub type Limits = (Option<f64>, Option<f64>);
