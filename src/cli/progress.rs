@@ -82,7 +82,7 @@ impl Progress {
                 let jobs = output::count(*jobs, "job");
                 self.say(&format!("{jobs} more; round {}", output::rounds(rounds)));
             }
-            RunEvent::JobDone { .. } | RunEvent::Tick => self.draw(),
+            RunEvent::Tick => self.draw(),
             RunEvent::JobTakesLong {
                 command,
                 predicted_cost,

@@ -257,7 +257,8 @@ impl Tables<'_> {
             for row in rows {
                 writer.push(&row)?;
             }
-            Ok(writer.finish()?)
+            writer.finish()?;
+            Ok(())
         })
     }
 }

@@ -164,7 +164,7 @@ impl Staged<'_, '_> {
         for row in rows {
             writer.push(&row)?;
         }
-        writer.finish()
+        writer.finish().map(drop)
     }
 }
 

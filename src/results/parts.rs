@@ -5,23 +5,23 @@
 //! tables until the part is committed.
 
 use crate::observe::Measurements;
-use crate::results::commit::Commit;
 use crate::results::directory::Results;
 use crate::results::tables::{
     self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
     label, relabel,
 };
 use crate::results::workers::Member;
-use crate::sweep::{Outline, Part, PartName};
+use crate::sweep::{Job, Outline, Part, PartName};
 use crate::table::Table;
 use crate::table::columns::columns;
 use crate::table::error::ResultsError;
-use crate::table::file::{Batch, Dataset, Footer, RowCount, TableWriter};
+use crate::table::file::{Batch, DataFile, Dataset, Footer, RowCount, TableWriter};
 use crate::table::storage::StorageError;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::iter;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What a job of a part ended with: its measurements, or why it failed.
 pub type Outcome = Result<Measurements, String>;
@@ -55,39 +55,58 @@ impl<'a> Results<'a> {
         self.layout().table(table).join(part.name.file())
     }
 
-    /// Spills the outcomes of some jobs of a part, beside those at the positions that are spilled already.
-    pub fn spill(
-        &self,
-        member: &Member<'_>,
-        part: &Part,
-        outcomes: &Outcomes,
-        spilled: &BTreeSet<usize>,
-    ) -> Result<(), ResultsError> {
-        let is_finished =
-            |position: &usize| outcomes.contains_key(position) || spilled.contains(position);
-        let spill = self.layout().spill();
-        let from = (!spilled.is_empty()).then_some(&spill);
-        self.write(member, part, outcomes, is_finished, (from, &spill))
+    /// The rows of a part that are there, in the tables or spilled.
+    pub fn kept(&self, part: &Part, place: Option<&Path>) -> Result<Kept, ResultsError> {
+        let read = |table| {
+            let file = place.map(|place| self.file_in(place, table, part.name));
+            let before = Dataset::of(self.layout().storage, file.into_iter().collect());
+            Ok((table, KeptRows::read(before)?))
+        };
+        self.tables().map(read).collect()
     }
 
-    /// Commits a part. Jobs without an outcome keep the rows that they have, in the tables or, at these positions,
-    /// spilled. On an error the part counts as before, or as done, but never as half done.
-    pub fn commit(
+    /// The files of a part in the tables or the spill: new rows of jobs with an outcome, kept ones of others. Uses no
+    /// disk.
+    pub fn encode(
         &self,
-        member: &Member<'_>,
         part: &Part,
         outcomes: &Outcomes,
-        spilled: &BTreeSet<usize>,
+        kept: &Kept,
+        place: &Path,
+    ) -> Result<PartFiles, ResultsError> {
+        let sweep = &self.extensions()[part.name.extension].sweep;
+        let label = |job: &Job| label(sweep, &job.parameters);
+        let labels: Vec<JobLabel<DriveAndSeed>> = part.jobs.iter().map(label).collect();
+        let outcomes = (0..).map(|position| outcomes.get(&position));
+        let jobs: Jobs<'_> = labels.iter().zip(outcomes).collect();
+        let left_out = sweep.recording().left_out();
+        let encoded = |table| {
+            let file = self.file_in(place, table, part.name);
+            let kept = &kept[table];
+            match table {
+                tables::SLIPS => encoded(file, &left_out, &jobs, kept, slip_rows),
+                tables::PRECURSORS => encoded(file, &left_out, &jobs, kept, precursor_rows),
+                _ => encoded(file, &left_out, &jobs, kept, job_row),
+            }
+        };
+        self.tables().map(encoded).collect()
+    }
+
+    /// Puts files of a part into their places below a folder. On an error the part counts as before, or as done, but
+    /// never as half done.
+    pub fn put(
+        &self,
+        member: &Member<'_>,
+        files: &PartFiles,
+        top: &Path,
     ) -> Result<(), ResultsError> {
-        let tables = self.layout().tables();
-        let spill = self.layout().spill();
-        let from = if spilled.is_empty() { &tables } else { &spill };
-        let from = (outcomes.len() < part.jobs.len()).then_some(from);
-        self.write(member, part, outcomes, |_| true, (from, &tables))?;
-        if !spilled.is_empty() {
-            self.remove_spilled(part)?;
+        let mut commit = member.commit();
+        for (path, bytes) in files {
+            let folder = path.parent().unwrap_or(top);
+            self.layout().storage.ensure_folder_below(top, folder)?;
+            commit.stage_bytes(path, bytes)?;
         }
-        Ok(())
+        self.publish(commit)
     }
 
     /// Removes spilled jobs of those of these parts that are done: the worker that committed them may have died before.
@@ -109,97 +128,66 @@ impl<'a> Results<'a> {
         Ok(())
     }
 
-    fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
+    pub fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
         // Jobs first: without them the other files do not count.
         self.tables().rev().try_for_each(|table| {
             let file = self.file_in(&self.layout().spill(), table, part.name);
             self.layout().remove(&file.path)
         })
     }
-
-    /// Writes files of a part, from and to the tables or the spill: new rows of jobs with an outcome, old ones of
-    /// others.
-    fn write(
-        &self,
-        member: &Member<'_>,
-        part: &Part,
-        outcomes: &Outcomes,
-        is_written: impl Fn(&usize) -> bool,
-        places: (Option<&PathBuf>, &PathBuf),
-    ) -> Result<(), ResultsError> {
-        let sweep = &self.extensions()[part.name.extension].sweep;
-        let positions = (0..part.jobs.len()).filter(is_written);
-        let job = |position: usize| {
-            let parameters = &part.jobs[position].parameters;
-            (label(sweep, parameters), outcomes.get(&position))
-        };
-        let jobs: Jobs<'_> = positions.map(job).collect();
-        let mut commit = member.commit();
-        self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
-            let mut slips = outcome.iter().flat_map(|measured| &measured.slips);
-            slips.try_for_each(|slip| writer.push(&(Cow::Borrowed(job), Cow::Borrowed(slip))))
-        })?;
-        if sweep.recording().precursors {
-            self.stage::<PrecursorRow<'_>>(
-                &mut commit,
-                part,
-                places,
-                &jobs,
-                |writer, job, outcome| {
-                    let mut precursors = outcome.iter().flat_map(|measured| &measured.precursors);
-                    precursors.try_for_each(|precursor| {
-                        writer.push(&(Cow::Borrowed(job), Cow::Borrowed(precursor)))
-                    })
-                },
-            )?;
-        }
-        self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
-            let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
-            writer.push(&(relabel(job), record))
-        })?;
-        self.publish(commit)
-    }
-
-    /// Writes a part's file of one table: new rows of jobs with an outcome, the old ones of the others.
-    fn stage<'j, R: Table>(
-        &self,
-        commit: &mut Commit<'_>,
-        part: &Part,
-        (from, to): (Option<&PathBuf>, &PathBuf),
-        jobs: &'j Jobs<'_>,
-        write: impl Fn(
-            &mut TableWriter<R>,
-            &'j JobLabel<DriveAndSeed>,
-            &'j Outcome,
-        ) -> Result<(), ResultsError>,
-    ) -> Result<(), ResultsError> {
-        let storage = self.layout().storage;
-        let file = |place: &PathBuf| self.file_in(place, R::NAME, part.name);
-        let target = file(to);
-        // A run makes the folder of the tables when it begins.
-        let top = if *to == self.layout().spill() {
-            &self.layout().run()
-        } else {
-            to
-        };
-        storage.ensure_folder_below(top, &to.join(R::NAME))?;
-        let kept = KeptRows::read(Dataset::of(storage, from.map(file).into_iter().collect()))?;
-        let sweep = &self.extensions()[part.name.extension].sweep;
-        let left_out = sweep.recording().left_out();
-        let footer = Footer::default().and(&target.footer).at(&target.path);
-        let mut writer = TableWriter::new(&left_out, commit.stage(&target.path)?, &footer)?;
-        for (job, outcome) in jobs {
-            match outcome {
-                Some(outcome) => write(&mut writer, job, outcome)?,
-                None => kept.copy(&mut writer, &job.0.job_id)?,
-            }
-        }
-        writer.finish()
-    }
 }
 
+/// Files of a part with their bytes, that of the jobs last.
+pub type PartFiles = Vec<(PathBuf, Vec<u8>)>;
+
+/// Rows of jobs that are there already, by table.
+pub type Kept = HashMap<&'static str, KeptRows>;
+
 /// The jobs of a part, those that were run with their outcomes.
-type Jobs<'a> = Vec<(JobLabel<DriveAndSeed>, Option<&'a Outcome>)>;
+type Jobs<'a> = Vec<(&'a JobLabel<DriveAndSeed>, Option<&'a Outcome>)>;
+
+/// The bytes of a file of one table.
+fn encoded<'j, R: Table, I: Iterator<Item = R>>(
+    file: DataFile,
+    left_out: &[Cow<'static, str>],
+    jobs: &Jobs<'j>,
+    kept: &KeptRows,
+    rows: impl Fn(&'j JobLabel<DriveAndSeed>, &'j Outcome) -> I,
+) -> Result<(PathBuf, Vec<u8>), ResultsError> {
+    let footer = Footer::default().and(&file.footer).at(&file.path);
+    let mut writer = TableWriter::in_memory(left_out, &file.path, &footer)?;
+    for (job, outcome) in jobs {
+        match outcome {
+            Some(outcome) => rows(job, outcome).try_for_each(|row| writer.push(&row))?,
+            None => kept.copy(&mut writer, &job.0.job_id)?,
+        }
+    }
+    Ok((file.path, writer.finish()?))
+}
+
+fn slip_rows<'j>(
+    job: &'j JobLabel<DriveAndSeed>,
+    outcome: &'j Outcome,
+) -> impl Iterator<Item = SlipRow<'j>> {
+    let slips = outcome.iter().flat_map(|measured| &measured.slips);
+    slips.map(|slip| (Cow::Borrowed(job), Cow::Borrowed(slip)))
+}
+
+fn precursor_rows<'j>(
+    job: &'j JobLabel<DriveAndSeed>,
+    outcome: &'j Outcome,
+) -> impl Iterator<Item = PrecursorRow<'j>> {
+    let precursors = outcome.iter().flat_map(|measured| &measured.precursors);
+    precursors.map(|precursor| (Cow::Borrowed(job), Cow::Borrowed(precursor)))
+}
+
+fn job_row(
+    job: &JobLabel<DriveAndSeed>,
+    outcome: &Outcome,
+) -> impl Iterator<Item = JobRow> + use<> {
+    let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
+    iter::once((relabel(job), record))
+}
 
 columns! {
     /// What the jobs table says about the rows of a job in other tables.
@@ -244,7 +232,7 @@ pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, Resu
 
 /// The rows of a file by job.
 #[derive(Default)]
-struct KeptRows {
+pub struct KeptRows {
     batches: Vec<Batch>,
     by_job: HashMap<String, Vec<(usize, Range<usize>)>>,
 }
@@ -268,7 +256,11 @@ impl KeptRows {
         Ok(kept)
     }
 
-    fn copy<R: Table>(&self, writer: &mut TableWriter<R>, job: &str) -> Result<(), ResultsError> {
+    fn copy<R: Table>(
+        &self,
+        writer: &mut TableWriter<R, Vec<u8>>,
+        job: &str,
+    ) -> Result<(), ResultsError> {
         let rows = self.by_job.get(job).into_iter().flatten();
         rows.cloned()
             .try_for_each(|(batch, rows)| writer.copy(&self.batches[batch], rows))

@@ -1,23 +1,25 @@
-//! The collector hands jobs to the threads, puts their outcomes together into parts, and commits them. Only it uses the
-//! disk.
+//! The collector hands jobs to the threads, puts their outcomes together into parts, and commits these. The threads
+//! also encode the files of whole parts, so that small jobs do not wait for the collector. Only it uses the disk.
 
-use crate::results::ResultsError;
 use crate::results::layout::shorter_in_tests;
-use crate::results::parts::{Outcome, Outcomes};
+use crate::results::parts::{Kept, Outcome, Outcomes, PartFiles};
 use crate::results::pending::Pending;
+use crate::results::{Results, ResultsError};
 use crate::run::take::{LOOK, Left, PartJob, Taken, Work};
 use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, limits};
 use crate::solver::SimulationError;
 use crate::sweep::{Job, PartName};
 use std::any::Any;
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 const STOP_POLL: Duration = Duration::from_millis(if cfg!(test) { 2 } else { 20 });
+/// How long the collector lets ended jobs gather after it had none.
+const GATHER: Duration = shorter_in_tests(Duration::from_micros(500), Duration::ZERO);
 /// Time between two ticks for the display.
 const TICK: Duration = shorter_in_tests(Duration::from_secs(1), Duration::from_millis(20));
 /// How often it counts the parts that others have done.
@@ -30,11 +32,25 @@ const LONG_BY_PREDICTION: f64 = 20.0;
 const AHEAD: f64 = 0.5;
 const MAX_AHEAD: usize = 256;
 
-struct Ended {
-    job: PartJob,
-    /// `None` if it was interrupted.
-    outcome: Option<Outcome>,
-    time: JobTime,
+/// What threads do.
+enum Task {
+    Run(PartJob),
+    Encode(OpenPart, Kept),
+}
+
+/// What they have done.
+enum Ended {
+    Job {
+        job: PartJob,
+        /// `None` if it was interrupted.
+        outcome: Option<Outcome>,
+        time: JobTime,
+    },
+    Part {
+        whole: OpenPart,
+        /// An error of the outer kind is a panic.
+        files: std::thread::Result<Result<PartFiles, ResultsError>>,
+    },
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -51,10 +67,11 @@ struct UnderWay {
 
 type AllUnderWay = Mutex<BTreeMap<(PartName, usize), UnderWay>>;
 
-/// The jobs that were handed out and have not ended.
+/// The jobs that were handed out and have not ended, and the whole parts that are being encoded.
 #[derive(Default)]
 struct Out {
     jobs: usize,
+    parts: usize,
     cost: f64,
     memory: f64,
     /// Memory that all jobs together may take, in bytes.
@@ -64,6 +81,10 @@ struct Out {
 }
 
 impl Out {
+    const fn is_empty(&self) -> bool {
+        self.jobs == 0 && self.parts == 0
+    }
+
     fn has_room(&self, threads: usize) -> bool {
         self.jobs < threads
             || (self.jobs < threads * MAX_AHEAD && self.cost < threads as f64 * AHEAD)
@@ -87,7 +108,7 @@ impl Out {
     }
 }
 
-/// A part of which some jobs are still out.
+/// A part of which some jobs are still out, or that is not committed yet.
 pub(super) struct OpenPart {
     of: Arc<Taken>,
     outcomes: Outcomes,
@@ -153,11 +174,20 @@ impl Collector<'_, '_> {
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = channel();
         let all_run = pool.in_place_scope(|workers| {
-            let hand_out = |job: PartJob| {
+            let results = self.pending.results;
+            let hand_out = |task: Task| {
                 let sender = sender.clone();
                 workers.spawn(move |_| {
+                    let ended = match task {
+                        Task::Run(job) => run_job(job, kernel, interrupt, under_way),
+                        Task::Encode(whole, kept) => {
+                            let encode = || encode(results, &whole, &kept);
+                            let files = catch_unwind(AssertUnwindSafe(encode));
+                            Ended::Part { whole, files }
+                        }
+                    };
                     // Without a receiver the run has ended.
-                    let _ = sender.send(run_job(job, kernel, interrupt, under_way));
+                    let _ = sender.send(ended);
                 });
             };
             let collected = self.collect(work, threads, hand_out, &receiver, under_way, interrupt);
@@ -172,14 +202,16 @@ impl Collector<'_, '_> {
 
     /// Keeps the finished jobs of unfinished parts.
     fn spill(&mut self) -> Result<(), ResultsError> {
+        let results = self.pending.results;
         for open in std::mem::take(&mut self.open).values() {
+            let kept = self.kept(&open.of)?;
             if open.of.again {
-                self.commit(open)?;
+                self.commit(open, &encode(results, open, &kept)?)?;
             } else {
-                let Taken { part, spilled, .. } = &*open.of;
-                self.pending
-                    .results
-                    .spill(self.joined.member, part, &open.outcomes, spilled)?;
+                let layout = results.layout();
+                let files =
+                    results.encode(&open.of.part, &open.outcomes, &kept, &layout.spill())?;
+                results.put(self.joined.member, &files, &layout.run())?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
                 self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
@@ -188,12 +220,24 @@ impl Collector<'_, '_> {
         Ok(())
     }
 
+    /// The rows that a part has already.
+    fn kept(&self, of: &Taken) -> Result<Kept, ResultsError> {
+        let layout = self.pending.results.layout();
+        let spill = (!of.spilled.is_empty()).then(|| layout.spill());
+        let place = if of.again {
+            Some(layout.tables())
+        } else {
+            spill
+        };
+        self.pending.results.kept(&of.part, place.as_deref())
+    }
+
     /// Hands out jobs and takes their outcomes until no more come. Returns whether it took all that it could.
     fn collect(
         &mut self,
         mut work: Work<'_>,
         threads: usize,
-        hand_out: impl Fn(PartJob),
+        hand_out: impl Fn(Task),
         ended: &Receiver<Ended>,
         under_way: &AllUnderWay,
         interrupt: &AtomicBool,
@@ -226,14 +270,21 @@ impl Collector<'_, '_> {
                 is_out_of_time = true;
                 self.events.send(&RunEvent::OutOfTime)?;
             }
-            if out.jobs == 0 && (is_interrupted || work.has_ended) {
+            if out.is_empty() && (is_interrupted || work.has_ended) {
                 return Ok(!is_interrupted && !is_out_of_time);
             }
-            // A sender is kept, so an error means that there is nothing yet.
-            if let Ok(Ended { job, outcome, time }) = ended.recv_timeout(STOP_POLL) {
-                out.remove(&job);
-                if let Some(outcome) = outcome {
-                    self.take(&job, outcome, time)?;
+            match next(ended) {
+                None => (),
+                Some(Ended::Job { job, outcome, time }) => {
+                    out.remove(&job);
+                    if let Some(outcome) = outcome {
+                        self.take(&job, outcome, time, &mut out, &hand_out)?;
+                    }
+                }
+                Some(Ended::Part { whole, files }) => {
+                    out.parts -= 1;
+                    let files = files.unwrap_or_else(|panic| resume_unwind(panic))?;
+                    self.commit(&whole, &files)?;
                 }
             }
         }
@@ -245,14 +296,14 @@ impl Collector<'_, '_> {
         out: &mut Out,
         work: &mut Work<'_>,
         threads: usize,
-        hand_out: &impl Fn(PartJob),
+        hand_out: &impl Fn(Task),
     ) -> Result<(), ResultsError> {
         while !self.joined.must_end()
             && out.has_room(threads)
-            && let Some(job) = work.next(out.jobs > 0, out.jobs >= threads)?
+            && let Some(job) = work.next(!out.is_empty(), out.jobs >= threads)?
         {
             if let Some(reason) = self.pending.refusal(job.job()) {
-                self.take(&job, Err(reason), JobTime::default())?;
+                self.take(&job, Err(reason), JobTime::default(), out, hand_out)?;
                 continue;
             }
             if out.memory + limits::beside_threads(job.memory, threads) > out.free {
@@ -269,7 +320,7 @@ impl Collector<'_, '_> {
                 }
             }
             out.add(&job);
-            hand_out(job);
+            hand_out(Task::Run(job));
         }
         Ok(())
     }
@@ -301,7 +352,15 @@ impl Collector<'_, '_> {
         })?)
     }
 
-    fn take(&mut self, of: &PartJob, outcome: Outcome, time: JobTime) -> Result<(), ResultsError> {
+    /// Puts an outcome to the others of its part, which is encoded when it is whole.
+    fn take(
+        &mut self,
+        of: &PartJob,
+        outcome: Outcome,
+        time: JobTime,
+        out: &mut Out,
+        hand_out: &impl Fn(Task),
+    ) -> Result<(), ResultsError> {
         let part = &of.of.part;
         let job = of.job();
         self.joined.member.count_job();
@@ -335,17 +394,21 @@ impl Collector<'_, '_> {
         if open.outcomes.len() == of.of.together
             && let Some(whole) = self.open.remove(&key)
         {
-            self.commit(&whole)?;
+            let kept = self.kept(&whole.of)?;
+            out.parts += 1;
+            hand_out(Task::Encode(whole, kept));
         }
         Ok(())
     }
 
-    fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
+    fn commit(&mut self, whole: &OpenPart, files: &PartFiles) -> Result<(), ResultsError> {
         let begin = Instant::now();
         let Taken { part, spilled, .. } = &*whole.of;
-        self.pending
-            .results
-            .commit(self.joined.member, part, &whole.outcomes, spilled)?;
+        let results = self.pending.results;
+        results.put(self.joined.member, files, &results.layout().tables())?;
+        if !spilled.is_empty() {
+            results.remove_spilled(part)?;
+        }
         let name = part.name;
         self.joined.member.end_part(name)?;
         let took = whole.of.begin.elapsed();
@@ -380,6 +443,23 @@ fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(PartName, usize),
     under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// What ended next, if anything does soon.
+fn next(ended: &Receiver<Ended>) -> Option<Ended> {
+    ended.try_recv().ok().or_else(|| {
+        // A sender is kept, so an error means that there is nothing yet.
+        let next = ended.recv_timeout(STOP_POLL).ok();
+        // To be woken for each small job would cost more than to take it.
+        std::thread::sleep(GATHER);
+        next
+    })
+}
+
+/// The files of a part in the tables.
+fn encode(results: &Results<'_>, whole: &OpenPart, kept: &Kept) -> Result<PartFiles, ResultsError> {
+    let tables = results.layout().tables();
+    results.encode(&whole.of.part, &whole.outcomes, kept, &tables)
+}
+
 fn run_job(
     job: PartJob,
     kernel: &Kernel<'_>,
@@ -387,7 +467,7 @@ fn run_job(
     under_way: &AllUnderWay,
 ) -> Ended {
     if interrupt.load(Ordering::Relaxed) {
-        return Ended {
+        return Ended::Job {
             job,
             outcome: None,
             time: JobTime::default(),
@@ -407,7 +487,7 @@ fn run_job(
     locked(under_way).remove(&key);
     let wall = begin.elapsed().as_secs_f64();
     let time = JobTime { cpu, wall };
-    Ended { job, outcome, time }
+    Ended::Job { job, outcome, time }
 }
 
 /// `None` for a job that was interrupted.

@@ -9,7 +9,7 @@ use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
 use crate::table::columns::Row;
 use crate::table::error::ResultsError;
-use crate::table::storage::{Storage, StoredFile};
+use crate::table::storage::{Sink, Storage, StorageError, StoredFile};
 use arrow_array::{RecordBatch, RecordBatchReader as _};
 use arrow_schema::{ArrowError, DataType, Schema, SchemaRef};
 use bytes::Bytes;
@@ -108,13 +108,14 @@ impl Footer {
     }
 }
 
-/// Writes one file of a table. A file that was not finished is unreadable.
-pub struct TableWriter<R> {
+/// Writes one file of a table, to the disk or into memory. A file that was not finished is unreadable.
+pub struct TableWriter<R, S = StoredFile> {
     row: PhantomData<fn(&R)>,
     buffer: RowBuffer,
     /// Encodes into memory, one row group at a time.
     writer: ArrowWriter<Vec<u8>>,
-    file: StoredFile,
+    path: PathBuf,
+    file: S,
     hasher: Sha256,
 }
 
@@ -125,16 +126,40 @@ impl<R: Row> TableWriter<R> {
         file: StoredFile,
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
+        let path = file.path().to_owned();
+        Self::into_sink(left_out, path, file, footer)
+    }
+}
+
+impl<R: Row> TableWriter<R, Vec<u8>> {
+    /// Makes the bytes of the file of this path.
+    pub fn in_memory(
+        left_out: &[Cow<'static, str>],
+        path: &Path,
+        footer: &Footer,
+    ) -> Result<Self, ResultsError> {
+        Self::into_sink(left_out, path.to_owned(), Vec::new(), footer)
+    }
+}
+
+impl<R: Row, S: Sink> TableWriter<R, S> {
+    fn into_sink(
+        left_out: &[Cow<'static, str>],
+        path: PathBuf,
+        file: S,
+        footer: &Footer,
+    ) -> Result<Self, ResultsError> {
         let buffer = RowBuffer::new::<R>().without(left_out);
         let schema = buffer.schema();
         let writer = footer.properties(schema).and_then(|properties| {
             ArrowWriter::try_new(Vec::new(), Arc::clone(schema), Some(properties))
         });
-        let writer = writer.map_err(ResultsError::unwritten(file.path()))?;
+        let writer = writer.map_err(ResultsError::unwritten(&path))?;
         Ok(Self {
             row: PhantomData,
             buffer,
             writer,
+            path,
             file,
             hasher: Sha256::new(),
         })
@@ -170,18 +195,18 @@ impl<R: Row> TableWriter<R> {
             self.writer.flush()?;
             Ok(self.writer.sync()?)
         };
-        encode().map_err(ResultsError::unwritten(self.file.path()))?;
+        encode().map_err(ResultsError::unwritten(&self.path))?;
         let bytes = std::mem::take(self.writer.inner_mut());
         self.hasher.update(&bytes);
-        Ok(self.file.write(&bytes)?)
+        let written = self.file.write_all(&bytes);
+        Ok(written.map_err(StorageError::at("write", &self.path))?)
     }
 
     /// Writes what is left and the footer, brings the file to the disk.
-    pub fn finish(mut self) -> Result<(), ResultsError> {
+    pub fn finish(mut self) -> Result<S, ResultsError> {
         if !self.buffer.is_empty() {
             self.flush()?;
         }
-        let mut file = self.file;
         let footer = || -> Result<Vec<u8>, ParquetError> {
             let mut footer = self.writer.into_inner()?;
             let no_place = "the footer has no place for a checksum";
@@ -189,9 +214,11 @@ impl<R: Row> TableWriter<R> {
                 .ok_or_else(|| ParquetError::General(no_place.to_owned()))?;
             Ok(footer)
         };
-        let footer = footer().map_err(ResultsError::unwritten(file.path()))?;
-        file.write(&footer)?;
-        Ok(file.sync()?)
+        let footer = footer().map_err(ResultsError::unwritten(&self.path))?;
+        let mut file = self.file;
+        let written = file.write_all(&footer).and_then(|()| file.sync());
+        written.map_err(StorageError::at("write", &self.path))?;
+        Ok(file)
     }
 }
 

@@ -63,6 +63,18 @@ impl Write for StoredFile {
     }
 }
 
+impl Sink for StoredFile {
+    fn sync(&mut self) -> io::Result<()> {
+        self.sink.sync()
+    }
+}
+
+impl Sink for Vec<u8> {
+    fn sync(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// The file operations. Every error names the operation, the path and the operating system's reason.
 pub trait Storage: Sync {
     /// Creates a folder within one that is there; nothing happens if it is there itself.
