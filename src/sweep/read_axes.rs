@@ -1,16 +1,5 @@
-//! The `[axes]` of a sweep file: lists, ranges, counts, zips and samples become axes.
-//!
-//! ```text
-//! V0    = [1e-5, 1e-4]                          a list
-//! Delta = { linear = [3e-7, 1e-6], points = 8 } ends included; log = [..] likewise
-//! seed  = { count = 4 }                         0, 1, 2, 3; with first = 100: 100, 101, 102, 103
-//! [[axes.zip]]                                  columns of equal length that move together
-//! [axes.sobol]                                  points, seed and a range for each quantity
-//! ```
-//!
-//! Axes stand in the order of the file; the last moves fastest. Values of a range are rounded to twelve digits, those
-//! of a whole-number quantity to whole numbers. An axis reports its first mistake, a zip or a sample that of each
-//! column.
+//! The `[axes]` of a sweep file: lists, ranges, counts, zips and samples become axes. `docs/sweeps.md` has their forms.
+//! An axis reports its first mistake, a zip or a sample that of each column.
 
 use super::axes::{Axis, Column, MAX_ROWS, MAX_SAMPLE, Range, Repeated, sobol};
 use super::checks::Places;

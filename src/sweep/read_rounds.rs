@@ -1,20 +1,5 @@
-//! The `[precision]` or the `[refine]` of a sweep file.
-//!
-//! ```text
-//! [precision]
-//! of       = "tau_mean"              a statistic with an interval, or a list of them
-//! relative = 0.01                    largest half-width of its 95 % interval; or absolute = .., in its unit
-//! seeds    = { from = 24, to = 256 } seeds of a set: at first, and at most; with first = 100 from 100 on
-//! [refine]
-//! axis      = "Delta"                a range of [axes]
-//! by        = "resultant_length"     a number, or a list of them; or "periods" with value = n
-//! threshold = 0.5                    what it crosses
-//! to        = 0.03                   largest width of the interval of an edge
-//! seeds     = { from = 24, to = 96 }
-//! jobs      = 4000                   at most
-//! ```
-//!
-//! The axis of `[refine]` becomes as fine as its `to`.
+//! The `[precision]` or the `[refine]` of a sweep file, see `docs/rounds.md`. The axis of `[refine]` becomes as
+//! fine as its `to`.
 
 use super::axes::{Axis, MAX_ROWS};
 use super::checks::Places;
