@@ -15,6 +15,7 @@ use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{Goal, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
+use super::variation::SECTIONS;
 use crate::model::{Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Solver, SolverKey};
@@ -56,17 +57,6 @@ impl Sweep {
     }
 }
 
-const SECTIONS: [&str; 8] = [
-    "name",
-    "where",
-    "model",
-    "axes",
-    "record",
-    "solver",
-    "precision",
-    "refine",
-];
-
 /// Reads the whole file, also past mistakes.
 fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, Refused> {
     let table = source.table()?;
@@ -76,7 +66,8 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         at: 0,
         table: &table,
     };
-    file.only(&SECTIONS).ok();
+    file.only(&[&["name", "where"], &SECTIONS[..]].concat())
+        .ok();
     let mut places = Places::new(source);
     let name = read_name(&file);
     let model = read_section(&file, "[model]", |model| read_model(model, &mut places));
@@ -196,12 +187,9 @@ fn read_model(
     model: &Section<'_>,
     places: &mut Places<'_>,
 ) -> Result<(Parameters, Option<Axis>), Refused> {
-    let keys: Vec<&str> = Quantity::all().map(Quantity::key).collect();
     let mut given = Point::default();
     all(model.entries().iter().map(|entry| {
-        let quantity =
-            Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
-        places.set(quantity, entry.at, model.title);
+        let quantity = read_axes::known(entry, model.title, &[], places)?;
         given.set(quantity, read_axes::read_value(entry, quantity)?);
         Ok(())
     }))?;

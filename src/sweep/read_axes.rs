@@ -37,7 +37,7 @@ fn tables<'a>(entry: &Entry<'a>, title: &'static str) -> Result<Vec<Section<'a>>
 }
 
 /// The quantity that an entry sets.
-fn known(
+pub(super) fn known(
     entry: &Entry<'_>,
     title: &'static str,
     also: &Keys,
@@ -57,25 +57,24 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refus
     if let (Some(values), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
         return Ok(Axis::Counted { symbol, values });
     }
-    let values = read_values(entry, quantity)?;
     let column = Column {
         quantity,
-        values: values.iter().map(|&(value, _)| value).collect(),
+        values: read_values(entry, quantity)?,
     };
-    Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
-        let (value, at) = values[later];
-        let earlier = earlier + 1;
-        let later = later + 1;
+    Axis::table(vec![column.clone()]).map_err(|Repeated { earlier, later }| {
+        let at = entry.list().map_or(entry.at, |list| list[later].at);
         let problem = format!(
-            "{} = {value}: repeats value {earlier} of this axis as value {later}; keep one, or take fewer points",
-            entry.key
+            "{} = {}: repeats value {} of this axis as value {}; keep one, or take fewer points",
+            entry.key,
+            column.values[later],
+            earlier + 1,
+            later + 1
         );
         entry.source.refuse(at, problem)
     })
 }
 
-/// Reads the values of a quantity, each with the byte of the text that sets it.
-fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usize)>, Refused> {
+fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<Value>, Refused> {
     if let Some(list) = entry.list() {
         if list.is_empty() {
             return Err(entry.refuse("an axis needs at least one value"));
@@ -85,8 +84,8 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
                 "an axis has at most {MAX_ROWS} listed values; split it into two axes"
             )));
         }
-        let read = |value: &Entry<'_>| Ok((read_value(value, quantity)?, value.at));
-        return list.iter().map(read).collect();
+        let values = list.iter().map(|value| read_value(value, quantity));
+        return values.collect();
     }
     if let Some(values) = read_count(entry, quantity)? {
         if values.end - values.start > MAX_ROWS {
@@ -95,12 +94,11 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
                 "a zip has at most {MAX_ROWS} rows; make {key} a separate axis"
             )));
         }
-        let values = values.map(Value::Count);
-        return Ok(values.map(|value| (value, entry.at)).collect());
+        return Ok(values.map(Value::Count).collect());
     }
     let (range, points) = read_spaced(entry, quantity)?;
     let values = range.spaced(points).map(|value| ranged(quantity, value));
-    Ok(values.map(|value| (value, entry.at)).collect())
+    Ok(values.collect())
 }
 
 /// Reads a range of an axis, and the number of its values.
@@ -229,8 +227,7 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
     let entries = table.entries();
     let columns = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &[], places)?;
-        let values = read_values(entry, quantity)?.into_iter();
-        let values = values.map(|(value, _)| value).collect();
+        let values = read_values(entry, quantity)?;
         Ok(Column { quantity, values })
     }))?;
     let [first, _, ..] = columns.as_slice() else {
