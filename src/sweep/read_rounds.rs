@@ -119,7 +119,9 @@ fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refuse
             } else {
                 unit
             };
-            Ok(Target::Absolute(entry.positive(unit)?))
+            let allowed = format!("a finite number > 0, in {unit}");
+            let error = entry.number(&allowed, |error| error > 0.0)?;
+            Ok(Target::Absolute(error))
         }
     }
 }
