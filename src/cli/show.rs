@@ -8,7 +8,7 @@ use crate::reduce::{
     means_of_slips, read_reduced, read_sets, renew,
 };
 use crate::results::Results;
-use crate::sets::{Digits, FOUND, label, with_decimals};
+use crate::sets::{Digits, FOUND, column_of, label, with_decimals};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Row as _};
@@ -190,31 +190,25 @@ fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
     Ok(sets.collect::<Result<_, _>>()?)
 }
 
-/// The column that shows a parameter: of the period, the frequency.
-const fn key_of(symbol: Symbol) -> &'static str {
-    if matches!(symbol, Symbol::T) {
-        FREQUENCY
-    } else {
-        symbol.key()
-    }
-}
-
 /// The parameters in which sets differ.
 fn usual_names(rows: &[SetRow]) -> Vec<&'static str> {
-    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(key_of).collect();
+    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(column_of).collect();
     names.extend(names.contains(&FREQUENCY).then_some("eta"));
     names
 }
 
+fn columns_of<'a>(names: impl IntoIterator<Item = &'a str>, rows: &[SetRow]) -> Vec<Values> {
+    let names = names.into_iter();
+    names
+        .filter_map(|name| Values::of(rows, name).ok())
+        .collect()
+}
+
 /// Parameters of these names, and what was found of sets.
 fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
-    let columns = names
-        .into_iter()
-        .chain(FOUND.iter().copied())
-        .filter_map(|name| Values::of(rows, name).ok());
+    let mut columns = columns_of([&names, FOUND].concat(), rows);
+    columns.retain(|values| values.numbers.iter().any(Option::is_some));
     columns
-        .filter(|values| values.numbers.iter().any(Option::is_some))
-        .collect()
 }
 
 /// The parameters of these names, and columns by name, heading or formula, each once; of slips, their means.
@@ -232,11 +226,8 @@ fn chosen_columns(
                 .ok_or_else(|| UsageError(format!("--columns {name}: {problem}")))?,
         });
     }
-    let is_left_out = |name: &&str| columns.iter().all(|values| values.name() != *name);
-    let parameters = parameters.into_iter().filter(is_left_out);
-    let mut all: Vec<Values> = parameters
-        .filter_map(|name| Values::of(rows, name).ok())
-        .collect();
+    let mut all = columns_of(parameters, rows);
+    all.retain(|values| columns.iter().all(|chosen| chosen.name() != values.name()));
     all.append(&mut columns);
     Ok(all)
 }
@@ -375,12 +366,10 @@ fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
         ..SetRow::default()
     };
     let rows: Vec<SetRow> = edges.iter().map(as_set).collect();
-    for symbol in differing(&rows.iter()) {
-        if symbol != axis
-            && let Ok(values) = Values::of(&rows, key_of(symbol))
-        {
-            add_column(&mut columns, &values, &rows, rows.len());
-        }
+    let mut parameters = differing(&rows.iter());
+    parameters.retain(|symbol| *symbol != axis);
+    for values in columns_of(parameters.into_iter().map(column_of), &rows) {
+        add_column(&mut columns, &values, &rows, rows.len());
     }
     let label = label(&first.axis);
     let brackets = edges.iter().map(|edge| edge.bracket_high);
@@ -573,10 +562,8 @@ fn note_on_removed_sets(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     if gone.is_empty() {
         return None;
     }
-    let columns: Vec<Values> = differing(&rows.iter())
-        .into_iter()
-        .filter_map(|symbol| Values::of(rows, key_of(symbol)).ok())
-        .collect();
+    let parameters = differing(&rows.iter()).into_iter();
+    let columns = columns_of(parameters.map(column_of), rows);
     let setting = |&set: &usize| {
         let settings = columns
             .iter()
