@@ -109,12 +109,8 @@ impl Sweep {
         })
     }
 
-    /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
-    pub fn contains(&self, parameters: &Parameters) -> bool {
-        self.find(parameters).is_some()
-    }
-
-    /// Number of the point that is the job with these canonical parameters.
+    /// Number of the point that is the job with these canonical parameters: exact bits, without walking through the
+    /// points.
     pub fn find(&self, parameters: &Parameters) -> Option<u64> {
         let control =
             || Some(self.point_count() + self.controls.as_ref()?.find_in_grid(parameters)?);
