@@ -2,13 +2,13 @@
 
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
-use crate::model::Symbol;
+use crate::model::{Selection, Symbol};
 use crate::reduce::{
     Condition, EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing,
     means_of_slips, read_reduced, read_sets, renew,
 };
 use crate::results::Results;
-use crate::sets::{Digits, FOUND, column_of, label, with_decimals};
+use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, with_decimals};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Row as _};
@@ -332,11 +332,8 @@ fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
 /// Whether a set differs from those of an edge in nothing but the refined axis.
 fn is_on_line(row: &SetRow, edge: &EdgeRow) -> bool {
     let axis = Symbol::from_key(&edge.axis).unwrap_or(Symbol::T);
-    let parameters = &row.parameters.parameters;
-    let mut others = Symbol::ALL
-        .into_iter()
-        .filter(|symbol| ![axis, Symbol::Seed].contains(symbol));
-    others.all(|symbol| parameters.get(symbol) == edge.parameters.get(symbol))
+    let mut others = AllButSeed::SYMBOLS.iter().filter(|symbol| **symbol != axis);
+    others.all(|&symbol| row.parameters.get(symbol) == edge.parameters.get(symbol))
 }
 
 /// On which side of the threshold all sets lie, where nothing crosses it.
@@ -468,7 +465,7 @@ fn jobs_of_sets(rows: &[SetRow], jobs: impl Fn(&SetRow) -> u64) -> Option<String
 fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let jobs = jobs_of_sets(rows, |row| row.jobs_without_slips)?;
     let without = rows.iter().filter(|row| row.jobs_without_slips > 0);
-    let mut places = without.filter_map(|row| sweep.set_with(&row.parameters.parameters));
+    let mut places = without.filter_map(|row| sweep.set_with(&row.parameters));
     let job = places
         .next()
         .and_then(|set| sweep.jobs_at(set..set + 1).next());
@@ -493,8 +490,7 @@ fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
 
 fn note_on_few_cycles(rows: &[SetRow]) -> Option<String> {
     let has_few_cycles = |row: &&SetRow| {
-        let period = row.parameters.parameters.modulation_period;
-        let times = period.zip(row.tau_mean);
+        let times = row.parameters.modulation_period.zip(row.tau_mean);
         row.phase_mean.is_none() && times.is_some_and(|(period, tau)| period >= tau)
     };
     let sets = rows.iter().filter(has_few_cycles).count() as u64;
@@ -554,10 +550,7 @@ fn note_on_model(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
 }
 
 fn note_on_removed_sets(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
-    let is_gone = |set: &usize| {
-        let parameters = &rows[*set].parameters.parameters;
-        sweep.set_with(parameters).is_none()
-    };
+    let is_gone = |set: &usize| sweep.set_with(&rows[*set].parameters).is_none();
     let gone: Vec<usize> = (0..rows.len()).filter(is_gone).collect();
     if gone.is_empty() {
         return None;

@@ -13,9 +13,7 @@
 //! Looking again and again until an interval is short prefers those that are short by chance: the more so, the fewer
 //! seeds it is when a set may end, and the more skewed its values are. So no set ends with fewer than [`MIN_SEEDS`].
 
-use crate::reduce::{
-    Line, SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges,
-};
+use crate::reduce::{SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges};
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Goal, MIN_SEEDS, Precision, Refinement, Round, Standing, Sweep};
 use crate::table::value::floored;
@@ -99,11 +97,8 @@ fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEd
     let mut room = refinement.max_jobs.saturating_sub(jobs);
     let mut wanted = BTreeMap::new();
     let mut standing = Standing::default();
-    for line in lines(sweep, refinement, sets) {
-        let Line {
-            mut rows, edges, ..
-        } = line;
-        for edge in edges.iter().filter(|edge| !edge.is_done()) {
+    for mut line in lines(sweep, refinement, sets) {
+        for edge in line.edges.iter().filter(|edge| !edge.is_done()) {
             let [fewest, most] = edge.seeds();
             let seeds = match edge.wanted_row {
                 Some(_) => from,
@@ -115,8 +110,8 @@ fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEd
                 None => edge.sets.iter().map(|set| set.row).collect(),
             };
             let set = |row: u64| {
-                rows[refinement.axis] = row;
-                sweep.set_at(&rows).filter(|&set| had(set) < seeds)
+                line.rows[refinement.axis] = row;
+                sweep.set_at(&line.rows).filter(|&set| had(set) < seeds)
             };
             let new: Vec<u64> = at.into_iter().filter_map(set).collect();
             let more = |set: &u64| {
