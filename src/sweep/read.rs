@@ -45,7 +45,8 @@ impl Sweep {
 
     /// The same with a text that was made of something, such as flags.
     pub fn parse_made(text: &str, of: &str) -> Result<Self, SweepError> {
-        let source = Source::made(of, text);
+        let mut source = Source::new(Path::new(of), text);
+        source.made_of = Some(of);
         read(&source, true, PLAN_VERSION).map_err(|_| source.error())
     }
 

@@ -84,7 +84,7 @@ pub(super) struct Source<'a> {
     path: &'a Path,
     pub text: &'a str,
     /// What the text was made of, such as flags: its author knows no lines of it, and no `[model]`.
-    made_of: Option<&'a str>,
+    pub made_of: Option<&'a str>,
     /// Each with the byte of the text that it is about.
     mistakes: RefCell<Vec<(usize, String)>>,
 }
@@ -96,14 +96,6 @@ impl<'a> Source<'a> {
             text,
             made_of: None,
             mistakes: RefCell::new(Vec::new()),
-        }
-    }
-
-    /// A text that a program made of something, such as flags.
-    pub fn made(of: &'a str, text: &'a str) -> Self {
-        Self {
-            made_of: Some(of),
-            ..Self::new(Path::new(of), text)
         }
     }
 
