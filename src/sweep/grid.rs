@@ -65,9 +65,9 @@ impl Sweep {
     }
 
     /// Keys of all axes.
-    pub fn swept(&self) -> impl Iterator<Item = String> {
+    pub fn swept(&self) -> impl Iterator<Item = &'static str> {
         let quantities = self.axes.iter().flat_map(Axis::quantities);
-        quantities.map(|quantity| quantity.key().to_owned())
+        quantities.map(Quantity::key)
     }
 
     /// Number of points of the grid, before the conditions drop some.
