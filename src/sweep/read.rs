@@ -75,7 +75,8 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
     let axes = read_section(&file, "[axes]", |axes| read_axes::read(axes, &mut places));
     let recording = read_section(&file, "[record]", read_recording);
     let solver = read_section(&file, "[solver]", read_solver);
-    let (base, period) = model.unwrap_or_default();
+    let (base, period) = model.ok().flatten().unwrap_or_default();
+    let axes = axes.map(|axes| axes.into_iter().flatten());
     let mut axes = axes.map(|axes| period.into_iter().chain(axes).collect::<Vec<Axis>>());
     let rounds = read_rounds(&file, &mut axes, &mut places);
     let title = rounds_title(&file).filter(|_| is_new);
@@ -83,8 +84,8 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         .entry("where")
         .map_or(Ok(Vec::new()), |entry| read_conditions(&entry, title));
     source.passed()?;
-    let recording = recording?;
-    let solver = solver?;
+    let recording = recording?.unwrap_or_default();
+    let solver = solver?.unwrap_or_default();
     let mut sweep = Sweep {
         name: name?,
         text: source.text.to_owned(),
@@ -124,7 +125,7 @@ fn read_rounds(
         let problem = "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
         return Err(file.source.refuse(precision.at, problem));
     }
-    optional_section(file, title, |section| {
+    read_section(file, title, |section| {
         let goal = if title == "[refine]" {
             read_refinement(section, file, axes).map(Goal::Edges)
         } else {
@@ -134,20 +135,12 @@ fn read_rounds(
     })
 }
 
-/// Reads a table of the file, or takes the default if there is none.
-fn read_section<'a, T: Default>(
-    file: &Section<'a>,
-    title: &'static str,
-    read: impl FnOnce(&Section<'a>) -> Result<T, Refused>,
-) -> Result<T, Refused> {
-    Ok(optional_section(file, title, read)?.unwrap_or_default())
-}
-
 fn key_of(title: &str) -> &str {
     title.trim_matches(['[', ']'])
 }
 
-fn optional_section<'a, T>(
+/// Reads a table of the file, if it is there.
+fn read_section<'a, T>(
     file: &Section<'a>,
     title: &'static str,
     read: impl FnOnce(&Section<'a>) -> Result<T, Refused>,
