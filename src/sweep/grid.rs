@@ -12,8 +12,9 @@ use super::job::{Identity, Job, settings, solver_settings};
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
 use crate::model::theory::to_twelve_digits;
-use crate::model::{Parameters, Symbol, Value};
+use crate::model::{Parameters, Selection, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
+use crate::sets::AllButSeed;
 use crate::solver::Solver;
 use std::ops::Range;
 
@@ -155,11 +156,11 @@ impl Sweep {
     }
 
     pub fn job_id(&self, parameters: &Parameters) -> String {
-        self.identity.job(parameters)
+        self.identity.id(parameters, &Symbol::ALL)
     }
 
     pub fn set_id(&self, parameters: &Parameters) -> String {
-        self.identity.set(parameters)
+        self.identity.id(parameters, AllButSeed::SYMBOLS)
     }
 
     /// This sweep with the ids that a program of other versions gave.
