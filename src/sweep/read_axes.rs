@@ -12,7 +12,6 @@ const RANGE_FORMS: &str =
 const AXIS_FORMS: &str = "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
 const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in a sample";
 
-type Keys = [&'static str];
 type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
 
 pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec<Axis>, Refused> {
@@ -40,7 +39,7 @@ fn tables<'a>(entry: &Entry<'a>, title: &'static str) -> Result<Vec<Section<'a>>
 pub(super) fn known(
     entry: &Entry<'_>,
     title: &'static str,
-    also: &Keys,
+    also: &[&'static str],
     places: &mut Places<'_>,
 ) -> Result<Quantity, Refused> {
     let quantity = Quantity::from_key(entry.key).ok_or_else(|| {
