@@ -141,7 +141,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
         rows = sets(results, usize::MAX)?;
     }
     let columns = if arguments.columns.is_empty() {
-        usual_columns(usual, &rows)
+        usual_columns(&usual, &rows)
     } else {
         chosen_columns(results, usual, &arguments.columns, &rows)?
     };
@@ -166,7 +166,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let results = &*renew(results)?;
     let rows = sets(results, MAX_READ)?;
-    let columns = usual_columns(usual_names(&rows), &rows);
+    let columns = usual_columns(&usual_names(&rows), &rows);
     // A line that says how many more there are is as long as one of these.
     let first = if count <= FIRST as u64 + 1 {
         FIRST + 1
@@ -205,8 +205,8 @@ fn columns_of<'a>(names: impl IntoIterator<Item = &'a str>, rows: &[SetRow]) -> 
 }
 
 /// Parameters of these names, and what was found of sets.
-fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
-    let mut columns = columns_of([&names, FOUND].concat(), rows);
+fn usual_columns(names: &[&str], rows: &[SetRow]) -> Vec<Values> {
+    let mut columns = columns_of([names, FOUND].concat(), rows);
     columns.retain(|values| values.numbers.iter().any(Option::is_some));
     columns
 }
