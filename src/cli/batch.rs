@@ -1,6 +1,4 @@
 //! `stickslip batch`: a script that submits a sweep to a batch system. It submits nothing itself.
-//!
-//! The script starts the same command many times; the workers share the missing jobs. Logs lie in `run/batch/`.
 
 use super::output::{self, quoted};
 use super::sweep::{self, PresetFlag};

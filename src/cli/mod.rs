@@ -86,7 +86,9 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Ok(cli) => cli.command,
         Err(error) => with_way_out(error).exit(),
     };
-    let ended = outlive_limit_of_files().and_then(|()| match command {
+    // So the write of a file that passes the limit on its size fails, where the signal would end the program.
+    let caught = register(SIGXFSZ, &FILE_TOO_LARGE).context("cannot catch signals");
+    let ended = caught.and_then(|_| match command {
         Command::Init(arguments) => init::init(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
         Command::Run(arguments) => run::run(&arguments),
@@ -228,12 +230,6 @@ pub fn catch_signals() -> Result<&'static AtomicBool> {
         register_all().context("cannot catch signals")?;
     }
     Ok(&STOP)
-}
-
-/// Lets the write of a file that passes the limit on its size fail, where a signal would end the program.
-fn outlive_limit_of_files() -> Result<()> {
-    register(SIGXFSZ, &FILE_TOO_LARGE).context("cannot catch signals")?;
-    Ok(())
 }
 
 /// Whether a signal came that cancels, alone or with others.

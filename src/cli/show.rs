@@ -2,13 +2,13 @@
 
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
-use crate::model::Symbol;
+use crate::model::{Selection, Symbol};
 use crate::reduce::{
     Condition, EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing,
     means_of_slips, read_reduced, read_sets, renew,
 };
 use crate::results::Results;
-use crate::sets::{Digits, FOUND, label, with_decimals};
+use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, with_decimals};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Row as _};
@@ -141,7 +141,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
         rows = sets(results, usize::MAX)?;
     }
     let columns = if arguments.columns.is_empty() {
-        usual_columns(usual, &rows)
+        usual_columns(&usual, &rows)
     } else {
         chosen_columns(results, usual, &arguments.columns, &rows)?
     };
@@ -166,7 +166,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let results = &*renew(results)?;
     let rows = sets(results, MAX_READ)?;
-    let columns = usual_columns(usual_names(&rows), &rows);
+    let columns = usual_columns(&usual_names(&rows), &rows);
     // A line that says how many more there are is as long as one of these.
     let first = if count <= FIRST as u64 + 1 {
         FIRST + 1
@@ -190,31 +190,25 @@ fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
     Ok(sets.collect::<Result<_, _>>()?)
 }
 
-/// The column that shows a parameter: of the period, the frequency.
-const fn key_of(symbol: Symbol) -> &'static str {
-    if matches!(symbol, Symbol::T) {
-        FREQUENCY
-    } else {
-        symbol.key()
-    }
-}
-
 /// The parameters in which sets differ.
 fn usual_names(rows: &[SetRow]) -> Vec<&'static str> {
-    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(key_of).collect();
+    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(column_of).collect();
     names.extend(names.contains(&FREQUENCY).then_some("eta"));
     names
 }
 
-/// Parameters of these names, and what was found of sets.
-fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
-    let columns = names
-        .into_iter()
-        .chain(FOUND.iter().copied())
-        .filter_map(|name| Values::of(rows, name).ok());
-    columns
-        .filter(|values| values.numbers.iter().any(Option::is_some))
+fn columns_of<'a>(names: impl IntoIterator<Item = &'a str>, rows: &[SetRow]) -> Vec<Values> {
+    let names = names.into_iter();
+    names
+        .filter_map(|name| Values::of(rows, name).ok())
         .collect()
+}
+
+/// Parameters of these names, and what was found of sets.
+fn usual_columns(names: &[&str], rows: &[SetRow]) -> Vec<Values> {
+    let mut columns = columns_of([names, FOUND].concat(), rows);
+    columns.retain(|values| values.numbers.iter().any(Option::is_some));
+    columns
 }
 
 /// The parameters of these names, and columns by name, heading or formula, each once; of slips, their means.
@@ -232,11 +226,8 @@ fn chosen_columns(
                 .ok_or_else(|| UsageError(format!("--columns {name}: {problem}")))?,
         });
     }
-    let is_left_out = |name: &&str| columns.iter().all(|values| values.name() != *name);
-    let parameters = parameters.into_iter().filter(is_left_out);
-    let mut all: Vec<Values> = parameters
-        .filter_map(|name| Values::of(rows, name).ok())
-        .collect();
+    let mut all = columns_of(parameters, rows);
+    all.retain(|values| columns.iter().all(|chosen| chosen.name() != values.name()));
     all.append(&mut columns);
     Ok(all)
 }
@@ -341,11 +332,8 @@ fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
 /// Whether a set differs from those of an edge in nothing but the refined axis.
 fn is_on_line(row: &SetRow, edge: &EdgeRow) -> bool {
     let axis = Symbol::from_key(&edge.axis).unwrap_or(Symbol::T);
-    let parameters = &row.parameters.parameters;
-    let mut others = Symbol::ALL
-        .into_iter()
-        .filter(|symbol| ![axis, Symbol::Seed].contains(symbol));
-    others.all(|symbol| parameters.get(symbol) == edge.parameters.get(symbol))
+    let mut others = AllButSeed::SYMBOLS.iter().filter(|symbol| **symbol != axis);
+    others.all(|&symbol| row.parameters.get(symbol) == edge.parameters.get(symbol))
 }
 
 /// On which side of the threshold all sets lie, where nothing crosses it.
@@ -375,12 +363,10 @@ fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
         ..SetRow::default()
     };
     let rows: Vec<SetRow> = edges.iter().map(as_set).collect();
-    for symbol in differing(&rows.iter()) {
-        if symbol != axis
-            && let Ok(values) = Values::of(&rows, key_of(symbol))
-        {
-            add_column(&mut columns, &values, &rows, rows.len());
-        }
+    let mut parameters = differing(&rows.iter());
+    parameters.retain(|symbol| *symbol != axis);
+    for values in columns_of(parameters.into_iter().map(column_of), &rows) {
+        add_column(&mut columns, &values, &rows, rows.len());
     }
     let label = label(&first.axis);
     let brackets = edges.iter().map(|edge| edge.bracket_high);
@@ -479,7 +465,7 @@ fn jobs_of_sets(rows: &[SetRow], jobs: impl Fn(&SetRow) -> u64) -> Option<String
 fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let jobs = jobs_of_sets(rows, |row| row.jobs_without_slips)?;
     let without = rows.iter().filter(|row| row.jobs_without_slips > 0);
-    let mut places = without.filter_map(|row| sweep.set_with(&row.parameters.parameters));
+    let mut places = without.filter_map(|row| sweep.set_with(&row.parameters));
     let job = places
         .next()
         .and_then(|set| sweep.jobs_at(set..set + 1).next());
@@ -504,8 +490,7 @@ fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
 
 fn note_on_few_cycles(rows: &[SetRow]) -> Option<String> {
     let has_few_cycles = |row: &&SetRow| {
-        let period = row.parameters.parameters.modulation_period;
-        let times = period.zip(row.tau_mean);
+        let times = row.parameters.modulation_period.zip(row.tau_mean);
         row.phase_mean.is_none() && times.is_some_and(|(period, tau)| period >= tau)
     };
     let sets = rows.iter().filter(has_few_cycles).count() as u64;
@@ -565,18 +550,13 @@ fn note_on_model(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
 }
 
 fn note_on_removed_sets(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
-    let is_gone = |set: &usize| {
-        let parameters = &rows[*set].parameters.parameters;
-        sweep.set_with(parameters).is_none()
-    };
+    let is_gone = |set: &usize| sweep.set_with(&rows[*set].parameters).is_none();
     let gone: Vec<usize> = (0..rows.len()).filter(is_gone).collect();
     if gone.is_empty() {
         return None;
     }
-    let columns: Vec<Values> = differing(&rows.iter())
-        .into_iter()
-        .filter_map(|symbol| Values::of(rows, key_of(symbol)).ok())
-        .collect();
+    let parameters = differing(&rows.iter()).into_iter();
+    let columns = columns_of(parameters.map(column_of), rows);
     let setting = |&set: &usize| {
         let settings = columns
             .iter()

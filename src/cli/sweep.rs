@@ -78,14 +78,11 @@ pub fn preset_parser() -> impl TypedValueParser<Value = Preset> {
 impl Preset {
     /// The preset of a name that [`preset_parser`] knows.
     pub fn named(name: &str) -> Result<Self, String> {
-        if let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) {
-            return Ok(*preset);
+        if let Some((_, now)) = FORMER.iter().find(|(former, _)| *former == name) {
+            return Err(format!("it is now `{now}`"));
         }
-        let former = FORMER.iter().find(|(former, _)| *former == name);
-        Err(match former {
-            Some((_, now)) => format!("it is now `{now}`"),
-            None => "there is no such preset".to_owned(),
-        })
+        let preset = PRESETS.into_iter().find(|preset| preset.name == name);
+        preset.ok_or_else(|| "there is no such preset".to_owned())
     }
 
     /// The first line of the file.

@@ -12,7 +12,7 @@ use super::values::Values;
 use crate::model::{Parameters, Symbol};
 use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
-use crate::sets::{FREQUENCY, SetRow};
+use crate::sets::{SetRow, column_of};
 use crate::table::columns::{Interval, Kind};
 use std::collections::{BTreeMap, HashMap};
 
@@ -161,11 +161,7 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
         .iter()
         .map(|pair| found_in_a[&pair.a.set_id].row.clone());
     let rows: Vec<SetRow> = rows.collect();
-    let column = |symbol: &Symbol| match symbol {
-        Symbol::T => FREQUENCY,
-        symbol => symbol.key(),
-    };
-    let parameters = keys.iter().map(column);
+    let parameters = keys.into_iter().map(column_of);
     let parameters = parameters.filter_map(|name| Values::of(&rows, name).ok());
     Ok(parameters.chain(found).collect())
 }

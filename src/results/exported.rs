@@ -138,13 +138,12 @@ impl Results<'_> {
     fn exported_columns(&self, table: &str) -> Vec<FieldRef> {
         let own = recorded_schema(table, self.sweep().recording());
         let extensions = self.extensions().iter();
-        let swept: HashSet<String> = extensions
-            .flat_map(|extension| extension.sweep.swept())
-            .collect();
+        let swept = extensions.flat_map(|extension| extension.sweep.swept());
+        let swept: HashSet<&str> = swept.collect();
         let mut columns = JoinedTable::columns(self, table);
         columns.retain(|field| {
             let name = field.name();
-            name == CONTROL || swept.contains(name) || own.field_with_name(name).is_ok()
+            name == CONTROL || swept.contains(&**name) || own.field_with_name(name).is_ok()
         });
         columns
     }

@@ -329,7 +329,7 @@ impl Results<'_> {
         }
         if !again.is_empty() && part.name.extension + 1 < self.extensions().len() {
             let jobs = self.plan().part(part).jobs;
-            again.retain(|&position, _| self.sweep().contains(&jobs[position].parameters));
+            again.retain(|&position, _| self.sweep().find(&jobs[position].parameters).is_some());
         }
         Ok(again)
     }

@@ -7,22 +7,13 @@
 //! Contract: a round is a pure function of the sweep and of the committed rows of the jobs that its earlier rounds
 //! chose: the same for any threads, workers, kills and order, and for a directory that has had other sweeps.
 //!
-//! With `[precision]`, a set gets seeds until every statistic is known to the target, or the set has the most. The
-//! half-width h of an interval of n seeds falls as 1/√n, so n (h/target)² seeds are predicted to do. A set gets these,
-//! but a quarter more than it has at least, since the prediction is as uncertain as h, and at most twice as many, so
-//! that a poor one costs little.
+//! `docs/rounds.md` has the rules. A prediction of seeds is as uncertain as the half-width that it comes from, so a set
+//! gets a quarter more at least, and at most twice as many, so that a poor one costs little. All edges share the jobs.
 //!
-//! With `[refine]`, an edge gets a set between its neighbours, until these are close; then seeds of the sets near it,
-//! equally many, until its interval is as narrow as is wanted, by the same rule. All edges share the jobs.
-//!
-//! Looking again and again until an interval is short prefers those that are short by chance, and their sets hold the
-//! true value less often than 95 of 100 times: the more so, the fewer seeds it is when a set may end, and the more
-//! skewed its values are. No set ends with fewer than [`MIN_SEEDS`] seeds. What that does to coverage is measured in
-//! `docs/rounds.md`.
+//! Looking again and again until an interval is short prefers those that are short by chance: the more so, the fewer
+//! seeds it is when a set may end, and the more skewed its values are. So no set ends with fewer than [`MIN_SEEDS`].
 
-use crate::reduce::{
-    Line, SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges,
-};
+use crate::reduce::{SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges};
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Goal, MIN_SEEDS, Precision, Refinement, Round, Standing, Sweep};
 use crate::table::value::floored;
@@ -106,11 +97,8 @@ fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEd
     let mut room = refinement.max_jobs.saturating_sub(jobs);
     let mut wanted = BTreeMap::new();
     let mut standing = Standing::default();
-    for line in lines(sweep, refinement, sets) {
-        let Line {
-            mut rows, edges, ..
-        } = line;
-        for edge in edges.iter().filter(|edge| !edge.is_done()) {
+    for mut line in lines(sweep, refinement, sets) {
+        for edge in line.edges.iter().filter(|edge| !edge.is_done()) {
             let [fewest, most] = edge.seeds();
             let seeds = match edge.wanted_row {
                 Some(_) => from,
@@ -122,8 +110,8 @@ fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEd
                 None => edge.sets.iter().map(|set| set.row).collect(),
             };
             let set = |row: u64| {
-                rows[refinement.axis] = row;
-                sweep.set_at(&rows).filter(|&set| had(set) < seeds)
+                line.rows[refinement.axis] = row;
+                sweep.set_at(&line.rows).filter(|&set| had(set) < seeds)
             };
             let new: Vec<u64> = at.into_iter().filter_map(set).collect();
             let more = |set: &u64| {

@@ -101,7 +101,7 @@ fn found(sweep: &Sweep, sets: &BTreeMap<u64, SetOfEdges>) -> Vec<Vec<([f64; 3], 
     let lines = lines(sweep, sweep.refinement().unwrap(), sets);
     lines
         .iter()
-        .map(|Line { edges, .. }| edges.iter().map(of_edge).collect())
+        .map(|line| line.edges.iter().map(of_edge).collect())
         .collect()
 }
 

@@ -92,7 +92,7 @@ fn jobs_kept(pending: &Pending<'_>) -> u64 {
         |part: &&Outline| part.name.extension < last && pending.done.contains(&part.name);
     let parts = pending.parts.iter().filter(is_earlier);
     let jobs = parts.flat_map(|part| pending.part(part).jobs);
-    let kept = jobs.filter(|job| !pending.results.sweep().contains(&job.parameters));
+    let kept = jobs.filter(|job| pending.results.sweep().find(&job.parameters).is_none());
     kept.count() as u64
 }
 

@@ -15,6 +15,14 @@ use std::sync::LazyLock;
 /// The column of 1/T, as which a swept period is shown.
 pub const FREQUENCY: &str = "frequency";
 
+/// The column that shows a parameter: of the period, the frequency.
+pub const fn column_of(symbol: Symbol) -> &'static str {
+    match symbol {
+        Symbol::T => FREQUENCY,
+        symbol => symbol.key(),
+    }
+}
+
 /// What tables show of a set, where there is anything.
 pub const FOUND: &[&str] = &[
     "regime",

@@ -10,7 +10,7 @@ use super::quantity::{Point, Quantity};
 use super::rounds::{Bounds, Goal, Refinement, Round, Rounds, Standing};
 use crate::model::Parameters;
 use std::collections::BTreeSet;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
 impl Sweep {
     /// How it runs in rounds; `None` for a sweep that runs its whole grid.
@@ -53,10 +53,7 @@ impl Sweep {
 
     /// Key and value of the first quantity of an axis at a row; NaN for a word.
     pub fn value_at(&self, axis: usize, row: u64) -> (&'static str, f64) {
-        let mut point = Point {
-            parameters: self.base.clone(),
-            fixes_period: None,
-        };
+        let mut point = Point::default();
         self.axes[axis].apply(row, &mut point);
         let quantity = self.axes[axis].quantities()[0];
         let period = point.fixes_period.map(|(_, value)| value);
@@ -88,14 +85,9 @@ impl Sweep {
     }
 
     /// The points of a set with these of its seeds.
-    pub fn points_of_set(
-        &self,
-        set: u64,
-        seeds: Range<u64>,
-    ) -> impl Iterator<Item = RangeInclusive<u64>> + use<> {
+    pub fn points_of_set(&self, set: u64, seeds: Range<u64>) -> impl Iterator<Item = u64> + use<> {
         let stride = self.seed_stride();
-        let points = seeds.map(move |seed| set + seed * stride);
-        points.map(|point| point..=point)
+        seeds.map(move |seed| set + seed * stride)
     }
 
     /// The sets of the first round, in order: all combinations of the rows that the sweep file has.

@@ -203,9 +203,9 @@ impl Table {
 impl Column {
     /// Orders the rows as [`Column::compare`] does: a larger η or frequency is a shorter period.
     fn rank(&self, row: u32) -> Value {
-        match self.values[row as usize] {
-            Value::Real(real) if self.is_inverse_period() => Value::Real(-real),
-            value => value,
+        match (self.quantity, self.values[row as usize]) {
+            (Quantity::Eta | Quantity::Frequency, Value::Real(real)) => Value::Real(-real),
+            (_, value) => value,
         }
     }
 
@@ -225,10 +225,6 @@ impl Column {
 
     fn is_seed(&self) -> bool {
         self.quantity == Quantity::SEED
-    }
-
-    fn is_inverse_period(&self) -> bool {
-        matches!(self.quantity, Quantity::Eta | Quantity::Frequency)
     }
 }
 

@@ -81,18 +81,16 @@ impl Sweep {
     }
 
     /// These points of the grid, and the controls of their jobs.
-    pub fn with_controls(&self, points: Vec<RangeInclusive<u64>>) -> Vec<RangeInclusive<u64>> {
-        if self.controls.is_none() {
-            return merged(points);
+    pub fn with_controls(&self, mut points: Vec<u64>) -> Vec<RangeInclusive<u64>> {
+        if self.controls.is_some() {
+            let control = |&point: &u64| {
+                let job = self.point(&self.rows(point)).canonical().parameters;
+                self.find(&job.without_modulation())
+            };
+            let controls: Vec<u64> = points.iter().filter_map(control).collect();
+            points.extend(controls);
         }
-        let control = |point| {
-            let job = self.point(&self.rows(point)).canonical().parameters;
-            self.find(&job.without_modulation())
-        };
-        let jobs = points.iter().cloned().flatten();
-        let controls: Vec<u64> = jobs.filter_map(control).collect();
-        let controls = controls.into_iter().map(|point| point..=point);
-        merged(points.into_iter().chain(controls).collect())
+        merged(points.into_iter().map(|point| point..=point).collect())
     }
 }
 
@@ -147,7 +145,7 @@ mod tests {
                     && job.parameters.clone().validated().is_ok()
             );
             assert_eq!(sweep.find(&job.parameters), Some(job.point));
-            assert!(plan.is_control(&job.parameters) && sweep.contains(&job.parameters));
+            assert!(plan.is_control(&job.parameters) && sweep.find(&job.parameters).is_some());
         }
         let first = sweep.jobs().next().unwrap().parameters;
         let own = sweep

@@ -12,8 +12,9 @@ use super::job::{Identity, Job, settings, solver_settings};
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
 use crate::model::theory::to_twelve_digits;
-use crate::model::{Parameters, Symbol, Value};
+use crate::model::{Parameters, Selection, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
+use crate::sets::AllButSeed;
 use crate::solver::Solver;
 use std::ops::Range;
 
@@ -65,9 +66,9 @@ impl Sweep {
     }
 
     /// Keys of all axes.
-    pub fn swept(&self) -> impl Iterator<Item = String> {
+    pub fn swept(&self) -> impl Iterator<Item = &'static str> {
         let quantities = self.axes.iter().flat_map(Axis::quantities);
-        quantities.map(|quantity| quantity.key().to_owned())
+        quantities.map(Quantity::key)
     }
 
     /// Number of points of the grid, before the conditions drop some.
@@ -109,12 +110,8 @@ impl Sweep {
         })
     }
 
-    /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
-    pub fn contains(&self, parameters: &Parameters) -> bool {
-        self.find(parameters).is_some()
-    }
-
-    /// Number of the point that is the job with these canonical parameters.
+    /// Number of the point that is the job with these canonical parameters: exact bits, without walking through the
+    /// points.
     pub fn find(&self, parameters: &Parameters) -> Option<u64> {
         let control =
             || Some(self.point_count() + self.controls.as_ref()?.find_in_grid(parameters)?);
@@ -159,11 +156,11 @@ impl Sweep {
     }
 
     pub fn job_id(&self, parameters: &Parameters) -> String {
-        self.identity.job(parameters)
+        self.identity.id(parameters, &Symbol::ALL)
     }
 
     pub fn set_id(&self, parameters: &Parameters) -> String {
-        self.identity.set(parameters)
+        self.identity.id(parameters, AllButSeed::SYMBOLS)
     }
 
     /// This sweep with the ids that a program of other versions gave.

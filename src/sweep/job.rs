@@ -4,9 +4,8 @@
 //! recording and parameters that is not at its default, parameters with their exact bits: never over the place in a
 //! grid. So keys that are added later change no id. Contract: pinned by known-answer tests, and so are the defaults.
 
-use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Selection, Symbol, Value};
+use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
-use crate::sets::AllButSeed;
 use crate::solver::{Solver, SolverKey};
 use crate::table::checksum::hexadecimal;
 use sha2::{Digest, Sha256};
@@ -84,16 +83,8 @@ impl Identity {
         Self { shared }
     }
 
-    /// The id of a job with these canonical parameters.
-    pub fn job(&self, parameters: &Parameters) -> String {
-        self.hash(parameters, &Symbol::ALL)
-    }
-
-    pub fn set(&self, parameters: &Parameters) -> String {
-        self.hash(parameters, AllButSeed::SYMBOLS)
-    }
-
-    fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> String {
+    /// The id of a job, or of a set, by these of its canonical parameters.
+    pub fn id(&self, parameters: &Parameters, symbols: &[Symbol]) -> String {
         let mut hasher = self.shared.clone();
         let defaults = Parameters::default();
         for &symbol in symbols {
@@ -116,7 +107,8 @@ impl Identity {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::BreakOn;
+    use crate::model::{BreakOn, Selection};
+    use crate::sets::AllButSeed;
     use std::collections::HashSet;
 
     fn identity() -> Identity {
@@ -135,15 +127,15 @@ mod tests {
         };
         let default = Identity::new(Solver::default(), &Recording::default());
         assert_eq!(
-            default.job(&Parameters::default()),
+            default.id(&Parameters::default(), &Symbol::ALL),
             "e9a963559e0ee48b531cae83da795678"
         );
         assert_eq!(
-            identity().job(&modulated),
+            identity().id(&modulated, &Symbol::ALL),
             "7a8ff4203e733126a2b4e1fc1ddbfce1"
         );
         assert_eq!(
-            identity().set(&modulated),
+            identity().id(&modulated, AllButSeed::SYMBOLS),
             "e041bd24ab83b579af7fbcd11ab10411"
         );
     }
@@ -181,7 +173,7 @@ mod tests {
             ramp_time: 1.0,
             ..Parameters::default()
         };
-        let mut jobs = HashSet::from([identity().job(&ramped)]);
+        let mut jobs = HashSet::from([identity().id(&ramped, &Symbol::ALL)]);
         for symbol in Symbol::ALL {
             let mut other = ramped.clone();
             let value = match other.get(symbol) {
@@ -191,8 +183,12 @@ mod tests {
                 Value::Flag(_) | Value::Null => panic!("all are there, none is a flag"),
             };
             other.set(symbol, value).unwrap();
-            assert!(jobs.insert(identity().job(&other)), "{symbol:?}");
-            let same_set = identity().set(&other) == identity().set(&ramped);
+            assert!(
+                jobs.insert(identity().id(&other, &Symbol::ALL)),
+                "{symbol:?}"
+            );
+            let same_set = identity().id(&other, AllButSeed::SYMBOLS)
+                == identity().id(&ramped, AllButSeed::SYMBOLS);
             assert_eq!(same_set, symbol == Symbol::Seed, "{symbol:?}");
         }
     }
@@ -207,7 +203,8 @@ mod tests {
             ..Recording::default()
         };
         let solver = Solver::fixed_step(1e-6);
-        let id = |recording| Identity::new(solver, recording).job(&Parameters::default());
+        let id =
+            |recording| Identity::new(solver, recording).id(&Parameters::default(), &Symbol::ALL);
         assert_eq!(id(&bounded), id(&Recording::default()));
         for key in RecordingKey::ALL.into_iter().filter(|key| {
             !matches!(
@@ -230,7 +227,7 @@ mod tests {
         for time_step in [1e-6, 1e-6_f64.next_up()] {
             for recording in &recordings {
                 let identity = Identity::new(Solver::fixed_step(time_step), recording);
-                assert!(ids.insert(identity.job(&Parameters::default())));
+                assert!(ids.insert(identity.id(&Parameters::default(), &Symbol::ALL)));
             }
         }
     }

@@ -246,19 +246,18 @@ impl<'a> Plan<'a> {
 
     /// Walks through the plan and sums it up.
     pub fn totals(self) -> Totals {
-        self.parts().fold(Totals::default(), |totals, part| {
+        let mut totals = Totals::default();
+        for part in self.parts() {
             let recording = self.extensions[part.name.extension].sweep.recording();
             let slips = |job: &Job| recording.expected_slips(typical_interval(&job.parameters));
             let slips: f64 = part.jobs.iter().map(slips).sum();
-            let memory_of_slips = MEMORY_OF_A_SLIP * slips;
-            Totals {
-                jobs: totals.jobs + part.job_count as u64,
-                parts: totals.parts + 1,
-                slips: totals.slips + slips,
-                cost: totals.cost + part.cost,
-                memory: totals.memory.max(part.memory),
-                memory_of_slips: totals.memory_of_slips.max(memory_of_slips),
-            }
-        })
+            totals.jobs += part.job_count as u64;
+            totals.parts += 1;
+            totals.slips += slips;
+            totals.cost += part.cost;
+            totals.memory = totals.memory.max(part.memory);
+            totals.memory_of_slips = totals.memory_of_slips.max(MEMORY_OF_A_SLIP * slips);
+        }
+        totals
     }
 }

@@ -15,6 +15,7 @@ use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{Goal, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
+use super::variation::SECTIONS;
 use crate::model::{Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Solver, SolverKey};
@@ -44,7 +45,8 @@ impl Sweep {
 
     /// The same with a text that was made of something, such as flags.
     pub fn parse_made(text: &str, of: &str) -> Result<Self, SweepError> {
-        let source = Source::made(of, text);
+        let mut source = Source::new(Path::new(of), text);
+        source.made_of = Some(of);
         read(&source, true, PLAN_VERSION).map_err(|_| source.error())
     }
 
@@ -56,17 +58,6 @@ impl Sweep {
     }
 }
 
-const SECTIONS: [&str; 8] = [
-    "name",
-    "where",
-    "model",
-    "axes",
-    "record",
-    "solver",
-    "precision",
-    "refine",
-];
-
 /// Reads the whole file, also past mistakes.
 fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, Refused> {
     let table = source.table()?;
@@ -76,14 +67,16 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         at: 0,
         table: &table,
     };
-    file.only(&SECTIONS).ok();
+    file.only(&[&["name", "where"], &SECTIONS[..]].concat())
+        .ok();
     let mut places = Places::new(source);
     let name = read_name(&file);
     let model = read_section(&file, "[model]", |model| read_model(model, &mut places));
     let axes = read_section(&file, "[axes]", |axes| read_axes::read(axes, &mut places));
     let recording = read_section(&file, "[record]", read_recording);
     let solver = read_section(&file, "[solver]", read_solver);
-    let (base, period) = model.unwrap_or_default();
+    let (base, period) = model.ok().flatten().unwrap_or_default();
+    let axes = axes.map(|axes| axes.into_iter().flatten());
     let mut axes = axes.map(|axes| period.into_iter().chain(axes).collect::<Vec<Axis>>());
     let rounds = read_rounds(&file, &mut axes, &mut places);
     let title = rounds_title(&file).filter(|_| is_new);
@@ -91,8 +84,8 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         .entry("where")
         .map_or(Ok(Vec::new()), |entry| read_conditions(&entry, title));
     source.passed()?;
-    let recording = recording?;
-    let solver = solver?;
+    let recording = recording?.unwrap_or_default();
+    let solver = solver?.unwrap_or_default();
     let mut sweep = Sweep {
         name: name?,
         text: source.text.to_owned(),
@@ -132,7 +125,7 @@ fn read_rounds(
         let problem = "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
         return Err(file.source.refuse(precision.at, problem));
     }
-    optional_section(file, title, |section| {
+    read_section(file, title, |section| {
         let goal = if title == "[refine]" {
             read_refinement(section, file, axes).map(Goal::Edges)
         } else {
@@ -142,20 +135,12 @@ fn read_rounds(
     })
 }
 
-/// Reads a table of the file, or takes the default if there is none.
-fn read_section<'a, T: Default>(
-    file: &Section<'a>,
-    title: &'static str,
-    read: impl FnOnce(&Section<'a>) -> Result<T, Refused>,
-) -> Result<T, Refused> {
-    Ok(optional_section(file, title, read)?.unwrap_or_default())
-}
-
 fn key_of(title: &str) -> &str {
     title.trim_matches(['[', ']'])
 }
 
-fn optional_section<'a, T>(
+/// Reads a table of the file, if it is there.
+fn read_section<'a, T>(
     file: &Section<'a>,
     title: &'static str,
     read: impl FnOnce(&Section<'a>) -> Result<T, Refused>,
@@ -196,12 +181,9 @@ fn read_model(
     model: &Section<'_>,
     places: &mut Places<'_>,
 ) -> Result<(Parameters, Option<Axis>), Refused> {
-    let keys: Vec<&str> = Quantity::all().map(Quantity::key).collect();
     let mut given = Point::default();
     all(model.entries().iter().map(|entry| {
-        let quantity =
-            Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
-        places.set(quantity, entry.at, model.title);
+        let quantity = read_axes::known(entry, model.title, &[], places)?;
         given.set(quantity, read_axes::read_value(entry, quantity)?);
         Ok(())
     }))?;

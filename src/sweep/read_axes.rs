@@ -1,16 +1,5 @@
-//! The `[axes]` of a sweep file: lists, ranges, counts, zips and samples become axes.
-//!
-//! ```text
-//! V0    = [1e-5, 1e-4]                          a list
-//! Delta = { linear = [3e-7, 1e-6], points = 8 } ends included; log = [..] likewise
-//! seed  = { count = 4 }                         0, 1, 2, 3; with first = 100: 100, 101, 102, 103
-//! [[axes.zip]]                                  columns of equal length that move together
-//! [axes.sobol]                                  points, seed and a range for each quantity
-//! ```
-//!
-//! Axes stand in the order of the file; the last moves fastest. Values of a range are rounded to twelve digits, those
-//! of a whole-number quantity to whole numbers. An axis reports its first mistake, a zip or a sample that of each
-//! column.
+//! The `[axes]` of a sweep file: lists, ranges, counts, zips and samples become axes. `docs/sweeps.md` has their forms.
+//! An axis reports its first mistake, a zip or a sample that of each column.
 
 use super::axes::{Axis, Column, MAX_ROWS, MAX_SAMPLE, Range, Repeated, sobol};
 use super::checks::Places;
@@ -23,7 +12,6 @@ const RANGE_FORMS: &str =
 const AXIS_FORMS: &str = "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
 const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in a sample";
 
-type Keys = [&'static str];
 type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
 
 pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec<Axis>, Refused> {
@@ -48,10 +36,10 @@ fn tables<'a>(entry: &Entry<'a>, title: &'static str) -> Result<Vec<Section<'a>>
 }
 
 /// The quantity that an entry sets.
-fn known(
+pub(super) fn known(
     entry: &Entry<'_>,
     title: &'static str,
-    also: &Keys,
+    also: &[&'static str],
     places: &mut Places<'_>,
 ) -> Result<Quantity, Refused> {
     let quantity = Quantity::from_key(entry.key).ok_or_else(|| {
@@ -68,25 +56,24 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refus
     if let (Some(values), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
         return Ok(Axis::Counted { symbol, values });
     }
-    let values = read_values(entry, quantity)?;
     let column = Column {
         quantity,
-        values: values.iter().map(|&(value, _)| value).collect(),
+        values: read_values(entry, quantity)?,
     };
-    Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
-        let (value, at) = values[later];
-        let earlier = earlier + 1;
-        let later = later + 1;
+    Axis::table(vec![column.clone()]).map_err(|Repeated { earlier, later }| {
+        let at = entry.list().map_or(entry.at, |list| list[later].at);
         let problem = format!(
-            "{} = {value}: repeats value {earlier} of this axis as value {later}; keep one, or take fewer points",
-            entry.key
+            "{} = {}: repeats value {} of this axis as value {}; keep one, or take fewer points",
+            entry.key,
+            column.values[later],
+            earlier + 1,
+            later + 1
         );
         entry.source.refuse(at, problem)
     })
 }
 
-/// Reads the values of a quantity, each with the byte of the text that sets it.
-fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usize)>, Refused> {
+fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<Value>, Refused> {
     if let Some(list) = entry.list() {
         if list.is_empty() {
             return Err(entry.refuse("an axis needs at least one value"));
@@ -96,8 +83,8 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
                 "an axis has at most {MAX_ROWS} listed values; split it into two axes"
             )));
         }
-        let read = |value: &Entry<'_>| Ok((read_value(value, quantity)?, value.at));
-        return list.iter().map(read).collect();
+        let values = list.iter().map(|value| read_value(value, quantity));
+        return values.collect();
     }
     if let Some(values) = read_count(entry, quantity)? {
         if values.end - values.start > MAX_ROWS {
@@ -106,12 +93,11 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
                 "a zip has at most {MAX_ROWS} rows; make {key} a separate axis"
             )));
         }
-        let values = values.map(Value::Count);
-        return Ok(values.map(|value| (value, entry.at)).collect());
+        return Ok(values.map(Value::Count).collect());
     }
     let (range, points) = read_spaced(entry, quantity)?;
     let values = range.spaced(points).map(|value| ranged(quantity, value));
-    Ok(values.map(|value| (value, entry.at)).collect())
+    Ok(values.collect())
 }
 
 /// Reads a range of an axis, and the number of its values.
@@ -240,8 +226,7 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
     let entries = table.entries();
     let columns = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &[], places)?;
-        let values = read_values(entry, quantity)?.into_iter();
-        let values = values.map(|(value, _)| value).collect();
+        let values = read_values(entry, quantity)?;
         Ok(Column { quantity, values })
     }))?;
     let [first, _, ..] = columns.as_slice() else {

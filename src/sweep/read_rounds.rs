@@ -1,22 +1,7 @@
-//! The `[precision]` or the `[refine]` of a sweep file.
-//!
-//! ```text
-//! [precision]
-//! of       = "tau_mean"              a statistic with an interval, or a list of them
-//! relative = 0.01                    largest half-width of its 95 % interval; or absolute = .., in its unit
-//! seeds    = { from = 24, to = 256 } seeds of a set: at first, and at most; with first = 100 from 100 on
-//! [refine]
-//! axis      = "Delta"                a range of [axes]
-//! by        = "resultant_length"     a number, or a list of them; or "periods" with value = n
-//! threshold = 0.5                    what it crosses
-//! to        = 0.03                   largest width of the interval of an edge
-//! seeds     = { from = 24, to = 96 }
-//! jobs      = 4000                   at most
-//! ```
-//!
-//! The axis of `[refine]` becomes as fine as its `to`.
+//! The `[precision]` or the `[refine]` of a sweep file, see `docs/rounds.md`. The axis of `[refine]` becomes as
+//! fine as its `to`.
 
-use super::axes::{Axis, MAX_ROWS};
+use super::axes::{Axis, MAX_ROWS, Range};
 use super::checks::Places;
 use super::quantity::{Quantity, hint};
 use super::read_axes::{read_spaced, spaced};
@@ -134,7 +119,9 @@ fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refuse
             } else {
                 unit
             };
-            Ok(Target::Absolute(entry.positive(unit)?))
+            let allowed = format!("a finite number > 0, in {unit}");
+            let error = entry.number(&allowed, |error| error > 0.0)?;
+            Ok(Target::Absolute(error))
         }
     }
 }
@@ -154,17 +141,35 @@ pub(super) fn read_refinement(
     let by = section.required("by", need);
     let by = by.and_then(|entry| read_by(section, &entry));
     let need = "the largest width of the interval of an edge, such as to = 0.03";
-    let to_entry = section.required("to", need);
-    let to = to_entry.and_then(|entry| entry.number("a finite number > 0", |to| to > 0.0));
+    let to = section.required("to", need);
+    let width = to.and_then(|entry| entry.number("a finite number > 0", |width| width > 0.0));
     let jobs = section.required("jobs", "the most jobs of the sweep, such as jobs = 4000");
     let max_jobs = jobs.and_then(|entry| entry.count(1, MAX_JOBS));
     let wanted = Refinement {
-        to: to?,
+        to: width?,
         max_jobs: max_jobs?,
         ..by?
     };
     let axes = axes.as_mut().map_err(|refused| *refused)?;
-    refined(wanted, quantity?, axis?, to_entry?, file, axes)
+    let quantity = quantity?;
+    let place = axes.iter().position(|axis| axis.quantities() == [quantity]);
+    let listed = file.entry("axes").and_then(|axes| axes.section("[axes]"));
+    let entry = listed.and_then(|axes| axes.entry(quantity.key()));
+    let range = entry.filter(|entry| entry.list().is_none());
+    let Some((place, range)) = place.zip(range) else {
+        let problem = "has no range of its own in [axes], and only there are values in between; write it there as \
+                       { linear = [low, high], points = n }, or log";
+        return Err(axis?.refuse(problem));
+    };
+    let (range, points) = read_spaced(&range, quantity)?;
+    let (levels, finer) = finer(&range, points, quantity, wanted.to, &to?)?;
+    axes[place] = finer;
+    Ok(Refinement {
+        axis: place,
+        levels,
+        is_log: range.logarithmic,
+        ..wanted
+    })
 }
 
 fn read_refinable(entry: &Entry<'_>) -> Result<Quantity, Refused> {
@@ -216,25 +221,14 @@ fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<Refinement, Refus
 /// What rounding may add to a step of the file's axis that is halved several times.
 const ROUNDING: f64 = 1e-9;
 
-/// Finds the axis of a quantity among all, and puts one in its place that is as fine as is wanted.
-fn refined(
-    wanted: Refinement,
+/// How often each step of a range is halved until it is as short as is wanted, and the axis of these steps.
+fn finer(
+    range: &Range,
+    points: u64,
     quantity: Quantity,
-    named: Entry<'_>,
-    to: Entry<'_>,
-    file: &Section<'_>,
-    axes: &mut [Axis],
-) -> Result<Refinement, Refused> {
-    let axis = axes.iter().position(|axis| axis.quantities() == [quantity]);
-    let section = file.entry("axes").and_then(|axes| axes.section("[axes]"));
-    let entry = section.and_then(|axes| axes.entry(quantity.key()));
-    let range = entry.filter(|entry| entry.list().is_none());
-    let Some((axis, entry)) = axis.zip(range) else {
-        let problem = "has no range of its own in [axes], and only there are values in between; write it there as \
-                       { linear = [low, high], points = n }, or log";
-        return Err(named.refuse(problem));
-    };
-    let (range, points) = read_spaced(&entry, quantity)?;
+    wanted: f64,
+    to: &Entry<'_>,
+) -> Result<(u32, Axis), Refused> {
     // Of an axis with 2^level steps in place of each.
     let step = |level: u32| {
         let steps = (points - 1) as f64 * f64::from(level).exp2();
@@ -244,7 +238,7 @@ fn refined(
             (range.high - range.low) / steps
         }
     };
-    if wanted.to >= step(0) {
+    if wanted >= step(0) {
         let what = if range.logarithmic {
             "as a share of the value"
         } else {
@@ -252,23 +246,15 @@ fn refined(
         };
         return Err(to.must_be(&format!("finer than {}, {what}", Shortest(step(0)))));
     }
-    let levels = (1..u64::BITS).find(|&level| step(level) <= wanted.to * (1.0 + ROUNDING));
+    let levels = (1..u64::BITS).find(|&level| step(level) <= wanted * (1.0 + ROUNDING));
     let fine = levels.and_then(|levels| {
         let points = (points - 1).checked_mul(1 << levels)? + 1;
         let is_held = points <= MAX_ROWS;
-        let axis = is_held.then(|| spaced(&range, points, quantity))??;
+        let axis = is_held.then(|| spaced(range, points, quantity))??;
         Some((levels, axis))
     });
-    let Some((levels, fine)) = fine else {
-        return Err(to.refuse(format!(
-            "makes more than {MAX_ROWS} values of the axis; take a coarser one"
-        )));
-    };
-    axes[axis] = fine;
-    Ok(Refinement {
-        axis,
-        levels,
-        is_log: range.logarithmic,
-        ..wanted
+    fine.ok_or_else(|| {
+        let problem = format!("makes more than {MAX_ROWS} values of the axis; take a coarser one");
+        to.refuse(problem)
     })
 }

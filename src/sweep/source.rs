@@ -36,8 +36,8 @@ pub enum SweepError {
         mistakes: Vec<Mistake>,
     },
     /// Flags, or other things that a text was made of, do not say what to run.
-    #[error("{}", listed_without_lines(of, problems))]
-    Made { of: String, problems: Vec<String> },
+    #[error("{0}")]
+    Made(String),
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,11 +70,6 @@ fn listed(path: &Path, mistakes: &[Mistake]) -> String {
     lines.join("\n  ")
 }
 
-fn listed_without_lines(of: &str, problems: &[String]) -> String {
-    let between = if problems.len() > 1 { "\n  " } else { " " };
-    format!("in the {of}:{between}{}", problems.join(between))
-}
-
 /// Something was refused, and its [`Source`] has the mistake.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refused(());
@@ -89,7 +84,7 @@ pub(super) struct Source<'a> {
     path: &'a Path,
     pub text: &'a str,
     /// What the text was made of, such as flags: its author knows no lines of it, and no `[model]`.
-    made_of: Option<&'a str>,
+    pub made_of: Option<&'a str>,
     /// Each with the byte of the text that it is about.
     mistakes: RefCell<Vec<(usize, String)>>,
 }
@@ -101,14 +96,6 @@ impl<'a> Source<'a> {
             text,
             made_of: None,
             mistakes: RefCell::new(Vec::new()),
-        }
-    }
-
-    /// A text that a program made of something, such as flags.
-    pub fn made(of: &'a str, text: &'a str) -> Self {
-        Self {
-            made_of: Some(of),
-            ..Self::new(Path::new(of), text)
         }
     }
 
@@ -130,11 +117,10 @@ impl<'a> Source<'a> {
         // A misspelt key that stands for a required key is met twice.
         mistakes.dedup();
         if let Some(of) = self.made_of {
-            let problems = mistakes.into_iter().map(|(_, problem)| problem).collect();
-            return SweepError::Made {
-                of: of.to_owned(),
-                problems,
-            };
+            let between = if mistakes.len() > 1 { "\n  " } else { " " };
+            let problems = mistakes.into_iter().map(|(_, problem)| problem);
+            let problems = problems.collect::<Vec<_>>().join(between);
+            return SweepError::Made(format!("in the {of}:{between}{problems}"));
         }
         let placed = |(at, problem)| Mistake {
             line: self.line(at),
@@ -339,11 +325,6 @@ impl<'a> Entry<'a> {
         let number = self.value().and_then(Value::number);
         let number = number.filter(|number| number.is_finite() && fits(*number));
         number.ok_or_else(|| self.must_be(allowed))
-    }
-
-    pub fn positive(&self, unit: &str) -> Result<f64, Refused> {
-        let allowed = format!("a finite number > 0, in {unit}");
-        self.number(&allowed, |number| number > 0.0)
     }
 
     pub fn count(&self, min: u64, max: u64) -> Result<u64, Refused> {

@@ -14,7 +14,7 @@ pub struct Change {
 }
 
 const AXES: &str = "axes";
-const SECTIONS: [&str; 6] = ["model", AXES, "record", "solver", "precision", "refine"];
+pub(super) const SECTIONS: [&str; 6] = ["model", AXES, "record", "solver", "precision", "refine"];
 /// Keys that take each other's place.
 const RIVALS: [&[&str]; 3] = [
     &["T", "eta", "frequency"],
