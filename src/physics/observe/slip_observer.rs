@@ -43,22 +43,14 @@ struct Span {
     settled: Option<Instant>,
 }
 
-/// The drive in its cycle at an instant of a slip or precursor.
-#[derive(Clone, Debug)]
-struct DriveAt {
-    slip_onset: Drive,
-    precursor_onset: Drive,
-    /// The first or last break of the last slip.
-    slip_break: Drive,
-}
-
 /// An observer that finds slips and precursors.
 #[derive(Clone, Debug)]
 pub struct SlipObserver {
     parameters: Parameters,
     recording: Recording,
     criteria: Criteria,
-    drive_at: DriveAt,
+    /// The drive in its cycle at the last slip's end.
+    drive: Drive,
     /// The end of the last segment, but for what is counted at events.
     now: Instant,
     /// The last event, and the contacts attached after it.
@@ -93,17 +85,12 @@ impl SlipObserver {
             crossing_time: parameters.wave_crossing_time(),
             give_up_time: recording.give_up_time(parameters),
         };
-        let drive = Drive::new(parameters);
         let drops = recording.drop_size;
         Self {
             parameters: parameters.clone(),
             recording: *recording,
             criteria,
-            drive_at: DriveAt {
-                slip_onset: drive,
-                precursor_onset: drive,
-                slip_break: drive,
-            },
+            drive: Drive::new(parameters),
             now: Instant::default(),
             at_event: Instant::default(),
             attached: contacts,
@@ -242,7 +229,6 @@ impl SlipObserver {
         let first = rupture.first;
         let last = rupture.last;
         let discard = self.recording.discard;
-        self.drive_at.slip_onset.advance_to(onset.time);
         if self.slips_seen >= discard {
             let slip = self.slip(rupture, onset);
             self.slips.push(slip);
@@ -261,6 +247,7 @@ impl SlipObserver {
             self.span.start_up_end = Some(end);
         }
         self.span.last_slip_end = end;
+        self.drive.advance_to(last.time);
         self.span.settled = None;
         self.last_onset = Some(onset.time);
         self.peaks_since.slip = self.peaks_since.last_break;
@@ -269,12 +256,12 @@ impl SlipObserver {
     }
 
     /// The row of a slip; drops are found at the end.
-    fn slip(&mut self, rupture: &Rupture, onset: Peak) -> Slip {
+    fn slip(&self, rupture: &Rupture, onset: Peak) -> Slip {
         let first = rupture.first;
         let last = rupture.last;
         let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
-        let drive = &self.drive_at.slip_onset;
-        let modulation = Modulation::of(drive);
+        let drive = self.drive_at(onset.time);
+        let modulation = Modulation::of(&drive);
         let interval = self.last_onset.map(|last| onset.time - last);
         let spent = self.span.last_slip_end.spent;
         let has_energies = self.recording.energies;
@@ -310,10 +297,17 @@ impl SlipObserver {
         }
     }
 
-    /// Displacement of the driven edge at a break of the last slip, from the force and the drive, in m.
-    fn edge_displacement(&mut self, at: Instant) -> f64 {
-        self.drive_at.slip_break.advance_to(at.time);
-        self.drive_at.slip_break.motion(at.time).0 - at.force / self.drive_at.slip_break.stiffness
+    /// The drive in its cycle at a time in s since the last slip's end.
+    fn drive_at(&self, time: f64) -> Drive {
+        let mut drive = self.drive;
+        drive.advance_to(time);
+        drive
+    }
+
+    /// Displacement of the driven edge at an instant since the last slip's end, from the force and the drive, in m.
+    fn edge_displacement(&self, at: Instant) -> f64 {
+        let drive = self.drive_at(at.time);
+        drive.motion(at.time).0 - at.force / drive.stiffness
     }
 
     fn record_precursor(&mut self, rupture: &Rupture) {
@@ -321,13 +315,12 @@ impl SlipObserver {
         let last = rupture.last;
         let onset = rupture.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
-            self.drive_at.precursor_onset.advance_to(onset);
             self.precursors.push(Precursor {
                 slip: self.slips_seen - self.recording.discard,
                 precursor: self.pending.count,
                 onset,
                 interval: self.pending.last_onset.map(|last| onset - last),
-                modulation: Modulation::of(&self.drive_at.precursor_onset),
+                modulation: Modulation::of(&self.drive_at(onset)),
                 nucleation: first.time,
                 nucleation_block: rupture.first_block as u64 + 1,
                 duration: last.time - first.time,
