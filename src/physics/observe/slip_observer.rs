@@ -8,9 +8,9 @@
 use super::drops::{DropDetector, Drops};
 use super::rupture::{Criteria, Instant, Peak, Rupture, advance_speed};
 use super::slip::{Energies, Modulation, Precursor, Slip, phase};
-use super::{Averages, Recording};
+use super::{Averages, Measurements, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
-use crate::solver::{Observer, Segment, Spent};
+use crate::solver::{Observer, Segment, Spent, Summary};
 
 /// Largest shear forces since the last slip's end, the last rupture of precursor size, and the last break.
 #[derive(Clone, Debug, Default)]
@@ -60,15 +60,10 @@ pub struct SlipObserver {
     rupture: Option<Rupture>,
     slips_seen: u64,
     last_onset: Option<f64>,
-    /// Onsets of the slips of start-up, in s.
-    pub(super) start_up: Vec<f64>,
-    slips: Vec<Slip>,
-    precursors: Vec<Precursor>,
+    /// What has been found so far.
+    measured: Measurements,
     pending: Pending,
     span: Span,
-    pub(super) has_given_up: bool,
-    /// Ruptures of any size that have ended.
-    pub(super) ruptures: u64,
     /// Drops, if they are recorded, and first and last break of every slip.
     drops: Option<DropDetector>,
     breaks_of_slips: Vec<(f64, f64)>,
@@ -98,40 +93,44 @@ impl SlipObserver {
             rupture: None,
             slips_seen: 0,
             last_onset: None,
-            start_up: Vec::new(),
-            slips: Vec::new(),
-            precursors: Vec::new(),
+            measured: Measurements::default(),
             pending: Pending::default(),
             span: Span::default(),
-            has_given_up: false,
-            ruptures: 0,
             drops: drops.map(|size| DropDetector::new(parameters, size)),
             breaks_of_slips: Vec::new(),
         }
     }
 
-    /// Slips past start-up, and their precursors if they are recorded.
-    pub fn into_rows(mut self) -> (Vec<Slip>, Vec<Precursor>) {
+    /// What has been measured in a simulation that ended with this summary.
+    pub fn into_measurements(mut self, summary: Summary) -> Measurements {
+        self.measured.summary = summary;
+        self.measured.averages = self.averages();
+        self.measured.running_interval = self.running_interval();
+        let Measurements {
+            slips, precursors, ..
+        } = &mut self.measured;
         // Precursors of a slip that the job does not have belong to none.
-        let slips = self.slips.len() as u64;
-        self.precursors.retain(|precursor| precursor.slip < slips);
+        precursors.retain(|precursor| precursor.slip < slips.len() as u64);
         if let Some(drops) = self.drops {
-            let discarded = self.breaks_of_slips.len() - self.slips.len();
+            let discarded = self.breaks_of_slips.len() - slips.len();
             let of_slips = drops.of_slips(&self.breaks_of_slips).into_iter();
-            for (slip, drops) in self.slips.iter_mut().zip(of_slips.skip(discarded)) {
+            for (slip, drops) in slips.iter_mut().zip(of_slips.skip(discarded)) {
                 slip.drops = drops;
             }
         }
-        (self.slips, self.precursors)
+        self.measured
     }
 
     /// Averages over time, from the end of start-up to that of the last slip. What follows belongs to it if no slip has
     /// come for half the time to give up: the slider then slides, and without a slip past start-up only that second
     /// half counts. `None` for an empty span.
-    pub fn averages(&self) -> Option<Averages> {
+    fn averages(&self) -> Option<Averages> {
         let (start, end) = match self.span.settled {
             Some(settled) => {
-                let start_up_end = self.span.start_up_end.filter(|_| !self.slips.is_empty());
+                let start_up_end = self
+                    .span
+                    .start_up_end
+                    .filter(|_| !self.measured.slips.is_empty());
                 (start_up_end.unwrap_or(settled), self.sliding())
             }
             None => (self.span.start_up_end?, self.span.last_slip_end),
@@ -147,18 +146,18 @@ impl SlipObserver {
     }
 
     /// Time since the last onset, in s, of a job that gives up: what its interval is at least.
-    pub fn running_interval(&self) -> Option<f64> {
-        let last = self.last_onset.filter(|_| self.has_given_up)?;
+    fn running_interval(&self) -> Option<f64> {
+        let last = self.last_onset.filter(|_| self.measured.has_given_up)?;
         Some(self.now.time - last)
     }
 
     /// Whether the last slip that was asked for is recorded.
     fn is_complete(&self) -> bool {
-        let Some(last) = self.slips.last() else {
+        let Some(last) = self.measured.slips.last() else {
             return false;
         };
         let Recording { slips, time, .. } = self.recording;
-        slips.is_some_and(|slips| self.slips.len() as u64 >= slips)
+        slips.is_some_and(|slips| self.measured.slips.len() as u64 >= slips)
             || time.is_some_and(|time| last.onset >= time)
     }
 
@@ -215,7 +214,7 @@ impl SlipObserver {
         let Some(rupture) = self.rupture.take() else {
             return;
         };
-        self.ruptures += 1;
+        self.measured.ruptures += 1;
         if rupture.is_slip(self.criteria.contacts) {
             self.record_slip(&rupture);
         } else if self.criteria.is_recorded(&rupture) {
@@ -231,9 +230,9 @@ impl SlipObserver {
         let discard = self.recording.discard;
         if self.slips_seen >= discard {
             let slip = self.slip(rupture, onset);
-            self.slips.push(slip);
+            self.measured.slips.push(slip);
         } else {
-            self.start_up.push(onset.time);
+            self.measured.start_up.push(onset.time);
         }
         if self.drops.is_some() {
             self.breaks_of_slips.push((first.time, last.time));
@@ -315,7 +314,7 @@ impl SlipObserver {
         let last = rupture.last;
         let onset = rupture.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
-            self.precursors.push(Precursor {
+            self.measured.precursors.push(Precursor {
                 slip: self.slips_seen - self.recording.discard,
                 precursor: self.pending.count,
                 onset,
@@ -385,7 +384,7 @@ impl Observer for SlipObserver {
         if self.span.settled.is_none() && since_slip >= 0.5 * self.criteria.give_up_time {
             self.span.settled = Some(self.sliding());
         }
-        self.has_given_up = since_slip >= self.criteria.give_up_time;
+        self.measured.has_given_up = since_slip >= self.criteria.give_up_time;
     }
 
     fn contact(&mut self, event: &ContactEvent) {
@@ -407,6 +406,6 @@ impl Observer for SlipObserver {
     }
 
     fn is_satisfied(&self) -> bool {
-        self.is_complete() || self.has_given_up
+        self.is_complete() || self.measured.has_given_up
     }
 }
