@@ -6,7 +6,7 @@
 //! its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::drops::{DropDetector, Drops};
-use super::rupture::{Criteria, Instant, Peak, Rupture, advance_speed};
+use super::rupture::{Instant, Peak, Rupture, advance_speed};
 use super::slip::{Energies, Modulation, Precursor, Slip, phase};
 use super::{Averages, Measurements, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
@@ -48,7 +48,12 @@ struct Span {
 pub struct SlipObserver {
     parameters: Parameters,
     recording: Recording,
-    criteria: Criteria,
+    /// All contacts, attached or not.
+    contacts: u64,
+    /// Least breaks of a precursor.
+    precursor_size: u64,
+    crossing_time: f64,
+    give_up_time: f64,
     /// The drive in its cycle at the last slip's end.
     drive: Drive,
     /// The end of the last segment, but for what is counted at events.
@@ -72,19 +77,15 @@ pub struct SlipObserver {
 impl SlipObserver {
     pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
         let contacts = (parameters.blocks * parameters.contacts_per_block) as u64;
-        let criteria = Criteria {
-            precursor_size: recording
-                .precursor_size
-                .unwrap_or(parameters.contacts_per_block as u64),
-            contacts,
-            crossing_time: parameters.wave_crossing_time(),
-            give_up_time: recording.give_up_time(parameters),
-        };
+        let size_of_block = parameters.contacts_per_block as u64;
         let drops = recording.drop_size;
         Self {
             parameters: parameters.clone(),
             recording: *recording,
-            criteria,
+            contacts,
+            precursor_size: recording.precursor_size.unwrap_or(size_of_block),
+            crossing_time: parameters.wave_crossing_time(),
+            give_up_time: recording.give_up_time(parameters),
             drive: Drive::new(parameters),
             now: Instant::default(),
             at_event: Instant::default(),
@@ -140,7 +141,7 @@ impl SlipObserver {
             time,
             friction: (end.impulse - start.impulse) / time,
             attached_fraction: (end.attached_time - start.attached_time)
-                / (time * self.criteria.contacts as f64),
+                / (time * self.contacts as f64),
             slip_share: (end.slipping - start.slipping) / time,
         })
     }
@@ -203,8 +204,7 @@ impl SlipObserver {
     /// Ends the rupture if no break has come in the wave crossing time before a time in s.
     #[inline(always)]
     fn finish_rupture_before(&mut self, time: f64) {
-        let crossing_time = self.criteria.crossing_time;
-        let is_over = |rupture: &Rupture| time - rupture.last.time > crossing_time;
+        let is_over = |rupture: &Rupture| time - rupture.last.time > self.crossing_time;
         if self.rupture.as_ref().is_some_and(is_over) {
             self.finish_rupture();
         }
@@ -215,9 +215,9 @@ impl SlipObserver {
             return;
         };
         self.measured.ruptures += 1;
-        if rupture.is_slip(self.criteria.contacts) {
+        if rupture.is_slip(self.contacts) {
             self.record_slip(&rupture);
-        } else if self.criteria.is_recorded(&rupture) {
+        } else if rupture.size >= self.precursor_size {
             self.record_precursor(&rupture);
         }
     }
@@ -265,7 +265,7 @@ impl SlipObserver {
         let spent = self.span.last_slip_end.spent;
         let has_energies = self.recording.energies;
         let energies = has_energies.then(|| Energies::between(spent, last.spent));
-        let contacts = self.criteria.contacts as f64;
+        let contacts = self.contacts as f64;
         let since_cycle = onset.time - drive.cycle_start;
         Slip {
             number: self.slips_seen - self.recording.discard,
@@ -349,10 +349,10 @@ impl Observer for SlipObserver {
     fn advance(&mut self, segment: &Segment<'_>) {
         // Each stretch contains the later ones, so a force that raises none of these peaks raises no other. The peak
         // since the last break counts only once its rupture ends, and if that is recorded.
-        let recordable = self
-            .rupture
-            .as_ref()
-            .is_some_and(|rupture| self.criteria.is_recorded(rupture));
+        let is_recorded = |rupture: &Rupture| {
+            rupture.size >= self.precursor_size || rupture.is_slip(self.contacts)
+        };
+        let recordable = self.rupture.as_ref().is_some_and(is_recorded);
         let floor = if recordable {
             self.peaks_since.last_break.force
         } else {
@@ -381,10 +381,10 @@ impl Observer for SlipObserver {
         };
         self.finish_rupture_before(self.now.time);
         let since_slip = self.now.time - self.span.last_slip_end.time;
-        if self.span.settled.is_none() && since_slip >= 0.5 * self.criteria.give_up_time {
+        if self.span.settled.is_none() && since_slip >= 0.5 * self.give_up_time {
             self.span.settled = Some(self.sliding());
         }
-        self.measured.has_given_up = since_slip >= self.criteria.give_up_time;
+        self.measured.has_given_up = since_slip >= self.give_up_time;
     }
 
     fn contact(&mut self, event: &ContactEvent) {
