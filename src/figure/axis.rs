@@ -94,12 +94,10 @@ impl Axis {
         self.minor = multiples(step / parts, self.low, self.high).collect();
     }
 
-    /// Leaves out the ticks between numbers if they would stand close on this length.
-    pub(super) fn thin_out(&mut self, length: f64) {
+    /// Whether the ticks between numbers would stand close on this length.
+    pub(super) fn is_crowded(&self, length: f64) -> bool {
         const CLOSE: f64 = 5.0;
-        if self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length {
-            self.minor.clear();
-        }
+        self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length
     }
 
     /// For data: logarithmic where these lie decades apart, and a little wider than they are; `None` without any.

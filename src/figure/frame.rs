@@ -257,21 +257,13 @@ impl Frame {
     pub(super) fn axes(&self, sheet: &mut Picture) {
         let right = self.right();
         let bottom = self.bottom();
-        let for_style = |axis: &Axis, length| {
-            let mut axis = axis.clone();
-            if sheet.style == Style::Print {
-                axis.thin_out(length);
-            }
-            axis
-        };
-        let x_axis = for_style(&self.x, self.width);
-        let y_axis = for_style(&self.y, self.height);
-        for (value, length) in ticks(&x_axis) {
+        let style = sheet.style;
+        for (value, length) in ticks(&self.x, self.width, style) {
             let x = self.x_of(value);
             sheet.line(vec![(x, bottom), (x, bottom - length)], AXIS);
             sheet.line(vec![(x, self.top), (x, self.top + length)], AXIS);
         }
-        for (value, length) in ticks(&y_axis) {
+        for (value, length) in ticks(&self.y, self.height, style) {
             let y = self.y_of(value);
             sheet.line(vec![(self.left, y), (self.left + length, y)], AXIS);
             sheet.line(vec![(right, y), (right - length, y)], AXIS);
@@ -285,15 +277,15 @@ impl Frame {
         for corner in 0..4 {
             sheet.line(vec![corners[corner], corners[(corner + 1) % 4]], AXIS);
         }
-        self.numbers(sheet, &x_axis, &y_axis);
+        self.numbers(sheet);
         self.labels(sheet);
     }
 
-    fn numbers(&self, sheet: &mut Picture, x_axis: &Axis, y_axis: &Axis) {
+    fn numbers(&self, sheet: &mut Picture) {
         let height = f64::from(TICK_TEXT);
         // Where a frame is small, numbers that would meet their neighbours are left out, and those that would be cut.
         let mut free = f64::INFINITY;
-        for (value, number) in &y_axis.ticks {
+        for (value, number) in &self.y.ticks {
             let y = self.y_of(*value);
             if y <= free {
                 let size = fitting(number, TICK_TEXT, LEFT - TICK_GAP - EDGE).unwrap_or(NOTE_TEXT);
@@ -302,7 +294,7 @@ impl Frame {
             }
         }
         let mut free = EDGE;
-        for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
+        for (value, number) in self.x.ticks.iter().filter(|_| self.is_lowest) {
             let x = self.x_of(*value);
             let half = 0.5 * text_width(number, TICK_TEXT);
             if x - half >= free && x + half <= sheet.scene.width - EDGE {
@@ -388,9 +380,11 @@ fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
     fitted(label.trim_end(), LABEL_TEXT, room)
 }
 
-/// Values at the ticks of an axis, and their lengths.
-fn ticks(axis: &Axis) -> impl Iterator<Item = (f64, f64)> {
-    let minor = axis.minor.iter().map(|&value| (value, MINOR_TICK_LENGTH));
+/// Values at the ticks of an axis of this length, and their lengths; in print without those that would stand close.
+fn ticks(axis: &Axis, length: f64, style: Style) -> impl Iterator<Item = (f64, f64)> {
+    let are_left_out = style == Style::Print && axis.is_crowded(length);
+    let minor = axis.minor.iter().filter(move |_| !are_left_out);
+    let minor = minor.map(|&value| (value, MINOR_TICK_LENGTH));
     minor.chain(axis.ticks.iter().map(|&(value, _)| (value, TICK_LENGTH)))
 }
 
