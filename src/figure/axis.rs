@@ -14,7 +14,7 @@ pub(super) struct Axis {
     /// What it shows, with its unit; an empty label is not drawn.
     pub(super) label: String,
     /// The same in short, for frames that have no room for it.
-    pub(super) short_label: Option<String>,
+    pub(super) short_label: String,
     pub(super) low: f64,
     pub(super) high: f64,
     scale: Scale,
@@ -195,18 +195,13 @@ impl Axis {
     fn bare(label: &str, low: f64, high: f64) -> Self {
         Self {
             label: label.to_owned(),
-            short_label: None,
+            short_label: label.to_owned(),
             low,
             high,
             scale: Scale::Linear,
             ticks: Vec::new(),
             minor: Vec::new(),
         }
-    }
-
-    /// Its label where there is little room.
-    pub(super) fn short_label(&self) -> &str {
-        self.short_label.as_deref().unwrap_or(&self.label)
     }
 
     /// Place of a value, 0 at the low end and 1 at the high end.

@@ -371,7 +371,7 @@ fn fitted(text: &str, size: u32, room: f64) -> (String, u32) {
 
 /// The label of an axis after a letter, in short where there is little room, and its size.
 fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
-    let [long, short] = [&axis.label, axis.short_label()].map(|label| format!("{letter}{label}"));
+    let [long, short] = [&axis.label, &axis.short_label].map(|label| format!("{letter}{label}"));
     let label = if text_width(&long, LABEL_TEXT) <= room {
         long
     } else {
@@ -461,7 +461,7 @@ mod tests {
         let long = "Standard deviation of the intervals between slips, tau_sd (s)";
         let x = Axis::linear(long, 0.0, 1000.0);
         let mut y = Axis::logarithmic(long, 3e-9, 8e-9);
-        y.short_label = Some("tau_sd (s)".to_owned());
+        y.short_label = "tau_sd (s)".to_owned();
         for size in [(60.0, 40.0), (86.0, 60.0), (178.0, 60.0)] {
             let (width, texts) = texts(Style::Print, size, &x, &y);
             assert!(
