@@ -2,7 +2,7 @@
 //! the small print under them.
 
 use super::axis::Axis;
-use super::legend::{Entry, draw_legend, legend_rows};
+use super::legend::{self, Entry, draw_legend, legend_rows};
 use super::picture::{Anchor, Picture, snapped};
 use super::style::{
     AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT, text_width,
@@ -39,8 +39,6 @@ const UNDER: f64 = 58.0;
 const ROW_GAP: f64 = 52.0;
 /// Space above a frame for a heading.
 const HEADING: f64 = 26.0;
-/// Distance of the rows of a legend.
-const LEGEND_ROW: f64 = 24.0;
 /// Distance of the lines of small print.
 const NOTE_ROW: f64 = 16.0;
 /// Of the label of the y axis over the frame or its heading.
@@ -94,7 +92,7 @@ impl Layout {
         let total = beside + columns * width;
 
         let right = total - MARGIN;
-        let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * LEGEND_ROW;
+        let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * legend::ROW;
         // A journal has the small print in the caption.
         let notes = if look.style == Style::Screen {
             wrapped(&look.note, right - MARGIN)
@@ -123,7 +121,7 @@ impl Layout {
         let frames: f64 = heights.iter().sum();
 
         let mut sheet = Picture::new(name, look, (total, frames + around));
-        draw_legend(&mut sheet, legend, MARGIN, right, LEGEND_ROW);
+        draw_legend(&mut sheet, legend, MARGIN, right);
         for (row, line) in (1..).map(f64::from).zip(&notes) {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
             sheet.coloured_text(place, line, NOTE_TEXT, Anchor::Start, Some(DARK_GREY));
