@@ -38,7 +38,7 @@ const UNDER: f64 = 58.0;
 /// Between two rows of frames, for a label and some air.
 const ROW_GAP: f64 = 52.0;
 /// Space above a frame for a heading.
-const HEADING: f64 = 26.0;
+pub(super) const HEADING: f64 = 26.0;
 /// Distance of the lines of small print.
 const NOTE_ROW: f64 = 16.0;
 /// Of the label of the y axis over the frame or its heading.
@@ -57,8 +57,8 @@ pub(super) struct Layout {
     pub(super) row_gap: f64,
     /// Space right of the last column.
     pub(super) right: f64,
-    /// Whether each frame has a heading.
-    pub(super) has_headings: bool,
+    /// Space above each frame for a heading.
+    pub(super) heading: f64,
 }
 
 impl Layout {
@@ -70,11 +70,12 @@ impl Layout {
             column_gap: 0.0,
             row_gap: ROW_GAP,
             right: RIGHT,
-            has_headings: false,
+            heading: 0.0,
         }
     }
 
-    /// Places rows of frames with these heights on a sheet of the requested size, under this legend.
+    /// Places frames with these heights, those of a row as high as the first, on a sheet of the requested size, under
+    /// this legend.
     pub(super) fn page(
         self,
         name: &str,
@@ -82,6 +83,8 @@ impl Layout {
         legend: &[Entry],
         natural_heights: &[f64],
     ) -> (Page, Picture) {
+        let count = natural_heights.len();
+        let natural_heights = natural_heights.iter().step_by(self.columns);
         let columns = self.columns as f64;
         let between = (columns - 1.0) * self.column_gap;
         let beside = LEFT + between + self.right;
@@ -100,8 +103,7 @@ impl Layout {
             Vec::new()
         };
         let rows = natural_heights.len() as f64;
-        let heading = if self.has_headings { HEADING } else { 0.0 };
-        let above_notes = top + rows * heading + (rows - 1.0) * self.row_gap + UNDER;
+        let above_notes = top + rows * self.heading + (rows - 1.0) * self.row_gap + UNDER;
         let around = above_notes
             + notes.len() as f64 * NOTE_ROW
             + if notes.is_empty() {
@@ -109,15 +111,13 @@ impl Layout {
             } else {
                 0.5 * NOTE_ROW
             };
-        let natural: f64 = natural_heights.iter().sum();
+        let natural: f64 = natural_heights.clone().sum();
         let scale = match asked {
             Some((_, height)) => (height - around) / natural,
             None => (width / self.width).min(1.0),
         };
-        let heights: Vec<f64> = natural_heights
-            .iter()
-            .map(|height| (scale * height).max(SHORTEST))
-            .collect();
+        let heights = natural_heights.map(|height| (scale * height).max(SHORTEST));
+        let heights: Vec<f64> = heights.collect();
         let frames: f64 = heights.iter().sum();
 
         let mut sheet = Picture::new(name, look, (total, frames + around));
@@ -129,9 +129,9 @@ impl Layout {
         (
             Page {
                 layout: Self { width, ..self },
+                count,
                 heights,
                 top,
-                heading,
                 end: right,
             },
             sheet,
@@ -161,25 +161,25 @@ fn wrapped(text: &str, width: f64) -> Vec<String> {
 pub(super) struct Page {
     /// With the width that the frames have.
     layout: Layout,
+    count: usize,
+    /// Of the rows.
     heights: Vec<f64>,
     top: f64,
-    heading: f64,
     end: f64,
 }
 
 impl Page {
-    /// The frame in a row and a column, both from 0. One of several has a letter.
-    pub(super) fn frame(&self, row: usize, column: usize, x: Axis, y: Axis) -> Frame {
-        let Self {
-            layout, heading, ..
-        } = *self;
+    /// The frame of this number, from 0, row by row. One of several has a letter.
+    pub(super) fn frame(&self, number: usize, x: Axis, y: Axis) -> Frame {
+        let layout = self.layout;
         let columns = layout.columns;
+        let row = number / columns;
+        let column = number % columns;
         let above: f64 = self.heights[..row]
             .iter()
-            .map(|height| height + layout.row_gap + heading)
+            .map(|height| height + layout.row_gap + layout.heading)
             .sum();
-        let is_alone = columns * self.heights.len() == 1;
-        let letter = u8::try_from(row * columns + column)
+        let letter = u8::try_from(number)
             .ok()
             .and_then(|index| b'a'.checked_add(index));
         let start = |column: usize| MARGIN + column as f64 * (layout.width + layout.column_gap);
@@ -193,15 +193,15 @@ impl Page {
             left: start(column) - MARGIN + LEFT,
             room: (start(column), end),
             // Over headings there is one for a row.
-            y_label_end: if heading > 0.0 { self.end } else { end },
-            top: self.top + above + heading,
+            y_label_end: if layout.heading > 0.0 { self.end } else { end },
+            top: self.top + above + layout.heading,
             width: layout.width,
             height: self.heights[row],
             x,
             y,
-            heading,
-            letter: letter.filter(|_| !is_alone).map(char::from),
-            is_lowest: row + 1 == self.heights.len(),
+            heading: layout.heading,
+            letter: letter.filter(|_| self.count > 1).map(char::from),
+            is_lowest: number + columns >= self.count,
         }
     }
 }
@@ -220,7 +220,7 @@ pub(super) struct Frame {
     heading: f64,
     letter: Option<char>,
     /// Whether it has the numbers and the label of the x axis.
-    pub(super) is_lowest: bool,
+    is_lowest: bool,
 }
 
 impl Frame {
@@ -442,9 +442,9 @@ mod tests {
             column_gap: LEFT,
             ..Layout::column(300.0)
         };
-        let (page, mut sheet) = layout.page("", &look, &[], &[200.0]);
+        let (page, mut sheet) = layout.page("", &look, &[], &[200.0; 2]);
         for column in 0..2 {
-            let frame = page.frame(0, column, x.clone(), y.clone());
+            let frame = page.frame(column, x.clone(), y.clone());
             frame.axes(&mut sheet);
             frame.heading(
                 &mut sheet,
