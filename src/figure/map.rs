@@ -105,7 +105,10 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
             mark_periods(&mut bar, &scale, ends().unwrap_or_default());
         }
         let none = is_of_periods.then_some(FREE);
-        let cells = map.coloured(|set| number(set).map(|n| colour(scale.place(n))).or(none));
+        let ink = |set| number(set).map(|n| colour(scale.place(n))).or(none);
+        let cells = map.sets.iter();
+        let cells = cells.filter_map(|&(set, position)| Some((map.cell(position), ink(set)?)));
+        let cells = Layer::Cells(cells.collect(), OVERLAP);
         let layers = std::iter::once(cells).chain(lines());
         let heading = Some(std::mem::take(&mut bar.label));
         let height = if is_locking { 280.0 } else { 220.0 };
@@ -238,15 +241,6 @@ impl Map {
 
     fn cell(&self, (column, row): Position) -> Cell {
         (self.columns.cell(column), self.rows.cell(row))
-    }
-
-    /// The sets that have a colour.
-    fn coloured<'l>(&self, colour: impl Fn(usize) -> Option<Ink>) -> Layer<'l> {
-        let cells = self
-            .sets
-            .iter()
-            .filter_map(|&(set, position)| Some((self.cell(position), colour(set)?)));
-        Layer::Cells(cells.collect(), OVERLAP)
     }
 
     /// Lines between neighbours of different regimes.
