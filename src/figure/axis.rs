@@ -217,11 +217,7 @@ impl Axis {
         if (self.high - self.low) / period > most {
             return Vec::new();
         }
-        let first = (self.low / period).ceil();
-        (0..=u32::MAX)
-            .map(|step| (first + f64::from(step)) * period)
-            .take_while(|&multiple| multiple <= self.high)
-            .collect()
+        multiples(period, self.low, self.high).collect()
     }
 
     /// `count` >= 2 values from end to end, evenly placed.
