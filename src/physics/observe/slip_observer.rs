@@ -1,9 +1,8 @@
 //! Finds slips and precursors from the contact events, and measures them on the shear force.
 //!
-//! Definitions: a slip is a rupture that breaks contacts at every block and lets go of at least half of those that
-//! held, and a tenth of all; a precursor any other of at least `precursor_size` breaks; smaller ones are creep. The
-//! onset of a slip is the largest shear force between the previous slip's end (its last break) and the instant at which
-//! its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
+//! A precursor is a rupture of at least `precursor_size` breaks that is no slip; smaller ones are creep. The onset of a
+//! slip is the largest shear force between the previous slip's end (its last break) and the instant at which its
+//! rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::drops::{DropDetector, Drops};
 use super::rupture::{Instant, Peak, Rupture, advance_speed};
@@ -204,14 +203,8 @@ impl SlipObserver {
     /// Ends the rupture if no break has come in the wave crossing time before a time in s.
     #[inline(always)]
     fn finish_rupture_before(&mut self, time: f64) {
-        let is_over = |rupture: &Rupture| time - rupture.last.time > self.crossing_time;
-        if self.rupture.as_ref().is_some_and(is_over) {
-            self.finish_rupture();
-        }
-    }
-
-    fn finish_rupture(&mut self) {
-        let Some(rupture) = self.rupture.take() else {
+        let is_over = |rupture: &mut Rupture| time - rupture.last.time > self.crossing_time;
+        let Some(rupture) = self.rupture.take_if(is_over) else {
             return;
         };
         self.measured.ruptures += 1;
