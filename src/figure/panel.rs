@@ -7,6 +7,8 @@ use super::legend::Entry;
 use super::picture::Picture;
 use super::style::{Dot, Fill, Ink, Look, Stroke};
 
+pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
+
 /// What is drawn in a panel, in units of its axes.
 pub(super) enum Layer<'a> {
     /// What lies inside the frame of other layers.
@@ -25,7 +27,7 @@ pub(super) enum Layer<'a> {
     /// Cells, each in its own colour, and by how much they reach under their neighbours.
     Cells(Vec<(Cell, Ink)>, f64),
     /// What depends on the size of the frame.
-    Drawn(Box<dyn FnOnce(&mut Picture, &Frame) + 'a>),
+    Drawn(Drawing<'a>),
 }
 
 impl Layer<'_> {
