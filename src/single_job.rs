@@ -151,5 +151,5 @@ pub fn simulate(
         profile: profile.rows,
         contacts: log.events,
     };
-    Ok((Measurements::new(slips, summary), records))
+    Ok((slips.into_measurements(summary), records))
 }

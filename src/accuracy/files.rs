@@ -99,7 +99,10 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     const NOTE: &str = "Biases: mean of a method's slips less that of the reference, over what equal means stay under in 95 of 100 \
                         samples; bars: 95 %. Errors of break times: median, bars up to the largest.";
     const EXTRAPOLATED: &str = " * Cost extrapolated from that of a step.";
-    let breaks = points(&findings.methods, set, |row| {
+    let rows = findings.methods.iter();
+    let rows = rows.filter(|row| row.parameters.without_modulation() == *set);
+    let rows: Vec<&MethodRow> = rows.collect();
+    let breaks = points(&rows, |row| {
         let error = row.break_times.median?;
         Some((error, (error, row.break_times.largest?)))
     });
@@ -109,7 +112,7 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
         points: breaks,
     }];
     for (quantity, name) in [("interval", "τ"), ("front_speed", "front speed")] {
-        let points = points(&findings.methods, set, |row| {
+        let points = points(&rows, |row| {
             let bias = findings.bias_of(row, quantity)?.bias;
             let by_chance = bias.half_width()?;
             let of_chance = bias.of_mean.abs() / by_chance;
@@ -123,11 +126,7 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     }
     panels.retain(|panel| !panel.points.is_empty());
     let others = others_in_words(set);
-    let mut mine = findings
-        .methods
-        .iter()
-        .filter(|row| row.parameters.without_modulation() == *set);
-    let extrapolated = if mine.any(|row| row.cost.is_extrapolated()) {
+    let extrapolated = if rows.iter().any(|row| row.cost.is_extrapolated()) {
         EXTRAPOLATED
     } else {
         ""
@@ -140,19 +139,16 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     work_precision(WORK, &panels, &look)
 }
 
-/// Each method under each modulation of the sets that are this one without: `error` gives an error and its uncertainty.
+/// Each method under each modulation: `error` gives an error and its uncertainty.
 fn points(
-    rows: &[MethodRow],
-    set: &Parameters,
+    rows: &[&MethodRow],
     error: impl Fn(&MethodRow) -> Option<(f64, (f64, f64))>,
 ) -> Vec<WorkPrecision> {
-    let rows = rows.iter();
-    let rows = rows.filter(|row| row.parameters.without_modulation() == *set);
-    let modulated = rows.clone().map(|row| &row.parameters);
+    let modulated = rows.iter().map(|row| &row.parameters);
     let mut modulated = modulated.filter(|set| set.modulation_amplitude > 0.0);
     let first = modulated.next();
     let is_one = modulated.all(|other| Some(other) == first);
-    let point = |row: &MethodRow| {
+    let point = |row: &&MethodRow| {
         let (error, uncertainty) = error(row)?;
         let amplitude = row.parameters.modulation_amplitude;
         let drive = match row.parameters.frequency() {
@@ -170,7 +166,7 @@ fn points(
             work: row.cost.per_slip,
         })
     };
-    rows.filter_map(point).collect()
+    rows.iter().filter_map(point).collect()
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use super::{BiasRow, Cost, Findings, MethodRow, SolverColumns, set_in_words};
 use crate::model::{Parameters, Selected};
 use crate::observe::{Measurements, Recording, Slip, measure};
 use crate::run::limits;
-use crate::solver::{Limits, Observer, Resolve, Solver, Summary, simulate};
+use crate::solver::{Observer, Resolve, Solver, Summary};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -347,19 +347,15 @@ impl Study {
     }
 }
 
-/// Observers end these simulations; none comes near this number of events.
-const LIMITS: Limits<'static> = Limits {
-    end_time: f64::INFINITY,
-    events: 1_000_000_000,
-    interrupt: None,
-};
-
+/// Observers end these simulations, none of which comes near the largest number of events.
 fn simulated(
     parameters: &Parameters,
     solver: Solver,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    simulate(parameters, solver, LIMITS, observer).with_context(|| in_words(parameters, solver))
+    Recording::default()
+        .simulate(parameters, solver, &AtomicBool::new(false), observer)
+        .with_context(|| in_words(parameters, solver))
 }
 
 /// CPU time in s, and what a sweep would measure.

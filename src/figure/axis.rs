@@ -3,21 +3,15 @@
 use crate::sets::{power_of_ten, with_decimals};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Scale {
-    Linear,
-    Logarithmic,
-}
-
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     /// What it shows, with its unit; an empty label is not drawn.
     pub(super) label: String,
     /// The same in short, for frames that have no room for it.
-    pub(super) short_label: Option<String>,
+    pub(super) short_label: String,
     pub(super) low: f64,
     pub(super) high: f64,
-    scale: Scale,
+    is_log: bool,
     pub(super) ticks: Vec<(f64, String)>,
     pub(super) minor: Vec<f64>,
 }
@@ -94,12 +88,10 @@ impl Axis {
         self.minor = multiples(step / parts, self.low, self.high).collect();
     }
 
-    /// Leaves out the ticks between numbers if they would stand close on this length.
-    pub(super) fn thin_out(&mut self, length: f64) {
+    /// Whether the ticks between numbers would stand close on this length.
+    pub(super) fn is_crowded(&self, length: f64) -> bool {
         const CLOSE: f64 = 5.0;
-        if self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length {
-            self.minor.clear();
-        }
+        !self.is_log && self.minor.len() as f64 * CLOSE > length
     }
 
     /// For data: logarithmic where these lie decades apart, and a little wider than they are; `None` without any.
@@ -130,7 +122,7 @@ impl Axis {
     pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
         let [low, high] = [low, high].map(|end| end.clamp(1.0 / LARGEST, LARGEST));
         let mut axis = Self::bare(label, low, high);
-        axis.scale = Scale::Logarithmic;
+        axis.is_log = true;
         for mantissas in &MANTISSAS[usize::from(libm::log10(high / low) < 2.0)..] {
             if axis.ticks.len() < FEWEST {
                 axis.set_mantissas(mantissas);
@@ -197,25 +189,21 @@ impl Axis {
     fn bare(label: &str, low: f64, high: f64) -> Self {
         Self {
             label: label.to_owned(),
-            short_label: None,
+            short_label: label.to_owned(),
             low,
             high,
-            scale: Scale::Linear,
+            is_log: false,
             ticks: Vec::new(),
             minor: Vec::new(),
         }
     }
 
-    /// Its label where there is little room.
-    pub(super) fn short_label(&self) -> &str {
-        self.short_label.as_deref().unwrap_or(&self.label)
-    }
-
     /// Place of a value, 0 at the low end and 1 at the high end.
     pub(super) fn place(&self, value: f64) -> f64 {
-        match self.scale {
-            Scale::Linear => (value - self.low) / (self.high - self.low),
-            Scale::Logarithmic => libm::log(value / self.low) / libm::log(self.high / self.low),
+        if self.is_log {
+            libm::log(value / self.low) / libm::log(self.high / self.low)
+        } else {
+            (value - self.low) / (self.high - self.low)
         }
     }
 
@@ -229,20 +217,17 @@ impl Axis {
         if (self.high - self.low) / period > most {
             return Vec::new();
         }
-        let first = (self.low / period).ceil();
-        (0..=u32::MAX)
-            .map(|step| (first + f64::from(step)) * period)
-            .take_while(|&multiple| multiple <= self.high)
-            .collect()
+        multiples(period, self.low, self.high).collect()
     }
 
     /// `count` >= 2 values from end to end, evenly placed.
     pub(super) fn evenly_placed(&self, count: usize) -> Vec<f64> {
         let value = |step: usize| {
             let place = step as f64 / (count - 1) as f64;
-            match self.scale {
-                Scale::Linear => self.low + place * (self.high - self.low),
-                Scale::Logarithmic => self.low * libm::exp(place * libm::log(self.high / self.low)),
+            if self.is_log {
+                self.low * libm::exp(place * libm::log(self.high / self.low))
+            } else {
+                self.low + place * (self.high - self.low)
             }
         };
         (0..count).map(value).collect()

@@ -10,7 +10,7 @@ use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Quantity, parameter, shows_phase, without_value};
 use super::style::{
-    BAR_WIDTH, BLACK, Dot, GREY, INKS, Ink, Look, RADIUS, REFERENCE, STRIPE, Stroke, WHITE, dot,
+    BAR_WIDTH, BLACK, Dot, GREY, INKS, Ink, Look, RADIUS, REFERENCE, STRIPE, Stroke, WHITE,
     drive_alone,
 };
 use crate::model::Symbol;
@@ -327,7 +327,7 @@ impl Chart<'_> {
             entries.extend(hues.entries(RADIUS, |value| numbers.contains(&Some(value))));
             if inside.iter().any(|&set| colour.number(set).is_none()) {
                 let text = without_value(&colour.column);
-                entries.push(entry(Mark::Dot(dot(GREY)), text));
+                entries.push(entry(Mark::Dot(Dot::solid(GREY, RADIUS)), text));
             }
         }
         if !dots.free.is_empty() {

@@ -6,7 +6,7 @@ use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{axis_of, distinct};
-use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, REFERENCE, Stroke, dot};
+use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, REFERENCE, Stroke};
 use crate::model::Symbol;
 use crate::reduce::{EdgeRow, FREQUENCY, Interval, ascending};
 
@@ -68,7 +68,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
         let text = format!("{}, 95 %", of_it().next()?.crossed());
-        legend.push(entry(Mark::Bar(dot(ink)), text));
+        legend.push(entry(Mark::Bar(Dot::solid(ink, RADIUS)), text));
         let stroke = Stroke::solid(ink, BAR_WIDTH);
         layers.push(Layer::Bars(of_it().filter_map(bar).collect(), stroke));
         let dot = Dot::solid(ink, 0.7 * RADIUS);

@@ -2,7 +2,7 @@
 //! the small print under them.
 
 use super::axis::Axis;
-use super::legend::{Entry, draw_legend, legend_rows};
+use super::legend::{self, Entry, draw_legend, legend_rows};
 use super::picture::{Anchor, Picture, snapped};
 use super::style::{
     AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT, text_width,
@@ -38,9 +38,7 @@ const UNDER: f64 = 58.0;
 /// Between two rows of frames, for a label and some air.
 const ROW_GAP: f64 = 52.0;
 /// Space above a frame for a heading.
-const HEADING: f64 = 26.0;
-/// Distance of the rows of a legend.
-const LEGEND_ROW: f64 = 24.0;
+pub(super) const HEADING: f64 = 26.0;
 /// Distance of the lines of small print.
 const NOTE_ROW: f64 = 16.0;
 /// Of the label of the y axis over the frame or its heading.
@@ -59,8 +57,8 @@ pub(super) struct Layout {
     pub(super) row_gap: f64,
     /// Space right of the last column.
     pub(super) right: f64,
-    /// Whether each frame has a heading.
-    pub(super) has_headings: bool,
+    /// Space above each frame for a heading.
+    pub(super) heading: f64,
 }
 
 impl Layout {
@@ -72,11 +70,12 @@ impl Layout {
             column_gap: 0.0,
             row_gap: ROW_GAP,
             right: RIGHT,
-            has_headings: false,
+            heading: 0.0,
         }
     }
 
-    /// Places rows of frames with these heights on a sheet of the requested size, under this legend.
+    /// Places frames with these heights, those of a row as high as the first, on a sheet of the requested size, under
+    /// this legend.
     pub(super) fn page(
         self,
         name: &str,
@@ -84,6 +83,8 @@ impl Layout {
         legend: &[Entry],
         natural_heights: &[f64],
     ) -> (Page, Picture) {
+        let count = natural_heights.len();
+        let natural_heights = natural_heights.iter().step_by(self.columns);
         let columns = self.columns as f64;
         let between = (columns - 1.0) * self.column_gap;
         let beside = LEFT + between + self.right;
@@ -94,7 +95,7 @@ impl Layout {
         let total = beside + columns * width;
 
         let right = total - MARGIN;
-        let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * LEGEND_ROW;
+        let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * legend::ROW;
         // A journal has the small print in the caption.
         let notes = if look.style == Style::Screen {
             wrapped(&look.note, right - MARGIN)
@@ -102,8 +103,7 @@ impl Layout {
             Vec::new()
         };
         let rows = natural_heights.len() as f64;
-        let heading = if self.has_headings { HEADING } else { 0.0 };
-        let above_notes = top + rows * heading + (rows - 1.0) * self.row_gap + UNDER;
+        let above_notes = top + rows * self.heading + (rows - 1.0) * self.row_gap + UNDER;
         let around = above_notes
             + notes.len() as f64 * NOTE_ROW
             + if notes.is_empty() {
@@ -111,19 +111,17 @@ impl Layout {
             } else {
                 0.5 * NOTE_ROW
             };
-        let natural: f64 = natural_heights.iter().sum();
+        let natural: f64 = natural_heights.clone().sum();
         let scale = match asked {
             Some((_, height)) => (height - around) / natural,
             None => (width / self.width).min(1.0),
         };
-        let heights: Vec<f64> = natural_heights
-            .iter()
-            .map(|height| (scale * height).max(SHORTEST))
-            .collect();
+        let heights = natural_heights.map(|height| (scale * height).max(SHORTEST));
+        let heights: Vec<f64> = heights.collect();
         let frames: f64 = heights.iter().sum();
 
         let mut sheet = Picture::new(name, look, (total, frames + around));
-        draw_legend(&mut sheet, legend, MARGIN, right, LEGEND_ROW);
+        draw_legend(&mut sheet, legend, MARGIN, right);
         for (row, line) in (1..).map(f64::from).zip(&notes) {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
             sheet.coloured_text(place, line, NOTE_TEXT, Anchor::Start, Some(DARK_GREY));
@@ -131,9 +129,9 @@ impl Layout {
         (
             Page {
                 layout: Self { width, ..self },
+                count,
                 heights,
                 top,
-                heading,
                 end: right,
             },
             sheet,
@@ -163,25 +161,25 @@ fn wrapped(text: &str, width: f64) -> Vec<String> {
 pub(super) struct Page {
     /// With the width that the frames have.
     layout: Layout,
+    count: usize,
+    /// Of the rows.
     heights: Vec<f64>,
     top: f64,
-    heading: f64,
     end: f64,
 }
 
 impl Page {
-    /// The frame in a row and a column, both from 0. One of several has a letter.
-    pub(super) fn frame(&self, row: usize, column: usize, x: Axis, y: Axis) -> Frame {
-        let Self {
-            layout, heading, ..
-        } = *self;
+    /// The frame of this number, from 0, row by row. One of several has a letter.
+    pub(super) fn frame(&self, number: usize, x: Axis, y: Axis) -> Frame {
+        let layout = self.layout;
         let columns = layout.columns;
+        let row = number / columns;
+        let column = number % columns;
         let above: f64 = self.heights[..row]
             .iter()
-            .map(|height| height + layout.row_gap + heading)
+            .map(|height| height + layout.row_gap + layout.heading)
             .sum();
-        let is_alone = columns * self.heights.len() == 1;
-        let letter = u8::try_from(row * columns + column)
+        let letter = u8::try_from(number)
             .ok()
             .and_then(|index| b'a'.checked_add(index));
         let start = |column: usize| MARGIN + column as f64 * (layout.width + layout.column_gap);
@@ -195,15 +193,15 @@ impl Page {
             left: start(column) - MARGIN + LEFT,
             room: (start(column), end),
             // Over headings there is one for a row.
-            y_label_end: if heading > 0.0 { self.end } else { end },
-            top: self.top + above + heading,
+            y_label_end: if layout.heading > 0.0 { self.end } else { end },
+            top: self.top + above + layout.heading,
             width: layout.width,
             height: self.heights[row],
             x,
             y,
-            heading,
-            letter: letter.filter(|_| !is_alone).map(char::from),
-            is_lowest: row + 1 == self.heights.len(),
+            heading: layout.heading,
+            letter: letter.filter(|_| self.count > 1).map(char::from),
+            is_lowest: number + columns >= self.count,
         }
     }
 }
@@ -222,7 +220,7 @@ pub(super) struct Frame {
     heading: f64,
     letter: Option<char>,
     /// Whether it has the numbers and the label of the x axis.
-    pub(super) is_lowest: bool,
+    is_lowest: bool,
 }
 
 impl Frame {
@@ -257,21 +255,13 @@ impl Frame {
     pub(super) fn axes(&self, sheet: &mut Picture) {
         let right = self.right();
         let bottom = self.bottom();
-        let for_style = |axis: &Axis, length| {
-            let mut axis = axis.clone();
-            if sheet.style == Style::Print {
-                axis.thin_out(length);
-            }
-            axis
-        };
-        let x_axis = for_style(&self.x, self.width);
-        let y_axis = for_style(&self.y, self.height);
-        for (value, length) in ticks(&x_axis) {
+        let style = sheet.style;
+        for (value, length) in ticks(&self.x, self.width, style) {
             let x = self.x_of(value);
             sheet.line(vec![(x, bottom), (x, bottom - length)], AXIS);
             sheet.line(vec![(x, self.top), (x, self.top + length)], AXIS);
         }
-        for (value, length) in ticks(&y_axis) {
+        for (value, length) in ticks(&self.y, self.height, style) {
             let y = self.y_of(value);
             sheet.line(vec![(self.left, y), (self.left + length, y)], AXIS);
             sheet.line(vec![(right, y), (right - length, y)], AXIS);
@@ -285,15 +275,15 @@ impl Frame {
         for corner in 0..4 {
             sheet.line(vec![corners[corner], corners[(corner + 1) % 4]], AXIS);
         }
-        self.numbers(sheet, &x_axis, &y_axis);
+        self.numbers(sheet);
         self.labels(sheet);
     }
 
-    fn numbers(&self, sheet: &mut Picture, x_axis: &Axis, y_axis: &Axis) {
+    fn numbers(&self, sheet: &mut Picture) {
         let height = f64::from(TICK_TEXT);
         // Where a frame is small, numbers that would meet their neighbours are left out, and those that would be cut.
         let mut free = f64::INFINITY;
-        for (value, number) in &y_axis.ticks {
+        for (value, number) in &self.y.ticks {
             let y = self.y_of(*value);
             if y <= free {
                 let size = fitting(number, TICK_TEXT, LEFT - TICK_GAP - EDGE).unwrap_or(NOTE_TEXT);
@@ -302,7 +292,7 @@ impl Frame {
             }
         }
         let mut free = EDGE;
-        for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
+        for (value, number) in self.x.ticks.iter().filter(|_| self.is_lowest) {
             let x = self.x_of(*value);
             let half = 0.5 * text_width(number, TICK_TEXT);
             if x - half >= free && x + half <= sheet.scene.width - EDGE {
@@ -379,7 +369,7 @@ fn fitted(text: &str, size: u32, room: f64) -> (String, u32) {
 
 /// The label of an axis after a letter, in short where there is little room, and its size.
 fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
-    let [long, short] = [&axis.label, axis.short_label()].map(|label| format!("{letter}{label}"));
+    let [long, short] = [&axis.label, &axis.short_label].map(|label| format!("{letter}{label}"));
     let label = if text_width(&long, LABEL_TEXT) <= room {
         long
     } else {
@@ -388,9 +378,11 @@ fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
     fitted(label.trim_end(), LABEL_TEXT, room)
 }
 
-/// Values at the ticks of an axis, and their lengths.
-fn ticks(axis: &Axis) -> impl Iterator<Item = (f64, f64)> {
-    let minor = axis.minor.iter().map(|&value| (value, MINOR_TICK_LENGTH));
+/// Values at the ticks of an axis of this length, and their lengths; in print without those that would stand close.
+fn ticks(axis: &Axis, length: f64, style: Style) -> impl Iterator<Item = (f64, f64)> {
+    let are_left_out = style == Style::Print && axis.is_crowded(length);
+    let minor = axis.minor.iter().filter(move |_| !are_left_out);
+    let minor = minor.map(|&value| (value, MINOR_TICK_LENGTH));
     minor.chain(axis.ticks.iter().map(|&(value, _)| (value, TICK_LENGTH)))
 }
 
@@ -450,9 +442,9 @@ mod tests {
             column_gap: LEFT,
             ..Layout::column(300.0)
         };
-        let (page, mut sheet) = layout.page("", &look, &[], &[200.0]);
+        let (page, mut sheet) = layout.page("", &look, &[], &[200.0; 2]);
         for column in 0..2 {
-            let frame = page.frame(0, column, x.clone(), y.clone());
+            let frame = page.frame(column, x.clone(), y.clone());
             frame.axes(&mut sheet);
             frame.heading(
                 &mut sheet,
@@ -467,7 +459,7 @@ mod tests {
         let long = "Standard deviation of the intervals between slips, tau_sd (s)";
         let x = Axis::linear(long, 0.0, 1000.0);
         let mut y = Axis::logarithmic(long, 3e-9, 8e-9);
-        y.short_label = Some("tau_sd (s)".to_owned());
+        y.short_label = "tau_sd (s)".to_owned();
         for size in [(60.0, 40.0), (86.0, 60.0), (178.0, 60.0)] {
             let (width, texts) = texts(Style::Print, size, &x, &y);
             assert!(

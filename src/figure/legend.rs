@@ -11,6 +11,8 @@ const GAP: f64 = 7.0;
 const ENTRY_GAP: f64 = 20.0;
 /// Where the first row begins.
 const TOP: f64 = 8.0;
+/// Distance of rows.
+pub(super) const ROW: f64 = 24.0;
 
 /// What a legend shows beside a text.
 #[derive(Clone, Copy, Debug)]
@@ -63,15 +65,9 @@ pub(super) fn legend_rows(entries: &[Entry], room: f64) -> Vec<Vec<&Entry>> {
 }
 
 /// Draws entries at the top of a sheet, between two edges.
-pub(super) fn draw_legend(
-    sheet: &mut Picture,
-    entries: &[Entry],
-    left: f64,
-    right: f64,
-    row_height: f64,
-) {
+pub(super) fn draw_legend(sheet: &mut Picture, entries: &[Entry], left: f64, right: f64) {
     for (row, entries) in legend_rows(entries, right - left).into_iter().enumerate() {
-        let middle = TOP + (row as f64 + 0.5) * row_height;
+        let middle = TOP + (row as f64 + 0.5) * ROW;
         let mut start = left;
         for entry in entries {
             draw_mark(sheet, entry.0, (start, middle));

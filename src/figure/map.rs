@@ -73,7 +73,7 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
             let lines = [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke));
             lines.into()
         } else {
-            let mut lines = map.borders(|set| sets[set].regime, BORDER);
+            let mut lines = map.borders(|set| sets[set].regime);
             for (regime, ink, _) in MARKS {
                 let of_it = map.sets.iter().map(|set| set.0);
                 let of_it = of_it.filter(|&set| sets[set].regime == Some(regime));
@@ -105,7 +105,10 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
             mark_periods(&mut bar, &scale, ends().unwrap_or_default());
         }
         let none = is_of_periods.then_some(FREE);
-        let cells = map.coloured(|set| number(set).map(|n| colour(scale.place(n))).or(none));
+        let ink = |set| number(set).map(|n| colour(scale.place(n))).or(none);
+        let cells = map.sets.iter();
+        let cells = cells.filter_map(|&(set, position)| Some((map.cell(position), ink(set)?)));
+        let cells = Layer::Cells(cells.collect(), OVERLAP);
         let layers = std::iter::once(cells).chain(lines());
         let heading = Some(std::mem::take(&mut bar.label));
         let height = if is_locking { 280.0 } else { 220.0 };
@@ -240,30 +243,14 @@ impl Map {
         (self.columns.cell(column), self.rows.cell(row))
     }
 
-    /// The sets that have a colour.
-    fn coloured<'l>(&self, colour: impl Fn(usize) -> Option<Ink>) -> Layer<'l> {
-        let cells = self
-            .sets
-            .iter()
-            .filter_map(|&(set, position)| Some((self.cell(position), colour(set)?)));
-        Layer::Cells(cells.collect(), OVERLAP)
-    }
-
-    /// Lines between neighbours that are of different kinds.
-    fn borders<'l, K: PartialEq>(
-        &self,
-        kind: impl Fn(usize) -> K,
-        stroke: Stroke,
-    ) -> Vec<Layer<'l>> {
-        let kinds: BTreeMap<Position, K> = self
-            .sets
-            .iter()
-            .map(|&(set, position)| (position, kind(set)))
-            .collect();
+    /// Lines between neighbours of different regimes.
+    fn borders(&self, regime: impl Fn(usize) -> Option<Regime>) -> Vec<Layer<'static>> {
+        let regimes = self.sets.iter();
+        let regimes = regimes.map(|&(set, position)| (position, regime(set)));
+        let regimes: BTreeMap<Position, _> = regimes.collect();
         let differs = |position, next| {
-            kinds
-                .get(&next)
-                .is_some_and(|other| *other != kinds[&position])
+            let other = regimes.get(&next);
+            other.is_some_and(|other| *other != regimes[&position])
         };
         let border = |&(_, (column, row)): &(usize, Position)| {
             let ((left, right), (bottom, top)) = self.cell((column, row));
@@ -276,7 +263,7 @@ impl Map {
         self.sets
             .iter()
             .flat_map(border)
-            .map(|line| Layer::Curve(line, stroke))
+            .map(|line| Layer::Curve(line, BORDER))
             .collect()
     }
 }

@@ -37,10 +37,7 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
         .collect();
     // No panel is to be empty.
     let fills_panels = |place: &usize| {
-        let Some(swept) = swept.get(*place) else {
-            return false;
-        };
-        let places = swept.places();
+        let places = swept[*place].places();
         let mut values = places.clone();
         values.sort();
         values.dedup();
@@ -51,11 +48,8 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
         };
         values.len() <= MAX_COLUMNS && ys.iter().all(has_all)
     };
-    let panels = if swept.len() > 2 {
-        [2, 1].into_iter().find(fills_panels)
-    } else {
-        None
-    };
+    let mut candidates = [2, 1].into_iter().filter(|_| swept.len() > 2);
+    let panels = candidates.find(fills_panels);
     let colour = quantity(if panels == Some(1) { 2 } else { 1 }, "colour");
     let panels = panels.map(|place| swept[place].clone());
     Chart {

@@ -1,7 +1,7 @@
 //! Panels as data: axes and what lies between them, layer by layer. One engine draws the panels of every figure.
 
 use super::axis::Axis;
-use super::frame::{Cell, Ends, Frame, Layout, Place};
+use super::frame::{Cell, Ends, Frame, HEADING, Layout, Place};
 use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::Entry;
 use super::picture::Picture;
@@ -125,7 +125,7 @@ impl<'a> Panel<'a> {
     }
 }
 
-/// Draws panels row by row, under a legend. Those of a row are as high as the first.
+/// Draws panels row by row, under a legend.
 pub(super) fn draw(
     name: &str,
     look: &Look,
@@ -136,19 +136,13 @@ pub(super) fn draw(
     if panels.iter().any(|panel| panel.bar.is_some()) {
         layout.right = COLOUR_BAR;
     }
-    layout.has_headings = panels.iter().any(|panel| panel.heading.is_some());
-    let heights: Vec<f64> = panels
-        .iter()
-        .step_by(layout.columns)
-        .map(|panel| panel.height)
-        .collect();
+    if panels.iter().any(|panel| panel.heading.is_some()) {
+        layout.heading = HEADING;
+    }
+    let heights: Vec<f64> = panels.iter().map(|panel| panel.height).collect();
     let (page, mut sheet) = layout.page(name, look, legend, &heights);
-    let count = panels.len();
-    for (index, panel) in panels.into_iter().enumerate() {
-        let row = index / layout.columns;
-        let column = index % layout.columns;
-        let mut frame = page.frame(row, column, panel.x, panel.y);
-        frame.is_lowest = index + layout.columns >= count;
+    for (number, panel) in panels.into_iter().enumerate() {
+        let frame = page.frame(number, panel.x, panel.y);
         for layer in panel.layers {
             layer.draw(&mut sheet, &frame);
         }

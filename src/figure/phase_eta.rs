@@ -7,7 +7,7 @@ use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::style::{
-    BAR_WIDTH, BLUE, Dot, Ink, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade, dot,
+    BAR_WIDTH, BLUE, Dot, Ink, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
 };
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point};
@@ -19,7 +19,7 @@ pub(super) const NAME: &str = "phi-eta";
 
 const WIDTH: f64 = 580.0;
 const HEIGHT: f64 = 390.0;
-const AVERAGE: Dot = dot(BLUE);
+const AVERAGE: Dot = Dot::solid(BLUE, RADIUS);
 /// Around it, so that it is seen on dark cells.
 const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
 const ASYMPTOTE: Stroke = Stroke::solid(RED, 2.4);

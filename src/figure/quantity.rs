@@ -170,8 +170,7 @@ impl Quantity<'_> {
         let label = self.axis_label();
         let short_label = self
             .label
-            .is_none()
-            .then(|| self.typeset().short(self.unit));
+            .map_or_else(|| self.typeset().short(self.unit), str::to_owned);
         if self.column.is_worded() {
             let mut axis = self.axis_of_words(&label)?;
             axis.short_label = short_label;
@@ -180,7 +179,7 @@ impl Quantity<'_> {
         let (low, high) = self.ends(sets)?;
         let axis = |label: &str| Axis::of_scale(self.is_log, label, low, high);
         let mut shown = axis(&label);
-        shown.short_label = short_label.map(|label| axis(&label).label);
+        shown.short_label = axis(&short_label).label;
         Ok(shown)
     }
 

@@ -258,10 +258,6 @@ pub(super) const fn drive_alone(ink: Ink) -> Stroke {
     Stroke::dashed(ink, 1.6, (3.0, 3.0))
 }
 
-pub(super) const fn dot(ink: Ink) -> Dot {
-    Dot::solid(ink, RADIUS)
-}
-
 /// From pale, where nothing happens, to dark, in even steps of lightness: also for the colour-blind and in grey.
 const SHADES: [[f64; 3]; 8] = [
     [250.0, 249.0, 244.0],

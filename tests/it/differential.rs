@@ -251,7 +251,7 @@ impl Run {
         }
         Ok(Self {
             breaks: breaks.in_order,
-            slips: slips.into_rows().0,
+            slips: slips.into_measurements(summary).slips,
             end: summary.end_time,
         })
     }

@@ -165,9 +165,10 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
         };
         let mut alone = SlipObserver::new(&parameters, &recording);
         let mut following = Following(alone.clone(), 0);
-        simulate(&parameters, Solver::default(), limits, &mut alone).unwrap();
-        simulate(&parameters, Solver::default(), limits, &mut following).unwrap();
-        let (alone, following) = (alone.into_rows().0, following.0.into_rows().0);
+        let summary = simulate(&parameters, Solver::default(), limits, &mut alone).unwrap();
+        let alone = alone.into_measurements(summary).slips;
+        let summary = simulate(&parameters, Solver::default(), limits, &mut following).unwrap();
+        let following = following.0.into_measurements(summary).slips;
         assert_eq!(alone.len(), 8);
         for (slip, other) in alone.iter().zip(&following) {
             assert_eq!(

@@ -241,7 +241,7 @@ fn run(parameters: &Parameters, solver: Solver, end_time: f64) -> Outcome {
     Outcome {
         summary,
         events: log.events,
-        slips: slips.into_rows().0.len(),
+        slips: slips.into_measurements(summary).slips.len(),
         mean_force,
     }
 }

@@ -156,10 +156,9 @@ fn logged(parameters: &Parameters, solver: Solver) -> (Vec<Slip>, ContactLog, f6
         events: u64::MAX,
         interrupt: None,
     };
-    let end = simulate(parameters, solver, limits, &mut observers)
-        .unwrap()
-        .end_time;
-    (slips.into_rows().0, log, end)
+    let summary = simulate(parameters, solver, limits, &mut observers).unwrap();
+    let slips = slips.into_measurements(summary).slips;
+    (slips, log, summary.end_time)
 }
 
 fn solvers() -> [Solver; 3] {

@@ -12,6 +12,7 @@
 //! forms of the equation; `tests/it/equation_of_motion.rs` compares them with the plain one.
 
 use super::Parameters;
+use super::theory::bisected;
 
 /// The tridiagonal stiffness matrix of the slider for given contact stiffnesses.
 #[derive(Clone, Debug)]
@@ -77,19 +78,10 @@ impl StiffnessMatrix {
         if !widest.is_finite() {
             return f64::INFINITY;
         }
-        let mut low = -f64::EPSILON * widest;
-        let mut high = widest * (1.0 + f64::EPSILON);
-        loop {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                return high;
-            }
-            if self.eigenvalues_below(middle) > index {
-                high = middle;
-            } else {
-                low = middle;
-            }
-        }
+        let high = widest * (1.0 + f64::EPSILON);
+        bisected(-f64::EPSILON * widest, high, |value| {
+            self.eigenvalues_below(value) > index
+        })
     }
 }
 

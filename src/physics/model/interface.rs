@@ -183,11 +183,7 @@ impl Interface {
             disorder: Disorder::new(parameters),
             rows: vec![detached; blocks * rows_per_block],
             lives: vec![Lives::default(); blocks * rows_per_block],
-            reattachments: Reattachments::new(
-                blocks,
-                parameters.contacts_per_block,
-                parameters.reattachment_time,
-            ),
+            reattachments: Reattachments::new(parameters),
             attached: Attached {
                 count: (blocks * parameters.contacts_per_block) as u64,
                 offset: 0.0,

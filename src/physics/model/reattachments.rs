@@ -4,6 +4,7 @@
 //! lies beyond a turn of the calendar waits aside. A contact has at most one reattachment, so lists run through the
 //! contacts and nothing is allocated. Contract: reattachments come in order of time, then block, then contact.
 
+use super::Parameters;
 use crate::value::floored;
 
 /// Bins of a turn, and of a mean delay.
@@ -66,12 +67,12 @@ pub(super) struct Reattachments {
 }
 
 impl Reattachments {
-    /// None yet, for contacts that reattach after `mean_delay` s on average.
-    pub fn new(blocks: usize, contacts_per_block: usize, mean_delay: f64) -> Self {
-        let contacts = blocks * contacts_per_block;
+    /// None yet.
+    pub fn new(parameters: &Parameters) -> Self {
+        let contacts = parameters.blocks * parameters.contacts_per_block;
         Self {
-            contacts_per_block,
-            bins_per_second: BINS_PER_DELAY / mean_delay,
+            contacts_per_block: parameters.contacts_per_block,
+            bins_per_second: BINS_PER_DELAY / parameters.reattachment_time,
             next: None,
             present_bin: 0,
             present: Vec::new(),
@@ -164,15 +165,14 @@ impl Reattachments {
 
     /// Moves the origin of time: subtracts `shift` s from every one.
     pub fn shift(&mut self, shift: f64) {
-        let mut all = Vec::from_iter(self.next.take());
-        all.append(&mut self.present);
-        all.append(&mut self.beyond);
         for word in 0..BINS / BITS {
             while self.occupied[word] != 0 {
-                let bin = word * BITS + self.occupied[word].trailing_zeros() as usize;
-                self.empty(bin, |due| all.push(due));
+                self.empty(word * BITS + self.occupied[word].trailing_zeros() as usize);
             }
         }
+        let mut all = std::mem::take(&mut self.present);
+        all.extend(self.next.take());
+        all.append(&mut self.beyond);
         self.present_bin = 0;
         for due in all {
             // Not negative, whatever rounding does; see `Due`.
@@ -210,36 +210,28 @@ impl Reattachments {
 
     /// Turns to the next bin that holds anything, and sorts it.
     fn turn(&mut self) {
-        let mut present = std::mem::take(&mut self.present);
         if let Some(ahead) = self.occupied_from(1) {
             self.present_bin += ahead as u64;
-            self.empty(place_of(self.present_bin), |due| present.push(due));
+            self.empty(place_of(self.present_bin));
         }
         if !self.beyond.is_empty() {
             // Nothing may stay aside that now lies within the turn.
-            if present.is_empty() {
-                self.present_bin = self
-                    .beyond
-                    .iter()
-                    .map(|due| self.bin(*due))
-                    .min()
-                    .unwrap_or(0);
+            if self.present.is_empty() {
+                let bins = self.beyond.iter().map(|due| self.bin(*due));
+                self.present_bin = bins.min().unwrap_or(0);
             }
-            self.present = present;
             for due in std::mem::take(&mut self.beyond) {
                 self.file(due);
             }
-            present = std::mem::take(&mut self.present);
         }
-        present.sort_unstable_by(|a, b| b.cmp(a));
-        self.present = present;
+        self.present.sort_unstable_by(|a, b| b.cmp(a));
     }
 
-    /// Takes everything out of a bin.
-    fn empty(&mut self, bin: usize, mut take: impl FnMut(Due)) {
+    /// Takes everything out of a bin, to what is due in the present one.
+    fn empty(&mut self, bin: usize) {
         let mut contact = std::mem::replace(&mut self.first[bin], NONE);
         while contact != NONE {
-            take(self.due[contact as usize]);
+            self.present.push(self.due[contact as usize]);
             contact = self.after[contact as usize];
         }
         self.occupied[bin / BITS] &= !(1 << (bin % BITS));
@@ -265,7 +257,12 @@ mod tests {
         fn they_come_in_the_order_of_a_heap(
             steps in prop::collection::vec((0_usize..40, -4.0_f64..5.0, 0_usize..60), 1..400), shifts in any::<bool>()
         ) {
-            let mut queue = Reattachments::new(8, 5, 1e-3);
+            let mut queue = Reattachments::new(&Parameters {
+                blocks: 8,
+                contacts_per_block: 5,
+                reattachment_time: 1e-3,
+                ..Parameters::default()
+            });
             let mut heap = BinaryHeap::new();
             let mut time = 0.0;
             let mut waiting = [false; 40];

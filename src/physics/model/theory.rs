@@ -29,17 +29,21 @@ pub fn minimum_phase(eta: f64) -> Option<f64> {
     // Both in the period of the slip: the preceding maximum lies at Φ_max - 2π and the load, in units of V0 T/2π, is
     // φ + η cos φ.
     let target = maximum - TAU + eta * libm::cos(maximum);
-    let mut low = -PI - maximum;
-    let mut high = maximum;
+    let reaches = |phase: f64| phase + eta * libm::cos(phase) >= target;
+    Some(bisected(-PI - maximum, maximum, reaches))
+}
+
+/// The least number at which a condition holds, up to the last bit: it does not at `low`, and from there on at `high`.
+pub(super) fn bisected(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     loop {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {
-            return Some(high);
+            return high;
         }
-        if middle + eta * libm::cos(middle) < target {
-            low = middle;
-        } else {
+        if holds(middle) {
             high = middle;
+        } else {
+            low = middle;
         }
     }
 }

@@ -72,21 +72,6 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// What an observer has measured in a simulation that ended with this summary.
-    pub fn new(mut observer: SlipObserver, summary: Summary) -> Self {
-        let mut measured = Self {
-            averages: observer.averages(),
-            running_interval: observer.running_interval(),
-            start_up: std::mem::take(&mut observer.start_up),
-            ruptures: observer.ruptures,
-            has_given_up: observer.has_given_up,
-            summary,
-            ..Self::default()
-        };
-        (measured.slips, measured.precursors) = observer.into_rows();
-        measured
-    }
-
     /// How the slider moved; `None` without averages.
     pub fn regime(&self) -> Option<Regime> {
         self.averages
@@ -104,7 +89,7 @@ pub fn measure(
 ) -> Result<Measurements, SimulationError> {
     let mut observer = SlipObserver::new(parameters, recording);
     let summary = recording.simulate(parameters, solver, interrupt, &mut observer)?;
-    Ok(Measurements::new(observer, summary))
+    Ok(observer.into_measurements(summary))
 }
 
 impl Recording {

@@ -1,5 +1,5 @@
 //! Ruptures: maximal runs of contact breaks in which no gap exceeds the wave crossing time; their fronts, what is
-//! measured on the force meanwhile, and what makes them slips or precursors.
+//! measured on the force meanwhile, and what makes them slips.
 
 use crate::model::{ContactEvent, Parameters};
 use crate::solver::Spent;
@@ -118,22 +118,6 @@ pub(super) struct Instant {
     pub mean_displacement: f64,
     /// Zero unless energies are recorded.
     pub spent: Spent,
-}
-
-/// What makes a rupture a slip or a precursor, and when it and the job end.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Criteria {
-    pub precursor_size: u64,
-    /// All contacts, attached or not.
-    pub contacts: u64,
-    pub crossing_time: f64,
-    pub give_up_time: f64,
-}
-
-impl Criteria {
-    pub fn is_recorded(&self, rupture: &Rupture) -> bool {
-        rupture.size >= self.precursor_size || rupture.is_slip(self.contacts)
-    }
 }
 
 /// Slope of position against time by least squares; `None` unless it is positive and finite.

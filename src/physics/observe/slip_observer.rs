@@ -1,16 +1,15 @@
 //! Finds slips and precursors from the contact events, and measures them on the shear force.
 //!
-//! Definitions: a slip is a rupture that breaks contacts at every block and lets go of at least half of those that
-//! held, and a tenth of all; a precursor any other of at least `precursor_size` breaks; smaller ones are creep. The
-//! onset of a slip is the largest shear force between the previous slip's end (its last break) and the instant at which
-//! its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
+//! A precursor is a rupture of at least `precursor_size` breaks that is no slip; smaller ones are creep. The onset of a
+//! slip is the largest shear force between the previous slip's end (its last break) and the instant at which its
+//! rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::drops::{DropDetector, Drops};
-use super::rupture::{Criteria, Instant, Peak, Rupture, advance_speed};
+use super::rupture::{Instant, Peak, Rupture, advance_speed};
 use super::slip::{Energies, Modulation, Precursor, Slip, phase};
-use super::{Averages, Recording};
+use super::{Averages, Measurements, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
-use crate::solver::{Observer, Segment, Spent};
+use crate::solver::{Observer, Segment, Spent, Summary};
 
 /// Largest shear forces since the last slip's end, the last rupture of precursor size, and the last break.
 #[derive(Clone, Debug, Default)]
@@ -43,22 +42,19 @@ struct Span {
     settled: Option<Instant>,
 }
 
-/// The drive in its cycle at an instant of a slip or precursor.
-#[derive(Clone, Debug)]
-struct DriveAt {
-    slip_onset: Drive,
-    precursor_onset: Drive,
-    /// The first or last break of the last slip.
-    slip_break: Drive,
-}
-
 /// An observer that finds slips and precursors.
 #[derive(Clone, Debug)]
 pub struct SlipObserver {
     parameters: Parameters,
     recording: Recording,
-    criteria: Criteria,
-    drive_at: DriveAt,
+    /// All contacts, attached or not.
+    contacts: u64,
+    /// Least breaks of a precursor.
+    precursor_size: u64,
+    crossing_time: f64,
+    give_up_time: f64,
+    /// The drive in its cycle at the last slip's end.
+    drive: Drive,
     /// The end of the last segment, but for what is counted at events.
     now: Instant,
     /// The last event, and the contacts attached after it.
@@ -68,15 +64,10 @@ pub struct SlipObserver {
     rupture: Option<Rupture>,
     slips_seen: u64,
     last_onset: Option<f64>,
-    /// Onsets of the slips of start-up, in s.
-    pub(super) start_up: Vec<f64>,
-    slips: Vec<Slip>,
-    precursors: Vec<Precursor>,
+    /// What has been found so far.
+    measured: Measurements,
     pending: Pending,
     span: Span,
-    pub(super) has_given_up: bool,
-    /// Ruptures of any size that have ended.
-    pub(super) ruptures: u64,
     /// Drops, if they are recorded, and first and last break of every slip.
     drops: Option<DropDetector>,
     breaks_of_slips: Vec<(f64, f64)>,
@@ -85,25 +76,16 @@ pub struct SlipObserver {
 impl SlipObserver {
     pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
         let contacts = (parameters.blocks * parameters.contacts_per_block) as u64;
-        let criteria = Criteria {
-            precursor_size: recording
-                .precursor_size
-                .unwrap_or(parameters.contacts_per_block as u64),
-            contacts,
-            crossing_time: parameters.wave_crossing_time(),
-            give_up_time: recording.give_up_time(parameters),
-        };
-        let drive = Drive::new(parameters);
+        let size_of_block = parameters.contacts_per_block as u64;
         let drops = recording.drop_size;
         Self {
             parameters: parameters.clone(),
             recording: *recording,
-            criteria,
-            drive_at: DriveAt {
-                slip_onset: drive,
-                precursor_onset: drive,
-                slip_break: drive,
-            },
+            contacts,
+            precursor_size: recording.precursor_size.unwrap_or(size_of_block),
+            crossing_time: parameters.wave_crossing_time(),
+            give_up_time: recording.give_up_time(parameters),
+            drive: Drive::new(parameters),
             now: Instant::default(),
             at_event: Instant::default(),
             attached: contacts,
@@ -111,40 +93,44 @@ impl SlipObserver {
             rupture: None,
             slips_seen: 0,
             last_onset: None,
-            start_up: Vec::new(),
-            slips: Vec::new(),
-            precursors: Vec::new(),
+            measured: Measurements::default(),
             pending: Pending::default(),
             span: Span::default(),
-            has_given_up: false,
-            ruptures: 0,
             drops: drops.map(|size| DropDetector::new(parameters, size)),
             breaks_of_slips: Vec::new(),
         }
     }
 
-    /// Slips past start-up, and their precursors if they are recorded.
-    pub fn into_rows(mut self) -> (Vec<Slip>, Vec<Precursor>) {
+    /// What has been measured in a simulation that ended with this summary.
+    pub fn into_measurements(mut self, summary: Summary) -> Measurements {
+        self.measured.summary = summary;
+        self.measured.averages = self.averages();
+        self.measured.running_interval = self.running_interval();
+        let Measurements {
+            slips, precursors, ..
+        } = &mut self.measured;
         // Precursors of a slip that the job does not have belong to none.
-        let slips = self.slips.len() as u64;
-        self.precursors.retain(|precursor| precursor.slip < slips);
+        precursors.retain(|precursor| precursor.slip < slips.len() as u64);
         if let Some(drops) = self.drops {
-            let discarded = self.breaks_of_slips.len() - self.slips.len();
+            let discarded = self.breaks_of_slips.len() - slips.len();
             let of_slips = drops.of_slips(&self.breaks_of_slips).into_iter();
-            for (slip, drops) in self.slips.iter_mut().zip(of_slips.skip(discarded)) {
+            for (slip, drops) in slips.iter_mut().zip(of_slips.skip(discarded)) {
                 slip.drops = drops;
             }
         }
-        (self.slips, self.precursors)
+        self.measured
     }
 
     /// Averages over time, from the end of start-up to that of the last slip. What follows belongs to it if no slip has
     /// come for half the time to give up: the slider then slides, and without a slip past start-up only that second
     /// half counts. `None` for an empty span.
-    pub fn averages(&self) -> Option<Averages> {
+    fn averages(&self) -> Option<Averages> {
         let (start, end) = match self.span.settled {
             Some(settled) => {
-                let start_up_end = self.span.start_up_end.filter(|_| !self.slips.is_empty());
+                let start_up_end = self
+                    .span
+                    .start_up_end
+                    .filter(|_| !self.measured.slips.is_empty());
                 (start_up_end.unwrap_or(settled), self.sliding())
             }
             None => (self.span.start_up_end?, self.span.last_slip_end),
@@ -154,24 +140,24 @@ impl SlipObserver {
             time,
             friction: (end.impulse - start.impulse) / time,
             attached_fraction: (end.attached_time - start.attached_time)
-                / (time * self.criteria.contacts as f64),
+                / (time * self.contacts as f64),
             slip_share: (end.slipping - start.slipping) / time,
         })
     }
 
     /// Time since the last onset, in s, of a job that gives up: what its interval is at least.
-    pub fn running_interval(&self) -> Option<f64> {
-        let last = self.last_onset.filter(|_| self.has_given_up)?;
+    fn running_interval(&self) -> Option<f64> {
+        let last = self.last_onset.filter(|_| self.measured.has_given_up)?;
         Some(self.now.time - last)
     }
 
     /// Whether the last slip that was asked for is recorded.
     fn is_complete(&self) -> bool {
-        let Some(last) = self.slips.last() else {
+        let Some(last) = self.measured.slips.last() else {
             return false;
         };
         let Recording { slips, time, .. } = self.recording;
-        slips.is_some_and(|slips| self.slips.len() as u64 >= slips)
+        slips.is_some_and(|slips| self.measured.slips.len() as u64 >= slips)
             || time.is_some_and(|time| last.onset >= time)
     }
 
@@ -217,21 +203,14 @@ impl SlipObserver {
     /// Ends the rupture if no break has come in the wave crossing time before a time in s.
     #[inline(always)]
     fn finish_rupture_before(&mut self, time: f64) {
-        let crossing_time = self.criteria.crossing_time;
-        let is_over = |rupture: &Rupture| time - rupture.last.time > crossing_time;
-        if self.rupture.as_ref().is_some_and(is_over) {
-            self.finish_rupture();
-        }
-    }
-
-    fn finish_rupture(&mut self) {
-        let Some(rupture) = self.rupture.take() else {
+        let is_over = |rupture: &mut Rupture| time - rupture.last.time > self.crossing_time;
+        let Some(rupture) = self.rupture.take_if(is_over) else {
             return;
         };
-        self.ruptures += 1;
-        if rupture.is_slip(self.criteria.contacts) {
+        self.measured.ruptures += 1;
+        if rupture.is_slip(self.contacts) {
             self.record_slip(&rupture);
-        } else if self.criteria.is_recorded(&rupture) {
+        } else if rupture.size >= self.precursor_size {
             self.record_precursor(&rupture);
         }
     }
@@ -242,12 +221,11 @@ impl SlipObserver {
         let first = rupture.first;
         let last = rupture.last;
         let discard = self.recording.discard;
-        self.drive_at.slip_onset.advance_to(onset.time);
         if self.slips_seen >= discard {
             let slip = self.slip(rupture, onset);
-            self.slips.push(slip);
+            self.measured.slips.push(slip);
         } else {
-            self.start_up.push(onset.time);
+            self.measured.start_up.push(onset.time);
         }
         if self.drops.is_some() {
             self.breaks_of_slips.push((first.time, last.time));
@@ -261,6 +239,7 @@ impl SlipObserver {
             self.span.start_up_end = Some(end);
         }
         self.span.last_slip_end = end;
+        self.drive.advance_to(last.time);
         self.span.settled = None;
         self.last_onset = Some(onset.time);
         self.peaks_since.slip = self.peaks_since.last_break;
@@ -269,17 +248,17 @@ impl SlipObserver {
     }
 
     /// The row of a slip; drops are found at the end.
-    fn slip(&mut self, rupture: &Rupture, onset: Peak) -> Slip {
+    fn slip(&self, rupture: &Rupture, onset: Peak) -> Slip {
         let first = rupture.first;
         let last = rupture.last;
         let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
-        let drive = &self.drive_at.slip_onset;
-        let modulation = Modulation::of(drive);
+        let drive = self.drive_at(onset.time);
+        let modulation = Modulation::of(&drive);
         let interval = self.last_onset.map(|last| onset.time - last);
         let spent = self.span.last_slip_end.spent;
         let has_energies = self.recording.energies;
         let energies = has_energies.then(|| Energies::between(spent, last.spent));
-        let contacts = self.criteria.contacts as f64;
+        let contacts = self.contacts as f64;
         let since_cycle = onset.time - drive.cycle_start;
         Slip {
             number: self.slips_seen - self.recording.discard,
@@ -310,10 +289,17 @@ impl SlipObserver {
         }
     }
 
-    /// Displacement of the driven edge at a break of the last slip, from the force and the drive, in m.
-    fn edge_displacement(&mut self, at: Instant) -> f64 {
-        self.drive_at.slip_break.advance_to(at.time);
-        self.drive_at.slip_break.motion(at.time).0 - at.force / self.drive_at.slip_break.stiffness
+    /// The drive in its cycle at a time in s since the last slip's end.
+    fn drive_at(&self, time: f64) -> Drive {
+        let mut drive = self.drive;
+        drive.advance_to(time);
+        drive
+    }
+
+    /// Displacement of the driven edge at an instant since the last slip's end, from the force and the drive, in m.
+    fn edge_displacement(&self, at: Instant) -> f64 {
+        let drive = self.drive_at(at.time);
+        drive.motion(at.time).0 - at.force / drive.stiffness
     }
 
     fn record_precursor(&mut self, rupture: &Rupture) {
@@ -321,13 +307,12 @@ impl SlipObserver {
         let last = rupture.last;
         let onset = rupture.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
-            self.drive_at.precursor_onset.advance_to(onset);
-            self.precursors.push(Precursor {
+            self.measured.precursors.push(Precursor {
                 slip: self.slips_seen - self.recording.discard,
                 precursor: self.pending.count,
                 onset,
                 interval: self.pending.last_onset.map(|last| onset - last),
-                modulation: Modulation::of(&self.drive_at.precursor_onset),
+                modulation: Modulation::of(&self.drive_at(onset)),
                 nucleation: first.time,
                 nucleation_block: rupture.first_block as u64 + 1,
                 duration: last.time - first.time,
@@ -357,10 +342,10 @@ impl Observer for SlipObserver {
     fn advance(&mut self, segment: &Segment<'_>) {
         // Each stretch contains the later ones, so a force that raises none of these peaks raises no other. The peak
         // since the last break counts only once its rupture ends, and if that is recorded.
-        let recordable = self
-            .rupture
-            .as_ref()
-            .is_some_and(|rupture| self.criteria.is_recorded(rupture));
+        let is_recorded = |rupture: &Rupture| {
+            rupture.size >= self.precursor_size || rupture.is_slip(self.contacts)
+        };
+        let recordable = self.rupture.as_ref().is_some_and(is_recorded);
         let floor = if recordable {
             self.peaks_since.last_break.force
         } else {
@@ -389,10 +374,10 @@ impl Observer for SlipObserver {
         };
         self.finish_rupture_before(self.now.time);
         let since_slip = self.now.time - self.span.last_slip_end.time;
-        if self.span.settled.is_none() && since_slip >= 0.5 * self.criteria.give_up_time {
+        if self.span.settled.is_none() && since_slip >= 0.5 * self.give_up_time {
             self.span.settled = Some(self.sliding());
         }
-        self.has_given_up = since_slip >= self.criteria.give_up_time;
+        self.measured.has_given_up = since_slip >= self.give_up_time;
     }
 
     fn contact(&mut self, event: &ContactEvent) {
@@ -414,6 +399,6 @@ impl Observer for SlipObserver {
     }
 
     fn is_satisfied(&self) -> bool {
-        self.is_complete() || self.has_given_up
+        self.is_complete() || self.measured.has_given_up
     }
 }

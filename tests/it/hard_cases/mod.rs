@@ -183,7 +183,7 @@ fn where_a_cycle_gains_less_than_the_tolerance_onsets_are_right_to_a_few_cycles(
             ..Recording::default()
         };
         let mut observer = SlipObserver::new(&parameters, &recording);
-        simulate(
+        let summary = simulate(
             &parameters,
             solver,
             Limits {
@@ -195,8 +195,8 @@ fn where_a_cycle_gains_less_than_the_tolerance_onsets_are_right_to_a_few_cycles(
         )
         .unwrap();
         observer
-            .into_rows()
-            .0
+            .into_measurements(summary)
+            .slips
             .iter()
             .map(|slip| slip.onset)
             .collect()
@@ -255,7 +255,7 @@ fn no_leap_hides_an_onset_that_is_larger_than_what_comes_before_later_contacts_b
             events: 1_000_000,
             interrupt: None,
         };
-        simulate(
+        let summary = simulate(
             &parameters,
             Solver {
                 resolve,
@@ -265,7 +265,7 @@ fn no_leap_hides_an_onset_that_is_larger_than_what_comes_before_later_contacts_b
             &mut observer,
         )
         .unwrap();
-        let slips = observer.into_rows().0;
+        let slips = observer.into_measurements(summary).slips;
         let slip = slips
             .iter()
             .find(|slip| (slip.nucleation - 13.7825).abs() < 1e-3)

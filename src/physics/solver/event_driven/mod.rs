@@ -579,7 +579,7 @@ mod tests {
                 }
                 .integrate(&mut observer)
                 .unwrap();
-                (summary, observer.into_rows().0)
+                (summary, observer.into_measurements(summary).slips)
             };
             let ((leaping, leapt), (stepping, stepped)) = (slips(0.0), slips(f64::INFINITY));
             assert!(
