@@ -48,6 +48,7 @@ enum Ended {
     },
     Part {
         whole: OpenPart,
+        begin: Instant,
         /// An error of the outer kind is a panic.
         files: std::thread::Result<Result<PartFiles, ResultsError>>,
     },
@@ -181,9 +182,14 @@ impl Collector<'_, '_> {
                     let ended = match task {
                         Task::Run(job) => run_job(job, kernel, interrupt, under_way),
                         Task::Encode(whole, kept) => {
+                            let begin = Instant::now();
                             let encode = || encode(results, &whole, &kept);
                             let files = catch_unwind(AssertUnwindSafe(encode));
-                            Ended::Part { whole, files }
+                            Ended::Part {
+                                whole,
+                                begin,
+                                files,
+                            }
                         }
                     };
                     // Without a receiver the run has ended.
@@ -204,9 +210,10 @@ impl Collector<'_, '_> {
     fn spill(&mut self) -> Result<(), ResultsError> {
         let results = self.pending.results;
         for open in std::mem::take(&mut self.open).values() {
+            let begin = Instant::now();
             let kept = self.kept(&open.of)?;
             if open.of.again {
-                self.commit(open, &encode(results, open, &kept)?)?;
+                self.commit(open, begin, &encode(results, open, &kept)?)?;
             } else {
                 let layout = results.layout();
                 let files =
@@ -223,11 +230,10 @@ impl Collector<'_, '_> {
     /// The rows that a part has already.
     fn kept(&self, of: &Taken) -> Result<Kept, ResultsError> {
         let layout = self.pending.results.layout();
-        let spill = (!of.spilled.is_empty()).then(|| layout.spill());
-        let place = if of.again {
-            Some(layout.tables())
-        } else {
-            spill
+        let place = match (of.again, of.spilled.is_empty()) {
+            (true, _) => Some(layout.tables()),
+            (false, false) => Some(layout.spill()),
+            (false, true) => None,
         };
         self.pending.results.kept(&of.part, place.as_deref())
     }
@@ -281,10 +287,14 @@ impl Collector<'_, '_> {
                         self.take(&job, outcome, time, &mut out, &hand_out)?;
                     }
                 }
-                Some(Ended::Part { whole, files }) => {
+                Some(Ended::Part {
+                    whole,
+                    begin,
+                    files,
+                }) => {
                     out.parts -= 1;
                     let files = files.unwrap_or_else(|panic| resume_unwind(panic))?;
-                    self.commit(&whole, &files)?;
+                    self.commit(&whole, begin, &files)?;
                 }
             }
         }
@@ -401,8 +411,13 @@ impl Collector<'_, '_> {
         Ok(())
     }
 
-    fn commit(&mut self, whole: &OpenPart, files: &PartFiles) -> Result<(), ResultsError> {
-        let begin = Instant::now();
+    /// Commits a part whose files began to be encoded then.
+    fn commit(
+        &mut self,
+        whole: &OpenPart,
+        begin: Instant,
+        files: &PartFiles,
+    ) -> Result<(), ResultsError> {
         let Taken { part, spilled, .. } = &*whole.of;
         let results = self.pending.results;
         results.put(self.joined.member, files, &results.layout().tables())?;

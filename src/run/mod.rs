@@ -2,10 +2,11 @@
 //!
 //! ```text
 //! take.rs     outlines of missing parts, claimed -> their jobs while there is time (limits.rs)
-//! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
+//! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> rayon -> their files -> Results::put, and events for
+//!             the log and a display
 //! ```
 //!
-//! Only the kernel runs on other threads than the calling one. A killed run resumes by looking which part files are
+//! Other threads than the calling one use no disk. A killed run resumes by looking which part files are
 //! missing. The same command, started several times, shares the parts. An adaptive sweep runs in rounds: the worker
 //! that first finds all parts done adds those of the next round (`rounds/`), and no worker ends before the last round.
 //! Contract: the bytes of the tables depend on neither threads nor workers nor interruptions. Memory: the parts with a
