@@ -42,11 +42,10 @@ impl Controls {
         if controls.is_empty() {
             return Ok(Self::default());
         }
-        for batch in slips.rows::<(JobOfSlip, Onset)>() {
-            for (job, onset) in batch? {
-                if let Some(set) = controls.get_mut(&job.set_id) {
-                    set.entry(job.seed).or_default().push(onset);
-                }
+        for row in slips.rows::<(JobOfSlip, Onset)>() {
+            let (job, onset) = row?;
+            if let Some(set) = controls.get_mut(&job.set_id) {
+                set.entry(job.seed).or_default().push(onset);
             }
         }
         Ok(Self(controls))

@@ -120,30 +120,29 @@ impl<'a> Gathering<'a> {
         // The job of the last slip, and its set if the job is wanted.
         let mut last = None;
         let mut found = None;
-        for batch in self.slips.clone().rows::<(JobOfSlip, Slip)>() {
-            for (job, slip) in batch? {
-                let here = place;
-                place += 1;
-                if last.as_ref() != Some(&job) {
-                    let is_wanted = |&index: &usize| {
-                        (self.is_wanted)(&Parameters {
-                            seed: job.seed,
-                            ..sets[index].jobs.parameters.clone()
-                        })
-                    };
-                    found = index.get(&job.set_id).copied().filter(is_wanted);
-                    last = Some(job);
-                }
-                let (Some(index), Some(job)) = (found, &last) else {
-                    continue;
+        for row in self.slips.clone().rows::<(JobOfSlip, Slip)>() {
+            let (job, slip) = row?;
+            let here = place;
+            place += 1;
+            if last.as_ref() != Some(&job) {
+                let is_wanted = |&index: &usize| {
+                    (self.is_wanted)(&Parameters {
+                        seed: job.seed,
+                        ..sets[index].jobs.parameters.clone()
+                    })
                 };
-                let set = &mut sets[index];
-                if here % spacing == 0 {
-                    let point = Point::of(&set.jobs.parameters, &slip);
-                    set.points.push((here, point));
-                }
-                set.slips.push(job.seed, &slip);
+                found = index.get(&job.set_id).copied().filter(is_wanted);
+                last = Some(job);
             }
+            let (Some(index), Some(job)) = (found, &last) else {
+                continue;
+            };
+            let set = &mut sets[index];
+            if here % spacing == 0 {
+                let point = Point::of(&set.jobs.parameters, &slip);
+                set.points.push((here, point));
+            }
+            set.slips.push(job.seed, &slip);
         }
         Ok(sets)
     }
@@ -176,11 +175,10 @@ pub(super) fn each_job(
     is_wanted: Wanted<'_>,
     mut job: impl FnMut(JobOfSet, Parameters),
 ) -> Result<(), ResultsError> {
-    for batch in files.clone().rows::<(JobOfSet, Selected<All>)>() {
-        for (of_set, Selected { parameters, .. }) in batch? {
-            if is_wanted(&parameters) {
-                job(of_set, parameters);
-            }
+    for row in files.clone().rows::<(JobOfSet, Selected<All>)>() {
+        let (of_set, Selected { parameters, .. }) = row?;
+        if is_wanted(&parameters) {
+            job(of_set, parameters);
         }
     }
     Ok(())

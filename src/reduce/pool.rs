@@ -54,14 +54,13 @@ impl Pool {
                 );
             },
         )?;
-        for batch in slips.clone().rows::<(JobOfSlip, Slip)>() {
-            for (job, slip) in batch? {
-                if let Some((_, set)) = sets.get_mut(&job.set_id) {
-                    set.get_mut(&job.seed)
-                        .expect("slips of a job")
-                        .slips
-                        .push(slip);
-                }
+        for row in slips.clone().rows::<(JobOfSlip, Slip)>() {
+            let (job, slip) = row?;
+            if let Some((_, set)) = sets.get_mut(&job.set_id) {
+                set.get_mut(&job.seed)
+                    .expect("slips of a job")
+                    .slips
+                    .push(slip);
             }
         }
         let controls = Controls::read(slips, plan, sets.values().map(|(set, _)| set))?;

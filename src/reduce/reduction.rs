@@ -387,9 +387,7 @@ pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
 /// The rows of a reduced table, such as [`Point`].
 pub fn read_reduced<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
     let file = layout.reduced_file(R::NAME);
-    let batches = Dataset::new(layout.storage, vec![file]).rows();
-    let batches: Vec<Vec<R>> = batches.collect::<Result<_, _>>()?;
-    Ok(batches.into_iter().flatten().collect())
+    Dataset::new(layout.storage, vec![file]).rows().collect()
 }
 
 /// The rows of the reduced sets, controls left out, in order.
@@ -397,11 +395,7 @@ pub fn read_sets<'a>(
     layout: &Layout<'a>,
 ) -> impl Iterator<Item = Result<SetRow, ResultsError>> + use<'a> {
     let file = layout.reduced_file(SetRow::NAME);
-    let batches = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
-    let rows = batches.flat_map(|batch| match batch {
-        Ok(rows) => rows.into_iter().map(Ok).collect(),
-        Err(error) => vec![Err(error)],
-    });
+    let rows = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
     rows.filter(|row| !matches!(row, Ok(row) if row.is_control))
 }
 

@@ -233,11 +233,10 @@ pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, Resu
         least: 0,
         may_exceed: false,
     };
-    for batch in jobs.rows::<RowsOfJob>() {
-        for RowCount { least, may_exceed } in batch?.iter().map(|job| job.count(table)) {
-            all.least = all.least.saturating_add(least);
-            all.may_exceed |= may_exceed;
-        }
+    for job in jobs.rows::<RowsOfJob>() {
+        let RowCount { least, may_exceed } = job?.count(table);
+        all.least = all.least.saturating_add(least);
+        all.may_exceed |= may_exceed;
     }
     Ok(all)
 }

@@ -310,17 +310,16 @@ impl Results<'_> {
         let mut again = BTreeMap::new();
         let mut rows = 0;
         let jobs = self.dataset_of(tables::JOBS, part.name);
-        for batch in jobs.rows::<OutcomeRow>() {
-            for row in batch? {
-                let is_cut_off = row.simulated_time.is_some_and(is_cut_off);
-                let why = match row.outcome {
-                    JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
-                    JobOutcome::TimeLimit if is_cut_off => Some(Again::CutOff),
-                    _ => None,
-                };
-                again.extend(why.map(|why| (rows, why)));
-                rows += 1;
-            }
+        for row in jobs.rows::<OutcomeRow>() {
+            let row = row?;
+            let is_cut_off = row.simulated_time.is_some_and(is_cut_off);
+            let why = match row.outcome {
+                JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
+                JobOutcome::TimeLimit if is_cut_off => Some(Again::CutOff),
+                _ => None,
+            };
+            again.extend(why.map(|why| (rows, why)));
+            rows += 1;
         }
         if rows != part.job_count {
             let file = self.part_file(tables::JOBS, part);
@@ -347,9 +346,9 @@ impl Results<'_> {
     ) -> Result<Option<Result<HashSet<String>, Lost>>, ResultsError> {
         let file = self.file_in(&self.layout().spill(), table, outline.name);
         let mut ids = HashSet::new();
-        for batch in Dataset::of(self.layout().storage, vec![file]).rows::<RowOfJob>() {
-            match batch {
-                Ok(rows) => ids.extend(rows.into_iter().map(|row| row.job_id)),
+        for row in Dataset::of(self.layout().storage, vec![file]).rows() {
+            match row {
+                Ok(RowOfJob { job_id }) => _ = ids.insert(job_id),
                 Err(error) if error.kind == ErrorKind::Damaged => return Ok(Some(Err(Lost))),
                 Err(error) if error.kind == ErrorKind::Disk(io::ErrorKind::NotFound) => {
                     // Another worker that has just committed the part has removed the file.

@@ -251,11 +251,8 @@ fn damage_of(
 fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
     let path = results.part_file(tables::JOBS, part);
     let damaged = |problem: String| Err(ResultsError::damaged(&path, problem));
-    let mut jobs: Vec<RowsOfJob> = Vec::new();
-    let dataset = results.dataset_of(tables::JOBS, part.name);
-    for batch in dataset.rows() {
-        jobs.extend(batch?);
-    }
+    let jobs = results.dataset_of(tables::JOBS, part.name).rows();
+    let jobs: Vec<RowsOfJob> = jobs.collect::<Result<_, _>>()?;
     for (expected, job) in ids(results, part).zip(&jobs) {
         if job.job_id != expected {
             let found = &job.job_id;
@@ -281,18 +278,16 @@ fn check_counts(
     let path = results.part_file(table, part);
     let mut counts = vec![0; jobs.len()];
     let mut at = 0;
-    let dataset = results.dataset_of(table, part.name);
-    for batch in dataset.rows::<RowOfJob>() {
-        for RowOfJob { job_id } in batch? {
-            // Rows stand in the order of the jobs.
-            let passed = jobs[at..].iter().take_while(|job| job.job_id != job_id);
-            at += passed.count();
-            let Some(count) = counts.get_mut(at) else {
-                let problem = format!("it has rows of job {job_id}, which its part does not have");
-                return Err(ResultsError::damaged(&path, problem));
-            };
-            *count += 1;
-        }
+    for row in results.dataset_of(table, part.name).rows() {
+        let RowOfJob { job_id } = row?;
+        // Rows stand in the order of the jobs.
+        let passed = jobs[at..].iter().take_while(|job| job.job_id != job_id);
+        at += passed.count();
+        let Some(count) = counts.get_mut(at) else {
+            let problem = format!("it has rows of job {job_id}, which its part does not have");
+            return Err(ResultsError::damaged(&path, problem));
+        };
+        *count += 1;
     }
     for (job, rows) in jobs.iter().zip(counts) {
         let problem =

@@ -303,9 +303,15 @@ impl<'a> Dataset<'a> {
         self.read(Vec::new())
     }
 
-    /// The same, as rows of one type.
-    pub fn rows<R: Row>(self) -> impl Iterator<Item = Result<Vec<R>, ResultsError>> + use<'a, R> {
-        self.read(R::names()).map(|batch| batch?.rows_of())
+    /// The same, row by row.
+    pub fn rows<R: Row>(self) -> impl Iterator<Item = Result<R, ResultsError>> + use<'a, R> {
+        self.read(R::names()).flat_map(|batch| {
+            let (rows, error) = match batch.and_then(|batch| batch.rows_of()) {
+                Ok(rows) => (rows, None),
+                Err(error) => (Vec::new(), Some(Err(error))),
+            };
+            rows.into_iter().map(Ok).chain(error)
+        })
     }
 
     /// The same, of the columns with these names alone, of which there is at least one; in the order of the file.
@@ -440,11 +446,8 @@ mod tests {
         assert_eq!(numbers(folder.path()).unwrap(), (0..9).collect::<Vec<_>>());
         let rows = dataset(folder.path())
             .rows()
-            .collect::<Result<Vec<Vec<Number>>, _>>();
-        assert_eq!(
-            rows.unwrap().concat(),
-            (0..9).map(Number::of).collect::<Vec<_>>()
-        );
+            .collect::<Result<Vec<Number>, _>>();
+        assert_eq!(rows.unwrap(), (0..9).map(Number::of).collect::<Vec<_>>());
     }
 
     #[test]
