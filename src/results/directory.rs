@@ -16,6 +16,7 @@ use std::io;
 use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
+use tempfile::TempDir;
 
 /// A results directory: where it lies, and which sweeps it belongs to. Finished parts are looked up each time.
 #[derive(Clone, Debug)]
@@ -368,8 +369,8 @@ impl<'a> Results<'a> {
         Ok(commit.publish()?)
     }
 
-    /// The same with reduced data in another folder, which is there.
-    pub fn reduced_to(&self, elsewhere: &Path) -> Self {
+    /// The same with reduced data in another folder, which is there as long as this.
+    pub fn reduced_to(&self, elsewhere: TempDir) -> Self {
         Self {
             layout: self.layout.reduced_to(elsewhere),
             ..self.clone()

@@ -14,7 +14,9 @@ use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
@@ -29,7 +31,7 @@ pub struct Layout<'a> {
     pub storage: &'a dyn Storage,
     root: PathBuf,
     /// Where reduced data lie, if not in the directory.
-    elsewhere: Option<PathBuf>,
+    elsewhere: Option<Arc<TempDir>>,
 }
 
 impl fmt::Debug for Layout<'_> {
@@ -49,16 +51,17 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The same with reduced data in another folder, which is there.
-    pub fn reduced_to(&self, elsewhere: &Path) -> Self {
+    /// The same with reduced data in another folder, which is there as long as this.
+    pub fn reduced_to(&self, elsewhere: TempDir) -> Self {
         Self {
-            elsewhere: Some(elsewhere.to_owned()),
+            elsewhere: Some(Arc::new(elsewhere)),
             ..self.clone()
         }
     }
 
     fn reduced_root(&self) -> &Path {
-        self.elsewhere.as_deref().unwrap_or(&self.root)
+        let elsewhere = self.elsewhere.as_ref().map(|folder| folder.path());
+        elsewhere.unwrap_or(&self.root)
     }
 
     /// The directory of a sweep, unless another is chosen.
