@@ -305,7 +305,7 @@ impl<'a> Results<'a> {
     pub(super) fn file_in(&self, place: &Path, table: &str, part: PartName) -> DataFile {
         DataFile {
             path: place.join(table).join(part.file()),
-            rows: None,
+            rows: 0..=u64::MAX,
             footer: Arc::clone(&self.footers[part.extension]),
         }
     }

@@ -16,11 +16,11 @@ use crate::sweep::{Outline, Part, PartName};
 use crate::table::Table;
 use crate::table::columns::columns;
 use crate::table::error::ResultsError;
-use crate::table::file::{Batch, Dataset, Footer, RowCount, TableWriter};
+use crate::table::file::{Batch, Dataset, Footer, TableWriter};
 use crate::table::storage::StorageError;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::PathBuf;
 
 /// What a job of a part ended with: its measurements, or why it failed.
@@ -45,7 +45,7 @@ impl<'a> Results<'a> {
                 let problem = "it is missing, though the jobs of its part are there";
                 return Err(ResultsError::damaged(&file.path, problem));
             }
-            file.rows = Some(row_count(self.dataset_of(tables::JOBS, part), table)?);
+            file.rows = row_count(self.dataset_of(tables::JOBS, part), table)?;
             files.push(file);
         }
         Ok(Dataset::of(self.layout().storage, files))
@@ -212,33 +212,35 @@ columns! {
 }
 
 impl RowsOfJob {
-    /// How many rows the job has in a table. A job that may run again may have more, which a killed run wrote.
-    pub(super) fn count(&self, table: &str) -> RowCount {
+    /// The fewest and the most rows of the job in a table. One that may run again may have more, which a killed run
+    /// wrote.
+    pub(super) fn count(&self, table: &str) -> RangeInclusive<u64> {
         let rows = if table == tables::SLIPS {
             self.slips
         } else {
             self.precursors
         };
-        let may_exceed = matches!(self.outcome, JobOutcome::Failed | JobOutcome::TimeLimit);
-        RowCount {
-            least: rows.unwrap_or(0),
-            may_exceed,
+        let least = rows.unwrap_or(0);
+        match self.outcome {
+            JobOutcome::Failed | JobOutcome::TimeLimit => least..=u64::MAX,
+            JobOutcome::Done | JobOutcome::NoSlips => least..=least,
         }
     }
 }
 
-/// How many rows the jobs of a part have in a table, as its jobs file says.
-pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, ResultsError> {
-    let mut all = RowCount {
-        least: 0,
-        may_exceed: false,
-    };
+/// The fewest and the most rows of the jobs of a part in a table, as its jobs file says.
+pub(super) fn row_count(
+    jobs: Dataset<'_>,
+    table: &str,
+) -> Result<RangeInclusive<u64>, ResultsError> {
+    let mut least = 0_u64;
+    let mut most = 0_u64;
     for job in jobs.rows::<RowsOfJob>() {
-        let RowCount { least, may_exceed } = job?.count(table);
-        all.least = all.least.saturating_add(least);
-        all.may_exceed |= may_exceed;
+        let of_job = job?.count(table);
+        least = least.saturating_add(*of_job.start());
+        most = most.saturating_add(*of_job.end());
     }
-    Ok(all)
+    Ok(least..=most)
 }
 
 /// The rows of a file by job.

@@ -12,7 +12,7 @@ use crate::results::pending::{Pending, Retry};
 use crate::results::tables::{self, RowOfJob};
 use crate::sweep::{Outline, Part, PartName};
 use crate::table::error::ResultsError;
-use crate::table::file::{DataFile, Footer};
+use crate::table::file::{DataFile, Footer, check_count};
 use crate::table::shown::{serialize_path, shown};
 use crate::table::storage::StorageError;
 use serde::Serialize;
@@ -292,7 +292,7 @@ fn check_counts(
     for (job, rows) in jobs.iter().zip(counts) {
         let problem =
             |problem| ResultsError::damaged(&path, format!("of job {} {problem}", job.job_id));
-        job.count(table).check(rows).map_err(problem)?;
+        check_count(rows, &job.count(table)).map_err(problem)?;
     }
     Ok(())
 }
