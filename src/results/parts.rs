@@ -8,8 +8,7 @@ use crate::observe::Measurements;
 use crate::results::commit::Commit;
 use crate::results::directory::Results;
 use crate::results::tables::{
-    self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
-    label, relabel,
+    self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, RowOfJob, label, relabel,
 };
 use crate::results::workers::Member;
 use crate::sweep::{Outline, Part, PartName};
@@ -135,43 +134,32 @@ impl<'a> Results<'a> {
         };
         let jobs: Jobs<'_> = positions.map(job).collect();
         let mut commit = member.commit();
-        self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
-            let mut slips = outcome.iter().flat_map(|measured| &measured.slips);
-            slips.try_for_each(|slip| writer.push(&(Cow::Borrowed(job), Cow::Borrowed(slip))))
+        self.stage(&mut commit, part, places, &jobs, |job, outcome| {
+            let slips = outcome.iter().flat_map(|measured| &measured.slips);
+            slips.map(move |slip| (Cow::Borrowed(job), Cow::Borrowed(slip)))
         })?;
         if sweep.recording().precursors {
-            self.stage::<PrecursorRow<'_>>(
-                &mut commit,
-                part,
-                places,
-                &jobs,
-                |writer, job, outcome| {
-                    let mut precursors = outcome.iter().flat_map(|measured| &measured.precursors);
-                    precursors.try_for_each(|precursor| {
-                        writer.push(&(Cow::Borrowed(job), Cow::Borrowed(precursor)))
-                    })
-                },
-            )?;
+            self.stage(&mut commit, part, places, &jobs, |job, outcome| {
+                let precursors = outcome.iter().flat_map(|measured| &measured.precursors);
+                precursors.map(move |precursor| (Cow::Borrowed(job), Cow::Borrowed(precursor)))
+            })?;
         }
-        self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
+        self.stage(&mut commit, part, places, &jobs, |job, outcome| {
             let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
-            writer.push(&(relabel(job), record))
+            let row: JobRow = (relabel(job), record);
+            [row]
         })?;
         self.publish(commit)
     }
 
     /// Writes a part's file of one table: new rows of jobs with an outcome, the old ones of the others.
-    fn stage<'j, R: Table>(
+    fn stage<'j, R: Table, Rows: IntoIterator<Item = R>>(
         &self,
         commit: &mut Commit<'_>,
         part: &Part,
         (from, to): (Option<&PathBuf>, &PathBuf),
         jobs: &'j Jobs<'_>,
-        write: impl Fn(
-            &mut TableWriter<R>,
-            &'j JobLabel<DriveAndSeed>,
-            &'j Outcome,
-        ) -> Result<(), ResultsError>,
+        rows: impl Fn(&'j JobLabel<DriveAndSeed>, &'j Outcome) -> Rows,
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
         let file = |place: &PathBuf| self.file_in(place, R::NAME, part.name);
@@ -190,7 +178,10 @@ impl<'a> Results<'a> {
         let mut writer = TableWriter::new(&left_out, commit.stage(&target.path)?, &footer)?;
         for (job, outcome) in jobs {
             match outcome {
-                Some(outcome) => write(&mut writer, job, outcome)?,
+                Some(outcome) => {
+                    let mut rows = rows(job, outcome).into_iter();
+                    rows.try_for_each(|row| writer.push(&row))?;
+                }
                 None => kept.copy(&mut writer, &job.0.job_id)?,
             }
         }
