@@ -180,8 +180,8 @@ impl<'a> Pending<'a> {
         let mut ids = HashSet::new();
         for table in self.results.tables() {
             match settled(|| self.results.spilled_ids(outline, table))? {
-                Some(Ok(of_table)) => ids = of_table,
-                Some(Err(Lost)) | None => return Ok(BTreeSet::new()),
+                Some(Some(of_table)) => ids = of_table,
+                _ => return Ok(BTreeSet::new()),
             }
         }
         let part = self.part(outline);
@@ -290,9 +290,6 @@ columns! {
     }
 }
 
-/// A file of the spill is damaged or gone.
-struct Lost;
-
 impl Results<'_> {
     /// How far all parts are. Of a directory of another version, whose parts were others, nothing counts as missing.
     pub fn overview(&self) -> Result<Overview, ResultsError> {
@@ -338,26 +335,26 @@ impl Results<'_> {
         Ok(self.layout().parts_in(&self.layout().spill().join(table))?)
     }
 
-    /// The ids in a file of the spill; `None` if this host does not see it yet.
+    /// The ids in a file of the spill, or none if it is damaged or gone; `None` if this host does not see it yet.
     fn spilled_ids(
         &self,
         outline: &Outline,
         table: &str,
-    ) -> Result<Option<Result<HashSet<String>, Lost>>, ResultsError> {
+    ) -> Result<Option<Option<HashSet<String>>>, ResultsError> {
         let file = self.file_in(&self.layout().spill(), table, outline.name);
         let mut ids = HashSet::new();
         for row in Dataset::of(self.layout().storage, vec![file]).rows() {
             match row {
                 Ok(RowOfJob { job_id }) => _ = ids.insert(job_id),
-                Err(error) if error.kind == ErrorKind::Damaged => return Ok(Some(Err(Lost))),
+                Err(error) if error.kind == ErrorKind::Damaged => return Ok(Some(None)),
                 Err(error) if error.kind == ErrorKind::Disk(io::ErrorKind::NotFound) => {
                     // Another worker that has just committed the part has removed the file.
                     let is_listed = self.spilled_parts(table)?.contains(&outline.name);
-                    return Ok((!is_listed).then_some(Err(Lost)));
+                    return Ok((!is_listed).then_some(None));
                 }
                 Err(error) => return Err(error),
             }
         }
-        Ok(Some(Ok(ids)))
+        Ok(Some(Some(ids)))
     }
 }

@@ -88,13 +88,29 @@ impl<'a> Results<'a> {
     }
 }
 
+/// Moves a file, if it is there, to the quarantine, under a name that is free.
 fn move_away(layout: &Layout<'_>, path: &Path) -> Result<(), StorageError> {
+    let storage = layout.storage;
+    if !storage.exists(path)? {
+        return Ok(());
+    }
     let places = [layout.tables(), layout.run(), layout.root().to_owned()];
     let below = places
         .iter()
         .find_map(|folder| path.strip_prefix(folder).ok());
     let target = layout.quarantine().join(below.unwrap_or(path));
-    layout.storage.move_away(path, &target)
+    let folder = target.parent().unwrap_or(&target);
+    storage.ensure_folder(folder)?;
+    let mut free = target.clone();
+    let mut number = 0;
+    while storage.exists(&free)? {
+        number += 1;
+        free = target.with_added_extension(number.to_string());
+    }
+    storage.rename(path, &free)?;
+    let folders = [Some(folder), path.parent()];
+    let mut folders = folders.into_iter().flatten();
+    folders.try_for_each(|folder| storage.sync_folder(folder))
 }
 
 fn examine<'a>(layout: &Layout<'a>) -> Result<(Results<'a>, Verification), ResultsError> {

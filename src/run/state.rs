@@ -213,11 +213,8 @@ impl Tally {
                 jobs,
                 predicted_cost,
                 ..
-            } => {
-                self.jobs += jobs;
-                self.predicted += predicted_cost;
             }
-            RunEvent::RoundBegun {
+            | RunEvent::RoundBegun {
                 jobs,
                 predicted_cost,
                 ..

@@ -10,10 +10,8 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::SystemTime;
 
-/// How often to look whether a lock is free.
-const LOCK_POLL: Duration = Duration::from_millis(if cfg!(test) { 1 } else { 20 });
 /// Most bytes of a file that is read as a whole: more than a part can have whose jobs fit in memory.
 pub const MAX_WHOLE: u64 = 1 << 32;
 
@@ -143,38 +141,6 @@ pub trait Storage: Sync {
         self.ensure_folder_below(top, parent)?;
         self.create_folder(folder)?;
         self.sync_folder(parent)
-    }
-
-    /// Moves a file, if it is there, under a name that is free.
-    fn move_away(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
-        if !self.exists(from)? {
-            return Ok(());
-        }
-        if let Some(folder) = to.parent() {
-            self.ensure_folder(folder)?;
-        }
-        let mut free = to.to_owned();
-        let mut number = 0;
-        while self.exists(&free)? {
-            number += 1;
-            free = to.with_added_extension(number.to_string());
-        }
-        self.rename(from, &free)?;
-        let folders = [free.parent(), from.parent()];
-        let mut folders = folders.into_iter().flatten();
-        folders.try_for_each(|folder| self.sync_folder(folder))
-    }
-
-    /// Tries for a lock until it is free or the time is over.
-    fn wait_for_lock(&self, file: &Path, max_wait: Duration) -> Result<Lock, StorageError> {
-        let begin = Instant::now();
-        loop {
-            let lock = self.lock(file)?;
-            if !matches!(lock, Lock::Taken) || begin.elapsed() >= max_wait {
-                return Ok(lock);
-            }
-            std::thread::sleep(LOCK_POLL);
-        }
     }
 }
 
