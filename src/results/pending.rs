@@ -179,9 +179,10 @@ impl<'a> Pending<'a> {
         }
         let mut ids = HashSet::new();
         for table in self.results.tables() {
-            match settled(|| self.results.spilled_ids(outline, table))? {
-                Some(Some(of_table)) => ids = of_table,
-                _ => return Ok(BTreeSet::new()),
+            match settled(|| self.results.spilled_ids(outline, table)) {
+                Ok(Some(of_table)) => ids = of_table,
+                Ok(None) => return Ok(BTreeSet::new()),
+                Err(error) => return error.damage().map(|_| BTreeSet::new()),
             }
         }
         let part = self.part(outline);
@@ -335,26 +336,24 @@ impl Results<'_> {
         Ok(self.layout().parts_in(&self.layout().spill().join(table))?)
     }
 
-    /// The ids in a file of the spill, or none if it is damaged or gone; `None` if this host does not see it yet.
+    /// The ids in a file of the spill; `None` if this host does not see it yet.
     fn spilled_ids(
         &self,
         outline: &Outline,
         table: &str,
-    ) -> Result<Option<Option<HashSet<String>>>, ResultsError> {
+    ) -> Result<Option<HashSet<String>>, ResultsError> {
         let file = self.file_in(&self.layout().spill(), table, outline.name);
-        let mut ids = HashSet::new();
-        for row in Dataset::of(self.layout().storage, vec![file]).rows() {
-            match row {
-                Ok(RowOfJob { job_id }) => _ = ids.insert(job_id),
-                Err(error) if error.kind == ErrorKind::Damaged => return Ok(Some(None)),
-                Err(error) if error.kind == ErrorKind::Disk(io::ErrorKind::NotFound) => {
-                    // Another worker that has just committed the part has removed the file.
-                    let is_listed = self.spilled_parts(table)?.contains(&outline.name);
-                    return Ok((!is_listed).then_some(None));
-                }
-                Err(error) => return Err(error),
+        let rows = Dataset::of(self.layout().storage, vec![file]).rows::<RowOfJob>();
+        let ids = rows.map(|row| row.map(|row| row.job_id));
+        match ids.collect::<Result<HashSet<String>, ResultsError>>() {
+            // If it is listed no more, another worker has committed the part and removed it.
+            Err(error)
+                if error.kind == ErrorKind::Disk(io::ErrorKind::NotFound)
+                    && self.spilled_parts(table)?.contains(&outline.name) =>
+            {
+                Ok(None)
             }
+            ids => ids.map(Some),
         }
-        Ok(Some(Some(ids)))
     }
 }
