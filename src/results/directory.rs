@@ -10,7 +10,7 @@ use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::{DataFile, Dataset, Footer};
-use crate::table::storage::{StorageError, gone_is_fine};
+use crate::table::storage::{StorageError, disk, gone_is_fine};
 use std::collections::BTreeSet;
 use std::io;
 use std::ops::RangeInclusive;
@@ -353,8 +353,10 @@ impl<'a> Results<'a> {
             layout.figures(),
         ];
         folders.extend(TABLES.map(|table| layout.table(table)));
+        let staging = disk(&layout.staging(""));
         for folder in folders {
-            if !layout.storage.is_one_disk(&layout.staging(""), &folder) {
+            let found = disk(&folder);
+            if found.is_some() && staging.is_some() && found != staging {
                 let problem = "is on another disk or mount than run/staging, and no file can be moved to it as a whole; \
                                make it a plain folder, or place the whole results directory on the other disk with --out";
                 return Err(ResultsError::refused(&folder, problem));

@@ -109,11 +109,6 @@ pub trait Storage: Sync {
         modified.map_err(StorageError::at("look up", path))
     }
 
-    /// Whether files can be moved from one folder to another, as far as that is known.
-    fn is_one_disk(&self, one: &Path, other: &Path) -> bool {
-        disk(one).is_none_or(|one| disk(other).is_none_or(|other| one == other))
-    }
-
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
         let failed = StorageError::at("read", file);
         match self.open(file)?.metadata() {
@@ -228,16 +223,16 @@ fn open_folder(path: &Path) -> io::Result<File> {
     options.open(path)
 }
 
-/// The device of a folder that is there, and the mount: nothing is moved from one to another.
+/// The device of a folder and the mount, if they are known: nothing is moved from one to another.
 #[cfg(target_os = "linux")]
-fn disk(folder: &Path) -> Option<(u32, u32, u64)> {
+pub fn disk(folder: &Path) -> Option<(u32, u32, u64)> {
     use rustix::fs::{AtFlags, CWD, StatxFlags, statx};
     let found = statx(CWD, folder, AtFlags::empty(), StatxFlags::MNT_ID).ok()?;
     Some((found.stx_dev_major, found.stx_dev_minor, found.stx_mnt_id))
 }
 
 #[cfg(not(target_os = "linux"))]
-const fn disk(_: &Path) -> Option<()> {
+pub const fn disk(_: &Path) -> Option<()> {
     None
 }
 
