@@ -130,7 +130,7 @@ impl Beyond {
         let [x, y] = seen.mean.mean().unwrap_or_default();
         let mut of_jobs = Vec::new();
         let mut of_controls = Vec::new();
-        for (seed, deviations) in seeds.iter().zip(seen.deviations.jobs()) {
+        for (seed, deviations) in seeds.iter().zip(&seen.deviations.jobs) {
             let Some(passage) = passages.get(seed) else {
                 continue;
             };
