@@ -26,13 +26,6 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Slips that are held at once: some 300 MB.
 pub(super) const MAX_SLIPS: u64 = 1 << 22;
-columns! {
-    pub(super) struct JobOfSet {
-        set_id: String;
-        facts: JobFacts;
-    }
-}
-
 /// Which jobs are wanted, by their parameters.
 type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 
@@ -154,34 +147,24 @@ pub(super) fn sets_of(
     is_wanted: Wanted<'_>,
 ) -> Result<Vec<SetJobs>, ResultsError> {
     let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
-    each_job(jobs, is_wanted, |job, parameters| {
+    for row in jobs.clone().rows::<(JobFacts, Selected<All>)>() {
+        let (job, Selected { parameters, .. }) = row?;
+        if !is_wanted(&parameters) {
+            continue;
+        }
         let seed = parameters.seed;
         let new = |set_id: &String| SetJobs {
             set_id: set_id.clone(),
             parameters,
             ..SetJobs::default()
         };
-        let set = sets.entry(job.set_id).or_insert_with_key(new);
-        set.push(seed, &job.facts);
-    })?;
+        let set = sets.entry(job.set_id.clone()).or_insert_with_key(new);
+        set.push(seed, &job);
+    }
     let mut sets: Vec<SetJobs> = sets.into_values().collect();
     // From a map: sets that agree in all parameters stay in the order of their ids.
     sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
     Ok(sets)
-}
-
-pub(super) fn each_job(
-    files: &Dataset<'_>,
-    is_wanted: Wanted<'_>,
-    mut job: impl FnMut(JobOfSet, Parameters),
-) -> Result<(), ResultsError> {
-    for row in files.clone().rows::<(JobOfSet, Selected<All>)>() {
-        let (of_set, Selected { parameters, .. }) = row?;
-        if is_wanted(&parameters) {
-            job(of_set, parameters);
-        }
-    }
-    Ok(())
 }
 
 /// The order of sets in every table.
