@@ -6,14 +6,14 @@
 //! of slips.
 
 use super::gather::{Gathered, Gathering, MAX_SLIPS, sets_of};
-use super::sequence::{Sequences, Sum, unit};
+use super::sequence::{Sum, unit};
 use super::set::{SetJobs, non_nan};
 use super::values::Values;
 use crate::model::{Parameters, Symbol};
 use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
 use crate::sets::{FREQUENCY, SetRow};
-use crate::table::columns::{Interval, Kind};
+use crate::table::columns::Kind;
 use std::collections::{BTreeMap, HashMap};
 
 /// What is compared: columns of the sets, each the mean of a sum.
@@ -65,13 +65,6 @@ impl Found {
         let row = set.slips.finish(&set.jobs).row;
         Self { row, sums }
     }
-}
-
-/// The interval of a difference B - A, less the difference itself, from the sums of jobs in A and in B.
-fn error(a: &[Sum], b: &[Sum]) -> Option<Interval> {
-    let added = Sum::added(a).into_iter().zip(Sum::added(b));
-    let added = added.map(|(a, b)| [b - a]).collect();
-    Sequences::independent(added).estimate().interval()
 }
 
 /// The sets with these seeds, by their ids.
@@ -141,7 +134,8 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
         let number = |found: &Found| found.row.number(name);
         let difference = |(a, b): &(&Found, &Found)| {
             let whole = number(b).zip(number(a)).map(|(b, a)| b - a);
-            let interval = whole.zip(error(&a.sums[statistic], &b.sums[statistic]));
+            let errors = Sum::difference(&b.sums[statistic], &a.sums[statistic]);
+            let interval = whole.zip(errors.interval());
             let interval = interval.map(|(whole, error)| (whole + error.low, whole + error.high));
             (whole, interval)
         };

@@ -153,11 +153,8 @@ impl Beyond {
             if slips.min(Sum::of_all(alone).weight) < MIN_VALUES as f64 {
                 return None;
             }
-            let added = Sum::added(seen).into_iter().zip(Sum::added(alone));
-            let added = added.map(|(seen, alone)| [seen - alone]);
             let unseen = Unseen::below(unseen * seen.len() as f64 / slips);
-            let added = Sequences::independent(added.collect()).estimate();
-            let error = added.interval_with(unseen)?;
+            let error = Sum::difference(seen, alone).interval_with(unseen)?;
             Some(Interval {
                 low: excess + error.low.min(-ROUNDING),
                 high: excess + error.high.max(ROUNDING),

@@ -264,8 +264,15 @@ impl Sum {
         (self.weight > 0.0).then(|| libm::hypot(x, y) / self.weight)
     }
 
+    /// The difference of the lengths of two such means, less itself: the mean of what pairs of these add to it.
+    pub(super) fn difference(sums: &[Self], less: &[Self]) -> Estimate<1> {
+        let added = Self::added(sums).into_iter().zip(Self::added(less));
+        let added = added.map(|(of_one, less)| [of_one - less]);
+        Sequences::independent(added.collect()).estimate()
+    }
+
     /// What each of these adds to the length of their mean, times their number.
-    pub(super) fn added(sums: &[Self]) -> Vec<f64> {
+    fn added(sums: &[Self]) -> Vec<f64> {
         let total = Self::of_all(sums);
         let length = libm::hypot(total.vector[0], total.vector[1]);
         let [x, y] = heading(total.vector);
