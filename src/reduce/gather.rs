@@ -297,9 +297,8 @@ impl Point {
 tables! { Point = "points", "Slips for scatter figures: all up to 20,000, or every k-th in table order"; }
 
 /// Distance k of the points among `slips` rows.
-pub(super) const fn spacing(slips: u64) -> u64 {
-    let spacing = slips.div_ceil(MAX_POINTS);
-    if spacing == 0 { 1 } else { spacing }
+pub(super) fn spacing(slips: u64) -> u64 {
+    slips.div_ceil(MAX_POINTS).max(1)
 }
 
 #[cfg(test)]

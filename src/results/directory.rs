@@ -4,7 +4,7 @@
 use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
-use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden};
+use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden, is_table_file};
 use crate::results::tables::{JOBS, TABLES, tables_of};
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
@@ -278,7 +278,8 @@ impl<'a> Results<'a> {
     pub(super) fn parts_of(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
         let folder = self.layout.table(table);
         let mut parts = BTreeSet::new();
-        for name in self.layout.table_files(&folder)? {
+        let names = self.layout.names_in(&folder)?.into_iter();
+        for name in names.filter(|name| is_table_file(name)) {
             match PartName::of_path(name.as_ref()) {
                 Some(part) if part.extension < self.extensions.len() => _ = parts.insert(part),
                 // A run may have added an extension since the directory was opened.

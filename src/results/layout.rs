@@ -95,19 +95,11 @@ impl<'a> Layout<'a> {
     }
 
     /// The names in a folder; none where another program's file stands in its place.
-    fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
+    pub(super) fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
         match self.storage.list(folder) {
             Err(error) if error.is_missing() => Ok(Vec::new()),
             names => names,
         }
-    }
-
-    /// The names of table files in a folder. Hidden names and other endings, which other programs leave, are passed
-    /// over.
-    pub fn table_files(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
-        let mut names = self.names_in(folder)?;
-        names.retain(|name| is_table_file(name));
-        Ok(names)
     }
 
     pub(super) fn parts_in(&self, folder: &Path) -> Result<BTreeSet<PartName>, StorageError> {
@@ -190,6 +182,7 @@ pub(super) fn is_hidden(name: &OsStr) -> bool {
     matches!(name.as_encoded_bytes().first(), Some(b'.' | b'_'))
 }
 
+/// Whether it is the name of a table file. Hidden names and other endings are left by other programs.
 pub(super) fn is_table_file(name: &OsStr) -> bool {
     let extension = Path::new(name).extension();
     !is_hidden(name) && extension.is_some_and(|extension| extension == FILE_EXTENSION)

@@ -94,7 +94,7 @@ impl<'a> Results<'a> {
         // All tables: a worker may also have died while it removed them.
         let mut spilled = HashSet::new();
         for table in self.tables() {
-            spilled.extend(self.layout().parts_in(&self.layout().spill().join(table))?);
+            spilled.extend(self.spilled_parts(table)?);
         }
         if spilled.is_empty() {
             return Ok(());

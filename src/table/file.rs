@@ -142,7 +142,7 @@ impl<R: Row> TableWriter<R> {
 
     pub fn push(&mut self, row: &R) -> Result<(), ResultsError> {
         self.buffer.push(row);
-        if self.buffer.len() == GROUP_ROWS {
+        if self.buffer.rows == GROUP_ROWS {
             self.flush()
         } else {
             Ok(())
@@ -152,12 +152,12 @@ impl<R: Row> TableWriter<R> {
     /// Appends rows that were read from a file of the same table.
     pub fn copy(&mut self, batch: &Batch, mut rows: Range<usize>) -> Result<(), ResultsError> {
         while !rows.is_empty() {
-            let next = rows.end.min(rows.start + GROUP_ROWS - self.buffer.len());
+            let next = rows.end.min(rows.start + GROUP_ROWS - self.buffer.rows);
             self.buffer
                 .copy(&batch.rows, rows.start..next)
                 .map_err(ResultsError::damage_at(&batch.path))?;
             rows.start = next;
-            if self.buffer.len() == GROUP_ROWS {
+            if self.buffer.rows == GROUP_ROWS {
                 self.flush()?;
             }
         }
@@ -178,7 +178,7 @@ impl<R: Row> TableWriter<R> {
 
     /// Writes what is left and the footer, brings the file to the disk.
     pub fn finish(mut self) -> Result<(), ResultsError> {
-        if !self.buffer.is_empty() {
+        if self.buffer.rows > 0 {
             self.flush()?;
         }
         let mut file = self.file;
