@@ -100,13 +100,12 @@ pub trait Storage: Sync {
         read().map_err(StorageError::at("read", file))
     }
 
-    /// When a file, or a name in a folder, was written last, by the clock of its file system.
-    fn modified(&self, path: &Path) -> Result<SystemTime, StorageError> {
+    /// When a file was written last, by the clock of its file system.
+    fn modified(&self, file: &Path) -> Result<SystemTime, StorageError> {
         // A network file system may have stale answers for what is not opened.
-        let opened = self.open(path);
-        let opened = opened.or_else(|error| open_folder(path).map_err(|_| error))?;
-        let modified = opened.metadata().and_then(|metadata| metadata.modified());
-        modified.map_err(StorageError::at("look up", path))
+        let metadata = self.open(file)?.metadata();
+        let modified = metadata.and_then(|metadata| metadata.modified());
+        modified.map_err(StorageError::at("look up", file))
     }
 
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
@@ -214,15 +213,6 @@ fn open_regular(options: &OpenOptions, path: &Path) -> io::Result<File> {
     }
 }
 
-/// Opens a folder: an empty path is that of the present one.
-fn open_folder(path: &Path) -> io::Result<File> {
-    let path = if path == "" { Path::new(".") } else { path };
-    let mut options = File::options();
-    options.read(true);
-    options.custom_flags(libc::O_DIRECTORY);
-    options.open(path)
-}
-
 /// The device of a folder and the mount, if they are known: nothing is moved from one to another.
 #[cfg(target_os = "linux")]
 pub fn disk(folder: &Path) -> Option<(u32, u32, u64)> {
@@ -282,7 +272,11 @@ impl Storage for Disk {
     }
 
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        let synced = open_folder(folder).and_then(|folder| folder.sync_all());
+        // An empty path is that of the present folder.
+        let path = if folder == "" { Path::new(".") } else { folder };
+        let mut options = File::options();
+        options.read(true).custom_flags(libc::O_DIRECTORY);
+        let synced = options.open(path).and_then(|folder| folder.sync_all());
         synced.map_err(StorageError::at("sync", folder))
     }
 
