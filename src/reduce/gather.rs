@@ -109,14 +109,12 @@ impl<'a> Gathering<'a> {
         let ids = sets.iter().map(|set| set.set_id.clone());
         let index: HashMap<String, usize> = ids.zip(0..).collect();
         let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
-        let mut place = 0;
         // The job of the last slip, and its set if the job is wanted.
         let mut last = None;
         let mut found = None;
-        for row in self.slips.clone().rows::<(JobOfSlip, Slip)>() {
+        let rows = self.slips.clone().rows::<(JobOfSlip, Slip)>();
+        for (place, row) in (0..).zip(rows) {
             let (job, slip) = row?;
-            let here = place;
-            place += 1;
             if last.as_ref() != Some(&job) {
                 let is_wanted = |&index: &usize| {
                     (self.is_wanted)(&Parameters {
@@ -131,9 +129,9 @@ impl<'a> Gathering<'a> {
                 continue;
             };
             let set = &mut sets[index];
-            if here % spacing == 0 {
+            if place % spacing == 0 {
                 let point = Point::of(&set.jobs.parameters, &slip);
-                set.points.push((here, point));
+                set.points.push((place, point));
             }
             set.slips.push(job.seed, &slip);
         }
