@@ -179,7 +179,8 @@ fn read_reduced(
     }
     let names: Vec<String> = columns.iter().map(|field| field.name().clone()).collect();
     let schema = Arc::new(Schema::new(columns));
-    let file = renew(results)?.layout().reduced_file(table);
+    let renewed = renew(results)?;
+    let file = renewed.layout().reduced_file(table);
     let mut batches = Vec::new();
     for batch in Dataset::new(&Disk, vec![file]).columns(&names) {
         let Batch { path, rows } = batch?;

@@ -70,7 +70,7 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&layout(&arguments.directory))?;
     match &arguments.other {
         Some(other) => show_differences(arguments, &results, other)?,
-        None => show_sets(arguments, &*renew(&results)?)?,
+        None => show_sets(arguments, &renew(&results)?)?,
     }
     Ok(Exit::Done)
 }
@@ -164,7 +164,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
 
 /// The first of the `count` sets of a directory, and notes on its jobs. Memory: [`MAX_READ`] sets.
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
-    let results = &*renew(results)?;
+    let results = &renew(results)?;
     let rows = sets(results, MAX_READ)?;
     let columns = usual_columns(&usual_names(&rows), &rows);
     // A line that says how many more there are is as long as one of these.

@@ -6,14 +6,14 @@
 //! of slips.
 
 use super::gather::{Gathered, Gathering, MAX_SLIPS, sets_of};
-use super::sequence::{Sequences, Sum, unit};
+use super::sequence::{Sum, unit};
 use super::set::{SetJobs, non_nan};
 use super::values::Values;
 use crate::model::{Parameters, Symbol};
 use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
 use crate::sets::{SetRow, column_of};
-use crate::table::columns::{Interval, Kind};
+use crate::table::columns::Kind;
 use std::collections::{BTreeMap, HashMap};
 
 /// What is compared: columns of the sets, each the mean of a sum.
@@ -65,13 +65,6 @@ impl Found {
         let row = set.slips.finish(&set.jobs).row;
         Self { row, sums }
     }
-}
-
-/// The interval of a difference B - A, less the difference itself, from the sums of jobs in A and in B.
-fn error(a: &[Sum], b: &[Sum]) -> Option<Interval> {
-    let added = Sum::added(a).into_iter().zip(Sum::added(b));
-    let added = added.map(|(a, b)| [b - a]).collect();
-    Sequences::independent(added).estimate().interval()
 }
 
 /// The sets with these seeds, by their ids.
@@ -130,25 +123,25 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
     let found_in_a = found_in(a, &of_a.collect())?;
     let of_b = pairs.iter().map(|pair| (&*pair.b.set_id, &*pair.seeds));
     let found_in_b = found_in(b, &of_b.collect())?;
+    let of_pair = |pair: &Pair<'_>| (&found_in_a[&pair.a.set_id], &found_in_b[&pair.b.set_id]);
+    let sets: Vec<(&Found, &Found)> = pairs.iter().map(of_pair).collect();
 
     let seeds = pairs
         .iter()
         .map(|pair| (Some(pair.seeds.len() as f64), None));
     let mut found = vec![Values::computed("seeds", Kind::Count, seeds)];
     for (statistic, name) in STATISTICS.into_iter().enumerate() {
-        let of_a = |pair: &Pair<'_>| found_in_a[&pair.a.set_id].row.number(name);
-        let of_b = |pair: &Pair<'_>| found_in_b[&pair.b.set_id].row.number(name);
-        let difference = |pair: &Pair<'_>| {
-            let whole = of_b(pair).zip(of_a(pair)).map(|(b, a)| b - a);
-            let sums_in_a = &found_in_a[&pair.a.set_id].sums[statistic];
-            let errors = error(sums_in_a, &found_in_b[&pair.b.set_id].sums[statistic]);
-            let interval = whole.zip(errors);
+        let number = |found: &Found| found.row.number(name);
+        let difference = |(a, b): &(&Found, &Found)| {
+            let whole = number(b).zip(number(a)).map(|(b, a)| b - a);
+            let errors = Sum::difference(&b.sums[statistic], &a.sums[statistic]);
+            let interval = whole.zip(errors.interval());
             let interval = interval.map(|(whole, error)| (whole + error.low, whole + error.high));
             (whole, interval)
         };
-        let in_a = pairs.iter().map(|pair| (of_a(pair), None));
-        let in_b = pairs.iter().map(|pair| (of_b(pair), None));
-        let differences = pairs.iter().map(difference);
+        let in_a = sets.iter().map(|(a, _)| (number(a), None));
+        let in_b = sets.iter().map(|(_, b)| (number(b), None));
+        let differences = sets.iter().map(difference);
         let name = |which| format!("{name}_{which}");
         found.extend([
             Values::computed(&name("a"), Kind::Real, in_a),
@@ -157,10 +150,7 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
         ]);
     }
     found.retain(|values| values.numbers.iter().any(Option::is_some));
-    let rows = pairs
-        .iter()
-        .map(|pair| found_in_a[&pair.a.set_id].row.clone());
-    let rows: Vec<SetRow> = rows.collect();
+    let rows: Vec<SetRow> = sets.iter().map(|(a, _)| a.row.clone()).collect();
     let parameters = keys.into_iter().map(column_of);
     let parameters = parameters.filter_map(|name| Values::of(&rows, name).ok());
     Ok(parameters.chain(found).collect())

@@ -101,30 +101,16 @@ impl Estimate<1> {
     }
 }
 
-/// The length of a mean vector, and its variances along the mean and across it.
-struct Polar {
-    length: f64,
-    along: f64,
-    across: f64,
-}
-
 impl Estimate<2> {
-    fn polar(&self) -> Option<Polar> {
-        let [x, y] = heading(self.mean()?);
-        Some(Polar {
-            length: self.resultant_length()?,
-            along: self.variance(&[x, y]),
-            across: self.variance(&[-y, x]),
-        })
-    }
-
     /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if
     /// no direction is excluded; `None` for fewer than two. By the circular standard error (Fisher, Statistical
     /// Analysis of Circular Data (1993), Sec. 4.4.4), whose (1 - ρ_2)/2 is the variance across the mean; valid for
     /// short resultants, too (Fieller's interval).
     pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
         let direction = self.direction(top)?;
-        let Polar { length, across, .. } = self.polar()?;
+        let length = self.resultant_length()?;
+        let [x, y] = heading(self.mean()?);
+        let across = self.variance(&[-y, x]);
         let sine = (student(self.freedom()?) * across.sqrt()).max(CANCELLED);
         let half = if sine < length {
             libm::asin(sine / length)
@@ -151,20 +137,19 @@ impl Centred<2> {
         if mean.count < MIN_VALUES {
             return None;
         }
-        let Polar {
-            length,
-            along,
-            across,
-        } = mean.polar()?;
+        let length = mean.resultant_length()?;
+        let [x, y] = heading(mean.mean()?);
         let t = student(mean.freedom()?);
         if length > LONG {
-            let components = self.deviations.along(&heading(mean.mean()?)).estimate();
+            let components = self.deviations.along(&[x, y]).estimate();
             let Interval { low, high } = components.interval_with(Unseen::below(unseen))?;
             return Some(Interval {
                 low: (length + low.min(-ROUNDING)).max(0.0),
                 high: (length + high.max(ROUNDING)).min(1.0),
             });
         }
+        let along = mean.variance(&[x, y]);
+        let across = mean.variance(&[-y, x]);
         let unbiased = length * length - along - across;
         let middle = unbiased + 2.0 * t * t * along;
         let constant = unbiased * unbiased - 2.0 * t * t * (along * along + across * across);

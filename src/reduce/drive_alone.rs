@@ -42,11 +42,10 @@ impl Controls {
         if controls.is_empty() {
             return Ok(Self::default());
         }
-        for batch in slips.rows::<(JobOfSlip, Onset)>() {
-            for (job, onset) in batch? {
-                if let Some(set) = controls.get_mut(&job.set_id) {
-                    set.entry(job.seed).or_default().push(onset);
-                }
+        for row in slips.rows::<(JobOfSlip, Onset)>() {
+            let (job, onset) = row?;
+            if let Some(set) = controls.get_mut(&job.set_id) {
+                set.entry(job.seed).or_default().push(onset);
             }
         }
         Ok(Self(controls))
@@ -131,7 +130,7 @@ impl Beyond {
         let [x, y] = seen.mean.mean().unwrap_or_default();
         let mut of_jobs = Vec::new();
         let mut of_controls = Vec::new();
-        for (seed, deviations) in seeds.iter().zip(seen.deviations.jobs()) {
+        for (seed, deviations) in seeds.iter().zip(&seen.deviations.jobs) {
             let Some(passage) = passages.get(seed) else {
                 continue;
             };
@@ -154,11 +153,8 @@ impl Beyond {
             if slips.min(Sum::of_all(alone).weight) < MIN_VALUES as f64 {
                 return None;
             }
-            let added = Sum::added(seen).into_iter().zip(Sum::added(alone));
-            let added = added.map(|(seen, alone)| [seen - alone]);
             let unseen = Unseen::below(unseen * seen.len() as f64 / slips);
-            let added = Sequences::independent(added.collect()).estimate();
-            let error = added.interval_with(unseen)?;
+            let error = Sum::difference(seen, alone).interval_with(unseen)?;
             Some(Interval {
                 low: excess + error.low.min(-ROUNDING),
                 high: excess + error.high.max(ROUNDING),

@@ -26,13 +26,6 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Slips that are held at once: some 300 MB.
 pub(super) const MAX_SLIPS: u64 = 1 << 22;
-columns! {
-    pub(super) struct JobOfSet {
-        set_id: String;
-        facts: JobFacts;
-    }
-}
-
 /// Which jobs are wanted, by their parameters.
 type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 
@@ -116,34 +109,31 @@ impl<'a> Gathering<'a> {
         let ids = sets.iter().map(|set| set.set_id.clone());
         let index: HashMap<String, usize> = ids.zip(0..).collect();
         let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
-        let mut place = 0;
         // The job of the last slip, and its set if the job is wanted.
         let mut last = None;
         let mut found = None;
-        for batch in self.slips.clone().rows::<(JobOfSlip, Slip)>() {
-            for (job, slip) in batch? {
-                let here = place;
-                place += 1;
-                if last.as_ref() != Some(&job) {
-                    let is_wanted = |&index: &usize| {
-                        (self.is_wanted)(&Parameters {
-                            seed: job.seed,
-                            ..sets[index].jobs.parameters.clone()
-                        })
-                    };
-                    found = index.get(&job.set_id).copied().filter(is_wanted);
-                    last = Some(job);
-                }
-                let (Some(index), Some(job)) = (found, &last) else {
-                    continue;
+        let rows = self.slips.clone().rows::<(JobOfSlip, Slip)>();
+        for (place, row) in (0..).zip(rows) {
+            let (job, slip) = row?;
+            if last.as_ref() != Some(&job) {
+                let is_wanted = |&index: &usize| {
+                    (self.is_wanted)(&Parameters {
+                        seed: job.seed,
+                        ..sets[index].jobs.parameters.clone()
+                    })
                 };
-                let set = &mut sets[index];
-                if here % spacing == 0 {
-                    let point = Point::of(&set.jobs.parameters, &slip);
-                    set.points.push((here, point));
-                }
-                set.slips.push(job.seed, &slip);
+                found = index.get(&job.set_id).copied().filter(is_wanted);
+                last = Some(job);
             }
+            let (Some(index), Some(job)) = (found, &last) else {
+                continue;
+            };
+            let set = &mut sets[index];
+            if place % spacing == 0 {
+                let point = Point::of(&set.jobs.parameters, &slip);
+                set.points.push((place, point));
+            }
+            set.slips.push(job.seed, &slip);
         }
         Ok(sets)
     }
@@ -155,35 +145,24 @@ pub(super) fn sets_of(
     is_wanted: Wanted<'_>,
 ) -> Result<Vec<SetJobs>, ResultsError> {
     let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
-    each_job(jobs, is_wanted, |job, parameters| {
+    for row in jobs.clone().rows::<(JobFacts, Selected<All>)>() {
+        let (job, Selected { parameters, .. }) = row?;
+        if !is_wanted(&parameters) {
+            continue;
+        }
         let seed = parameters.seed;
         let new = |set_id: &String| SetJobs {
             set_id: set_id.clone(),
             parameters,
             ..SetJobs::default()
         };
-        let set = sets.entry(job.set_id).or_insert_with_key(new);
-        set.push(seed, &job.facts);
-    })?;
+        let set = sets.entry(job.set_id.clone()).or_insert_with_key(new);
+        set.push(seed, &job);
+    }
     let mut sets: Vec<SetJobs> = sets.into_values().collect();
     // From a map: sets that agree in all parameters stay in the order of their ids.
     sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
     Ok(sets)
-}
-
-pub(super) fn each_job(
-    files: &Dataset<'_>,
-    is_wanted: Wanted<'_>,
-    mut job: impl FnMut(JobOfSet, Parameters),
-) -> Result<(), ResultsError> {
-    for batch in files.clone().rows::<(JobOfSet, Selected<All>)>() {
-        for (of_set, Selected { parameters, .. }) in batch? {
-            if is_wanted(&parameters) {
-                job(of_set, parameters);
-            }
-        }
-    }
-    Ok(())
 }
 
 /// The order of sets in every table.
@@ -316,9 +295,8 @@ impl Point {
 tables! { Point = "points", "Slips for scatter figures: all up to 20,000, or every k-th in table order"; }
 
 /// Distance k of the points among `slips` rows.
-pub(super) const fn spacing(slips: u64) -> u64 {
-    let spacing = slips.div_ceil(MAX_POINTS);
-    if spacing == 0 { 1 } else { spacing }
+pub(super) fn spacing(slips: u64) -> u64 {
+    slips.div_ceil(MAX_POINTS).max(1)
 }
 
 #[cfg(test)]

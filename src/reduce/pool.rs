@@ -2,13 +2,13 @@
 
 use super::backbone::{Backbone, BackboneBin};
 use super::drive_alone::{Controls, Explained};
-use super::gather::{Gathered, JobOfSet, each_job};
+use super::gather::Gathered;
 use super::set::FinishedSet;
 use super::set::{JobFacts, SetJobs};
-use crate::model::Parameters;
+use crate::model::{Parameters, Selected};
 use crate::observe::Slip;
 use crate::results::layout::Layout;
-use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
+use crate::results::tables::{All, JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
 use crate::sets::SetRow;
 use std::collections::BTreeMap;
@@ -36,32 +36,29 @@ impl Pool {
         let jobs = results.dataset(JOBS)?;
         let slips = results.committed_files(SLIPS, &jobs)?;
         let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
-        each_job(
-            &jobs,
-            &|parameters| !plan.is_control(parameters),
-            |JobOfSet { set_id, facts }, parameters| {
-                let seed = parameters.seed;
-                let (_, set) = sets
-                    .entry(set_id)
-                    .or_insert_with(|| (parameters, BTreeMap::new()));
-                set.insert(
-                    seed,
-                    PooledJob {
-                        seed,
-                        facts,
-                        slips: Vec::new(),
-                    },
-                );
-            },
-        )?;
-        for batch in slips.clone().rows::<(JobOfSlip, Slip)>() {
-            for (job, slip) in batch? {
-                if let Some((_, set)) = sets.get_mut(&job.set_id) {
-                    set.get_mut(&job.seed)
-                        .expect("slips of a job")
-                        .slips
-                        .push(slip);
-                }
+        for row in jobs.rows::<(JobFacts, Selected<All>)>() {
+            let (facts, Selected { parameters, .. }) = row?;
+            if plan.is_control(&parameters) {
+                continue;
+            }
+            let seed = parameters.seed;
+            let (_, set) = sets
+                .entry(facts.set_id.clone())
+                .or_insert_with(|| (parameters, BTreeMap::new()));
+            let job = PooledJob {
+                seed,
+                facts,
+                slips: Vec::new(),
+            };
+            set.insert(seed, job);
+        }
+        for row in slips.clone().rows::<(JobOfSlip, Slip)>() {
+            let (job, slip) = row?;
+            if let Some((_, set)) = sets.get_mut(&job.set_id) {
+                set.get_mut(&job.seed)
+                    .expect("slips of a job")
+                    .slips
+                    .push(slip);
             }
         }
         let controls = Controls::read(slips, plan, sets.values().map(|(set, _)| set))?;

@@ -26,9 +26,7 @@ use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io;
-use std::ops::Deref;
 use std::path::PathBuf;
-use tempfile::TempDir;
 
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
 pub const WRITER: &str = "reduce";
@@ -309,31 +307,13 @@ fn source(results: &Results<'_>) -> Result<String, ResultsError> {
     Ok(hexadecimal(&digest.finalize()))
 }
 
-/// A directory whose reduced data are up to date. If nothing can be written there, they lie elsewhere as long as this
-/// lives.
-pub struct Renewed<'a> {
-    results: Results<'a>,
-    _elsewhere: Option<TempDir>,
-}
-
-impl<'a> Deref for Renewed<'a> {
-    type Target = Results<'a>;
-
-    fn deref(&self) -> &Self::Target {
-        &self.results
-    }
-}
-
-/// Reduces the tables if the reduced data are out of date, and there are tables.
-pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
-    let renewed = Renewed {
-        results: results.clone(),
-        _elsewhere: None,
-    };
+/// The same directory with reduced data that are up to date: reduces the tables if they are not, and there are tables.
+/// If nothing can be written there, the data lie elsewhere as long as the results live.
+pub fn renew<'a>(results: &Results<'a>) -> Result<Results<'a>> {
     let layout = results.layout();
     let is_there = layout.storage.exists(&layout.reduced_file(SetRow::NAME))?;
     if is_there && !layout.storage.exists(&layout.table(JOBS))? {
-        return Ok(renewed);
+        return Ok(results.clone());
     }
     let source = Footer::empty().with(SOURCE, &source(results)?);
     let is_current = |table| {
@@ -347,18 +327,14 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
         && is_current(Point::NAME)
         && edges.is_none_or(is_current)
     {
-        return Ok(renewed);
+        return Ok(results.clone());
     }
     match reduce(results) {
-        Ok(_) => Ok(renewed),
+        Ok(_) => Ok(results.clone()),
         Err(error) if is_read_only(&error) => {
-            let elsewhere = tempfile::tempdir()?;
-            let results = results.reduced_to(elsewhere.path());
-            reduce(&results)?;
-            Ok(Renewed {
-                results,
-                _elsewhere: Some(elsewhere),
-            })
+            let elsewhere = results.reduced_to(tempfile::tempdir()?);
+            reduce(&elsewhere)?;
+            Ok(elsewhere)
         }
         Err(error) if is_there => Err(error.context("the reduced data are out of date")),
         Err(error) => Err(error),
@@ -387,9 +363,7 @@ pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
 /// The rows of a reduced table, such as [`Point`].
 pub fn read_reduced<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
     let file = layout.reduced_file(R::NAME);
-    let batches = Dataset::new(layout.storage, vec![file]).rows();
-    let batches: Vec<Vec<R>> = batches.collect::<Result<_, _>>()?;
-    Ok(batches.into_iter().flatten().collect())
+    Dataset::new(layout.storage, vec![file]).rows().collect()
 }
 
 /// The rows of the reduced sets, controls left out, in order.
@@ -397,11 +371,7 @@ pub fn read_sets<'a>(
     layout: &Layout<'a>,
 ) -> impl Iterator<Item = Result<SetRow, ResultsError>> + use<'a> {
     let file = layout.reduced_file(SetRow::NAME);
-    let batches = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
-    let rows = batches.flat_map(|batch| match batch {
-        Ok(rows) => rows.into_iter().map(Ok).collect(),
-        Err(error) => vec![Err(error)],
-    });
+    let rows = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
     rows.filter(|row| !matches!(row, Ok(row) if row.is_control))
 }
 

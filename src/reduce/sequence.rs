@@ -16,38 +16,25 @@ use std::f64::consts::TAU;
 /// Stretches of slips whose sums make a variance, at least: it is then known to 27 %.
 const MIN_STRETCHES: usize = 8;
 
-/// Values of a quantity with D components, in the order of slips, and where jobs begin.
+/// Values of a quantity with D components, job by job, in the order of slips.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sequences<const D: usize> {
-    values: Vec<[f64; D]>,
-    starts: Vec<usize>,
+    pub(super) jobs: Vec<Vec<[f64; D]>>,
 }
 
 impl<const D: usize> Sequences<D> {
     pub(super) fn of<Job: IntoIterator<Item = [f64; D]>>(
         jobs: impl IntoIterator<Item = Job>,
     ) -> Self {
-        let mut values = Vec::new();
-        let mut starts = Vec::new();
-        for job in jobs {
-            starts.push(values.len());
-            values.extend(job);
+        let jobs = jobs.into_iter().map(|job| job.into_iter().collect());
+        Self {
+            jobs: jobs.collect(),
         }
-        Self { values, starts }
     }
 
     /// Jobs of one value each: independent values.
     pub(super) fn independent(values: Vec<[f64; D]>) -> Self {
         Self::of(values.into_iter().map(|value| [value]))
-    }
-
-    pub(super) fn jobs(&self) -> impl Iterator<Item = &[[f64; D]]> {
-        let starts = self.starts.iter();
-        let ends = starts.clone().skip(1).copied();
-        let ends = ends.chain([self.values.len()]);
-        starts
-            .zip(ends)
-            .map(|(&start, end)| &self.values[start..end])
     }
 
     pub(super) fn estimate(self) -> Estimate<D> {
@@ -56,10 +43,10 @@ impl<const D: usize> Sequences<D> {
 
     /// Their deviations from the mean, and the mean with its covariance.
     pub(super) fn centred(mut self) -> Centred<D> {
-        let count = self.values.len() as u64;
-        let total = sum(&self.values);
+        let count = self.jobs.iter().map(Vec::len).sum::<usize>() as u64;
+        let total = sum(self.jobs.iter().flatten());
         let mean = total.map(|sum| sum / count as f64);
-        for value in &mut self.values {
+        for value in self.jobs.iter_mut().flatten() {
             for (component, mean) in value.iter_mut().zip(mean) {
                 *component -= mean;
             }
@@ -83,15 +70,15 @@ impl<const D: usize> Sequences<D> {
 
     /// The sums of jobs; of few, those of equal stretches of each job.
     pub(super) fn stretch_sums(&self) -> Vec<Vec<[f64; D]>> {
-        let jobs = self.jobs().filter(|job| !job.is_empty()).count();
+        let jobs = self.jobs.iter().filter(|job| !job.is_empty()).count();
         let parts = MIN_STRETCHES.div_ceil(jobs.max(1));
-        let of_job = |job: &[[f64; D]]| {
+        let of_job = |job: &Vec<[f64; D]>| {
             let start = |part: usize| job.len() * part / parts;
             let stretches = (0..parts).map(|part| &job[start(part)..start(part + 1)]);
             let stretches = stretches.filter(|stretch| !stretch.is_empty());
             stretches.map(sum).collect()
         };
-        self.jobs().map(of_job).collect()
+        self.jobs.iter().map(of_job).collect()
     }
 
     /// Their components along a unit vector.
@@ -100,10 +87,7 @@ impl<const D: usize> Sequences<D> {
             let products = value.iter().zip(direction).map(|(x, part)| x * part);
             [products.sum::<f64>()]
         };
-        Sequences {
-            values: self.values.iter().map(component).collect(),
-            starts: self.starts.clone(),
-        }
+        Sequences::of(self.jobs.iter().map(|job| job.iter().map(component)))
     }
 }
 
@@ -120,8 +104,8 @@ impl<const D: usize> Default for Centred<D> {
     }
 }
 
-fn sum<const D: usize>(values: &[[f64; D]]) -> [f64; D] {
-    values.iter().fold([0.0; D], |mut sum, value| {
+fn sum<'a, const D: usize>(values: impl IntoIterator<Item = &'a [f64; D]>) -> [f64; D] {
+    values.into_iter().fold([0.0; D], |mut sum, value| {
         add(&mut sum, value);
         sum
     })
@@ -280,8 +264,15 @@ impl Sum {
         (self.weight > 0.0).then(|| libm::hypot(x, y) / self.weight)
     }
 
+    /// The difference of the lengths of two such means, less itself: the mean of what pairs of these add to it.
+    pub(super) fn difference(sums: &[Self], less: &[Self]) -> Estimate<1> {
+        let added = Self::added(sums).into_iter().zip(Self::added(less));
+        let added = added.map(|(of_one, less)| [of_one - less]);
+        Sequences::independent(added.collect()).estimate()
+    }
+
     /// What each of these adds to the length of their mean, times their number.
-    pub(super) fn added(sums: &[Self]) -> Vec<f64> {
+    fn added(sums: &[Self]) -> Vec<f64> {
         let total = Self::of_all(sums);
         let length = libm::hypot(total.vector[0], total.vector[1]);
         let [x, y] = heading(total.vector);

@@ -306,9 +306,10 @@ pub(super) struct FinishedSet {
 }
 
 columns! {
-    /// What a reduction takes from the jobs table beside set and parameters.
+    /// What a reduction takes from the jobs table beside parameters.
     #[derive(Clone, Debug)]
     pub(super) struct JobFacts {
+        set_id: String;
         outcome: JobOutcome;
         slips: Option<u64>;
         averaged_time: Option<f64>;
@@ -589,6 +590,7 @@ pub(super) mod tests {
         running_interval: Option<f64>,
     ) -> JobFacts {
         JobFacts {
+            set_id: String::new(),
             outcome,
             slips: Some(1),
             averaged_time: Some(time),

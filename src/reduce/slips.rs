@@ -38,24 +38,23 @@ fn each_slip(
     let places: HashMap<&str, usize> = ids.zip(0..).collect();
     let mut last: Option<(usize, SlipOfSet)> = None;
     let files = results.committed_files(SLIPS, &results.dataset(JOBS)?)?;
-    for batch in files.rows::<(JobOfSlip, Slip)>() {
-        for (job, slip) in batch? {
-            let Some(&place) = places.get(&*job.set_id) else {
-                continue;
-            };
-            if let Some((place, mut before)) = last.take() {
-                if before.0.0 == job {
-                    before.1.2.next_interval = slip.interval;
-                }
-                give(place, before);
+    for row in files.rows::<(JobOfSlip, Slip)>() {
+        let (job, slip) = row?;
+        let Some(&place) = places.get(&*job.set_id) else {
+            continue;
+        };
+        if let Some((place, mut before)) = last.take() {
+            if before.0.0 == job {
+                before.1.2.next_interval = slip.interval;
             }
-            let parameters = sets[place].parameters.clone();
-            let following = Following {
-                next_interval: None,
-            };
-            let loading = Loading::of(&parameters);
-            last = Some((place, ((job, parameters), (loading, slip, following))));
+            give(place, before);
         }
+        let parameters = sets[place].parameters.clone();
+        let following = Following {
+            next_interval: None,
+        };
+        let loading = Loading::of(&parameters);
+        last = Some((place, ((job, parameters), (loading, slip, following))));
     }
     if let Some((place, slip)) = last {
         give(place, slip);

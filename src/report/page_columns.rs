@@ -125,8 +125,9 @@ impl Census {
             ..Self::default()
         };
         let file = layout.reduced_file(SetRow::NAME);
-        for batch in Dataset::new(layout.storage, vec![file]).rows::<Counted>() {
-            for set in batch?.into_iter().filter(|set| !set.is_control) {
+        for set in Dataset::new(layout.storage, vec![file]).rows::<Counted>() {
+            let set = set?;
+            if !set.is_control {
                 census.sets += 1;
                 census.slips += set.slips;
                 census.jobs_cut += set.jobs_cut.unwrap_or(0);
@@ -191,12 +192,11 @@ impl Sets {
             sets.swept.push((name, swept.is_logarithmic()));
         }
         let file = layout.reduced_file(HistogramBin::NAME);
-        for batch in Dataset::new(layout.storage, vec![file]).rows::<HistogramBin>() {
-            for bin in batch? {
-                if let Some(&place) = sets.places.get(&bin.set_id) {
-                    let number = floored((bin.low / (bin.high - bin.low)).round()) as u64;
-                    sets.histograms[place].extend([number, bin.count]);
-                }
+        for bin in Dataset::new(layout.storage, vec![file]).rows::<HistogramBin>() {
+            let bin = bin?;
+            if let Some(&place) = sets.places.get(&bin.set_id) {
+                let number = floored((bin.low / (bin.high - bin.low)).round()) as u64;
+                sets.histograms[place].extend([number, bin.count]);
             }
         }
         Ok(sets)
@@ -269,22 +269,21 @@ impl Slips {
         let mut number = 0_u64;
         let mut last: Option<JobOfSlip> = None;
         let files = results.committed_files(SLIPS, &results.dataset(JOBS)?)?;
-        for batch in files.rows::<(JobOfSlip, Slip)>() {
-            for (job, slip) in batch? {
-                let Some(&place) = places.get(&job.set_id) else {
-                    continue;
-                };
-                number += 1;
-                if !(number - 1).is_multiple_of(slips.every) {
-                    continue;
-                }
-                if last.as_ref() != Some(&job) {
-                    slips.jobs.push((place, job.seed));
-                    last = Some(job);
-                }
-                slips.job.push(slips.jobs.len() - 1);
-                slips.columns.push(&slip, rounded);
+        for row in files.rows::<(JobOfSlip, Slip)>() {
+            let (job, slip) = row?;
+            let Some(&place) = places.get(&job.set_id) else {
+                continue;
+            };
+            number += 1;
+            if !(number - 1).is_multiple_of(slips.every) {
+                continue;
             }
+            if last.as_ref() != Some(&job) {
+                slips.jobs.push((place, job.seed));
+                last = Some(job);
+            }
+            slips.job.push(slips.jobs.len() - 1);
+            slips.columns.push(&slip, rounded);
         }
         slips.columns.label(|column| {
             let (_, symbol, what) = shown(&column.name).copied().unwrap_or_default();

@@ -9,10 +9,12 @@ use crate::table::storage::{Lock, Storage, StorageError, StoredFile};
 use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How long to wait for another process that does the same, such as a reduction.
 const MAX_WAIT: Duration = shorter_in_tests(Duration::from_mins(10), Duration::from_secs(5));
+/// How often to look whether it has ended.
+const POLL: Duration = shorter_in_tests(Duration::from_millis(20), Duration::from_millis(1));
 
 /// Files that are being prepared for their places. Dropped before [`Commit::publish`], it removes what it can.
 pub struct Commit<'a> {
@@ -112,12 +114,18 @@ fn is_staged(name: &OsStr) -> bool {
 pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
     layout.ensure_folder(&layout.locks())?;
     let file = layout.locks().join(writer);
-    let lock = layout.storage.wait_for_lock(&file, MAX_WAIT)?;
-    if matches!(lock, Lock::Taken) {
-        let problem = "another process holds it; try again when it has ended";
-        let held = io::Error::new(io::ErrorKind::WouldBlock, problem);
-        return Err(StorageError::at("lock", &file)(held));
-    }
+    let begin = Instant::now();
+    let lock = loop {
+        match layout.storage.lock(&file)? {
+            Lock::Taken if begin.elapsed() < MAX_WAIT => std::thread::sleep(POLL),
+            Lock::Taken => {
+                let problem = "another process holds it; try again when it has ended";
+                let held = io::Error::new(io::ErrorKind::WouldBlock, problem);
+                return Err(StorageError::at("lock", &file)(held));
+            }
+            lock => break lock,
+        }
+    };
     if matches!(lock, Lock::Ours(_)) {
         let staging = layout.staging(writer);
         let names = layout.storage.list(&staging)?;

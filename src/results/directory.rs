@@ -4,18 +4,19 @@
 use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
-use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden};
+use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden, is_table_file};
 use crate::results::tables::{JOBS, TABLES, tables_of};
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::{DataFile, Dataset, Footer};
-use crate::table::storage::{StorageError, gone_is_fine};
+use crate::table::storage::{StorageError, disk, gone_is_fine};
 use std::collections::BTreeSet;
 use std::io;
 use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
+use tempfile::TempDir;
 
 /// A results directory: where it lies, and which sweeps it belongs to. Finished parts are looked up each time.
 #[derive(Clone, Debug)]
@@ -277,7 +278,8 @@ impl<'a> Results<'a> {
     pub(super) fn parts_of(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
         let folder = self.layout.table(table);
         let mut parts = BTreeSet::new();
-        for name in self.layout.table_files(&folder)? {
+        let names = self.layout.names_in(&folder)?.into_iter();
+        for name in names.filter(|name| is_table_file(name)) {
             match PartName::of_path(name.as_ref()) {
                 Some(part) if part.extension < self.extensions.len() => _ = parts.insert(part),
                 // A run may have added an extension since the directory was opened.
@@ -304,7 +306,7 @@ impl<'a> Results<'a> {
     pub(super) fn file_in(&self, place: &Path, table: &str, part: PartName) -> DataFile {
         DataFile {
             path: place.join(table).join(part.file()),
-            rows: None,
+            rows: 0..=u64::MAX,
             footer: Arc::clone(&self.footers[part.extension]),
         }
     }
@@ -352,8 +354,10 @@ impl<'a> Results<'a> {
             layout.figures(),
         ];
         folders.extend(TABLES.map(|table| layout.table(table)));
+        let staging = disk(&layout.staging(""));
         for folder in folders {
-            if !layout.storage.is_one_disk(&layout.staging(""), &folder) {
+            let found = disk(&folder);
+            if found.is_some() && staging.is_some() && found != staging {
                 let problem = "is on another disk or mount than run/staging, and no file can be moved to it as a whole; \
                                make it a plain folder, or place the whole results directory on the other disk with --out";
                 return Err(ResultsError::refused(&folder, problem));
@@ -368,8 +372,8 @@ impl<'a> Results<'a> {
         Ok(commit.publish()?)
     }
 
-    /// The same with reduced data in another folder, which is there.
-    pub fn reduced_to(&self, elsewhere: &Path) -> Self {
+    /// The same with reduced data in another folder, which is there as long as this.
+    pub fn reduced_to(&self, elsewhere: TempDir) -> Self {
         Self {
             layout: self.layout.reduced_to(elsewhere),
             ..self.clone()

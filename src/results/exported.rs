@@ -231,7 +231,7 @@ impl<'a> JoinedTable<'a> {
         let mut file = (self.results).file_in(&layout.tables(), self.table, part);
         if self.table != JOBS {
             let jobs = self.results.dataset_of(JOBS, part);
-            file.rows = Some(row_count(jobs, self.table).map_err(unread)?);
+            file.rows = row_count(jobs, self.table).map_err(unread)?;
         }
         for batch in Dataset::of(layout.storage, vec![file]).columns(&self.own) {
             let Batch { path, rows } = batch.map_err(unread)?;

@@ -14,7 +14,9 @@ use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
@@ -29,7 +31,7 @@ pub struct Layout<'a> {
     pub storage: &'a dyn Storage,
     root: PathBuf,
     /// Where reduced data lie, if not in the directory.
-    elsewhere: Option<PathBuf>,
+    elsewhere: Option<Arc<TempDir>>,
 }
 
 impl fmt::Debug for Layout<'_> {
@@ -49,16 +51,17 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The same with reduced data in another folder, which is there.
-    pub fn reduced_to(&self, elsewhere: &Path) -> Self {
+    /// The same with reduced data in another folder, which is there as long as this.
+    pub fn reduced_to(&self, elsewhere: TempDir) -> Self {
         Self {
-            elsewhere: Some(elsewhere.to_owned()),
+            elsewhere: Some(Arc::new(elsewhere)),
             ..self.clone()
         }
     }
 
     fn reduced_root(&self) -> &Path {
-        self.elsewhere.as_deref().unwrap_or(&self.root)
+        let elsewhere = self.elsewhere.as_ref().map(|folder| folder.path());
+        elsewhere.unwrap_or(&self.root)
     }
 
     /// The directory of a sweep, unless another is chosen.
@@ -92,19 +95,11 @@ impl<'a> Layout<'a> {
     }
 
     /// The names in a folder; none where another program's file stands in its place.
-    fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
+    pub(super) fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
         match self.storage.list(folder) {
             Err(error) if error.is_missing() => Ok(Vec::new()),
             names => names,
         }
-    }
-
-    /// The names of table files in a folder. Hidden names and other endings, which other programs leave, are passed
-    /// over.
-    pub fn table_files(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
-        let mut names = self.names_in(folder)?;
-        names.retain(|name| is_table_file(name));
-        Ok(names)
     }
 
     pub(super) fn parts_in(&self, folder: &Path) -> Result<BTreeSet<PartName>, StorageError> {
@@ -187,6 +182,7 @@ pub(super) fn is_hidden(name: &OsStr) -> bool {
     matches!(name.as_encoded_bytes().first(), Some(b'.' | b'_'))
 }
 
+/// Whether it is the name of a table file. Hidden names and other endings are left by other programs.
 pub(super) fn is_table_file(name: &OsStr) -> bool {
     let extension = Path::new(name).extension();
     !is_hidden(name) && extension.is_some_and(|extension| extension == FILE_EXTENSION)

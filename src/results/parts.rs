@@ -7,20 +7,18 @@
 use crate::observe::Measurements;
 use crate::results::directory::Results;
 use crate::results::tables::{
-    self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, PrecursorRow, RowOfJob, SlipRow,
-    label, relabel,
+    self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, RowOfJob, label, relabel,
 };
 use crate::results::workers::Member;
 use crate::sweep::{Job, Outline, Part, PartName};
 use crate::table::Table;
 use crate::table::columns::columns;
 use crate::table::error::ResultsError;
-use crate::table::file::{Batch, DataFile, Dataset, Footer, RowCount, TableWriter};
+use crate::table::file::{Batch, DataFile, Dataset, Footer, TableWriter};
 use crate::table::storage::StorageError;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::iter;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
 /// What a job of a part ended with: its measurements, or why it failed.
@@ -45,7 +43,7 @@ impl<'a> Results<'a> {
                 let problem = "it is missing, though the jobs of its part are there";
                 return Err(ResultsError::damaged(&file.path, problem));
             }
-            file.rows = Some(row_count(self.dataset_of(tables::JOBS, part), table)?);
+            file.rows = row_count(self.dataset_of(tables::JOBS, part), table)?;
             files.push(file);
         }
         Ok(Dataset::of(self.layout().storage, files))
@@ -84,9 +82,19 @@ impl<'a> Results<'a> {
             let file = self.file_in(place, table, part.name);
             let kept = &kept[table];
             match table {
-                tables::SLIPS => encoded(file, &left_out, &jobs, kept, slip_rows),
-                tables::PRECURSORS => encoded(file, &left_out, &jobs, kept, precursor_rows),
-                _ => encoded(file, &left_out, &jobs, kept, job_row),
+                tables::SLIPS => encoded(file, &left_out, &jobs, kept, |job, outcome| {
+                    let slips = outcome.iter().flat_map(|measured| &measured.slips);
+                    slips.map(move |slip| (Cow::Borrowed(job), Cow::Borrowed(slip)))
+                }),
+                tables::PRECURSORS => encoded(file, &left_out, &jobs, kept, |job, outcome| {
+                    let precursors = outcome.iter().flat_map(|measured| &measured.precursors);
+                    precursors.map(move |precursor| (Cow::Borrowed(job), Cow::Borrowed(precursor)))
+                }),
+                _ => encoded(file, &left_out, &jobs, kept, |job, outcome| {
+                    let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
+                    let row: JobRow = (relabel(job), record);
+                    [row]
+                }),
             }
         };
         self.tables().map(encoded).collect()
@@ -114,7 +122,7 @@ impl<'a> Results<'a> {
         // All tables: a worker may also have died while it removed them.
         let mut spilled = HashSet::new();
         for table in self.tables() {
-            spilled.extend(self.layout().parts_in(&self.layout().spill().join(table))?);
+            spilled.extend(self.spilled_parts(table)?);
         }
         if spilled.is_empty() {
             return Ok(());
@@ -147,46 +155,25 @@ pub type Kept = HashMap<&'static str, KeptRows>;
 type Jobs<'a> = Vec<(&'a JobLabel<DriveAndSeed>, Option<&'a Outcome>)>;
 
 /// The bytes of a file of one table.
-fn encoded<'j, R: Table, I: Iterator<Item = R>>(
+fn encoded<'j, R: Table, Rows: IntoIterator<Item = R>>(
     file: DataFile,
     left_out: &[Cow<'static, str>],
     jobs: &Jobs<'j>,
     kept: &KeptRows,
-    rows: impl Fn(&'j JobLabel<DriveAndSeed>, &'j Outcome) -> I,
+    rows: impl Fn(&'j JobLabel<DriveAndSeed>, &'j Outcome) -> Rows,
 ) -> Result<(PathBuf, Vec<u8>), ResultsError> {
     let footer = Footer::default().and(&file.footer).at(&file.path);
     let mut writer = TableWriter::in_memory(left_out, &file.path, &footer)?;
     for (job, outcome) in jobs {
         match outcome {
-            Some(outcome) => rows(job, outcome).try_for_each(|row| writer.push(&row))?,
+            Some(outcome) => {
+                let mut rows = rows(job, outcome).into_iter();
+                rows.try_for_each(|row| writer.push(&row))?;
+            }
             None => kept.copy(&mut writer, &job.0.job_id)?,
         }
     }
     Ok((file.path, writer.finish()?))
-}
-
-fn slip_rows<'j>(
-    job: &'j JobLabel<DriveAndSeed>,
-    outcome: &'j Outcome,
-) -> impl Iterator<Item = SlipRow<'j>> {
-    let slips = outcome.iter().flat_map(|measured| &measured.slips);
-    slips.map(|slip| (Cow::Borrowed(job), Cow::Borrowed(slip)))
-}
-
-fn precursor_rows<'j>(
-    job: &'j JobLabel<DriveAndSeed>,
-    outcome: &'j Outcome,
-) -> impl Iterator<Item = PrecursorRow<'j>> {
-    let precursors = outcome.iter().flat_map(|measured| &measured.precursors);
-    precursors.map(|precursor| (Cow::Borrowed(job), Cow::Borrowed(precursor)))
-}
-
-fn job_row(
-    job: &JobLabel<DriveAndSeed>,
-    outcome: &Outcome,
-) -> impl Iterator<Item = JobRow> + use<> {
-    let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
-    iter::once((relabel(job), record))
 }
 
 columns! {
@@ -200,34 +187,35 @@ columns! {
 }
 
 impl RowsOfJob {
-    /// How many rows the job has in a table. A job that may run again may have more, which a killed run wrote.
-    pub(super) fn count(&self, table: &str) -> RowCount {
+    /// The fewest and the most rows of the job in a table. One that may run again may have more, which a killed run
+    /// wrote.
+    pub(super) fn count(&self, table: &str) -> RangeInclusive<u64> {
         let rows = if table == tables::SLIPS {
             self.slips
         } else {
             self.precursors
         };
-        let may_exceed = matches!(self.outcome, JobOutcome::Failed | JobOutcome::TimeLimit);
-        RowCount {
-            least: rows.unwrap_or(0),
-            may_exceed,
+        let least = rows.unwrap_or(0);
+        match self.outcome {
+            JobOutcome::Failed | JobOutcome::TimeLimit => least..=u64::MAX,
+            JobOutcome::Done | JobOutcome::NoSlips => least..=least,
         }
     }
 }
 
-/// How many rows the jobs of a part have in a table, as its jobs file says.
-pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, ResultsError> {
-    let mut all = RowCount {
-        least: 0,
-        may_exceed: false,
-    };
-    for batch in jobs.rows::<RowsOfJob>() {
-        for RowCount { least, may_exceed } in batch?.iter().map(|job| job.count(table)) {
-            all.least = all.least.saturating_add(least);
-            all.may_exceed |= may_exceed;
-        }
+/// The fewest and the most rows of the jobs of a part in a table, as its jobs file says.
+pub(super) fn row_count(
+    jobs: Dataset<'_>,
+    table: &str,
+) -> Result<RangeInclusive<u64>, ResultsError> {
+    let mut least = 0_u64;
+    let mut most = 0_u64;
+    for job in jobs.rows::<RowsOfJob>() {
+        let of_job = job?.count(table);
+        least = least.saturating_add(*of_job.start());
+        most = most.saturating_add(*of_job.end());
     }
-    Ok(all)
+    Ok(least..=most)
 }
 
 /// The rows of a file by job.

@@ -179,9 +179,10 @@ impl<'a> Pending<'a> {
         }
         let mut ids = HashSet::new();
         for table in self.results.tables() {
-            match settled(|| self.results.spilled_ids(outline, table))? {
-                Some(Ok(of_table)) => ids = of_table,
-                Some(Err(Lost)) | None => return Ok(BTreeSet::new()),
+            match settled(|| self.results.spilled_ids(outline, table)) {
+                Ok(Some(of_table)) => ids = of_table,
+                Ok(None) => return Ok(BTreeSet::new()),
+                Err(error) => return error.damage().map(|_| BTreeSet::new()),
             }
         }
         let part = self.part(outline);
@@ -290,9 +291,6 @@ columns! {
     }
 }
 
-/// A file of the spill is damaged or gone.
-struct Lost;
-
 impl Results<'_> {
     /// How far all parts are. Of a directory of another version, whose parts were others, nothing counts as missing.
     pub fn overview(&self) -> Result<Overview, ResultsError> {
@@ -310,17 +308,16 @@ impl Results<'_> {
         let mut again = BTreeMap::new();
         let mut rows = 0;
         let jobs = self.dataset_of(tables::JOBS, part.name);
-        for batch in jobs.rows::<OutcomeRow>() {
-            for row in batch? {
-                let is_cut_off = row.simulated_time.is_some_and(is_cut_off);
-                let why = match row.outcome {
-                    JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
-                    JobOutcome::TimeLimit if is_cut_off => Some(Again::CutOff),
-                    _ => None,
-                };
-                again.extend(why.map(|why| (rows, why)));
-                rows += 1;
-            }
+        for row in jobs.rows::<OutcomeRow>() {
+            let row = row?;
+            let is_cut_off = row.simulated_time.is_some_and(is_cut_off);
+            let why = match row.outcome {
+                JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
+                JobOutcome::TimeLimit if is_cut_off => Some(Again::CutOff),
+                _ => None,
+            };
+            again.extend(why.map(|why| (rows, why)));
+            rows += 1;
         }
         if rows != part.job_count {
             let file = self.part_file(tables::JOBS, part);
@@ -344,21 +341,19 @@ impl Results<'_> {
         &self,
         outline: &Outline,
         table: &str,
-    ) -> Result<Option<Result<HashSet<String>, Lost>>, ResultsError> {
+    ) -> Result<Option<HashSet<String>>, ResultsError> {
         let file = self.file_in(&self.layout().spill(), table, outline.name);
-        let mut ids = HashSet::new();
-        for batch in Dataset::of(self.layout().storage, vec![file]).rows::<RowOfJob>() {
-            match batch {
-                Ok(rows) => ids.extend(rows.into_iter().map(|row| row.job_id)),
-                Err(error) if error.kind == ErrorKind::Damaged => return Ok(Some(Err(Lost))),
-                Err(error) if error.kind == ErrorKind::Disk(io::ErrorKind::NotFound) => {
-                    // Another worker that has just committed the part has removed the file.
-                    let is_listed = self.spilled_parts(table)?.contains(&outline.name);
-                    return Ok((!is_listed).then_some(Err(Lost)));
-                }
-                Err(error) => return Err(error),
+        let rows = Dataset::of(self.layout().storage, vec![file]).rows::<RowOfJob>();
+        let ids = rows.map(|row| row.map(|row| row.job_id));
+        match ids.collect::<Result<HashSet<String>, ResultsError>>() {
+            // If it is listed no more, another worker has committed the part and removed it.
+            Err(error)
+                if error.kind == ErrorKind::Disk(io::ErrorKind::NotFound)
+                    && self.spilled_parts(table)?.contains(&outline.name) =>
+            {
+                Ok(None)
             }
+            ids => ids.map(Some),
         }
-        Ok(Some(Ok(ids)))
     }
 }

@@ -12,7 +12,7 @@ use crate::results::pending::{Pending, Retry};
 use crate::results::tables::{self, RowOfJob};
 use crate::sweep::{Outline, Part, PartName};
 use crate::table::error::ResultsError;
-use crate::table::file::{DataFile, Footer};
+use crate::table::file::{DataFile, Footer, check_count};
 use crate::table::shown::{serialize_path, shown};
 use crate::table::storage::StorageError;
 use serde::Serialize;
@@ -88,13 +88,29 @@ impl<'a> Results<'a> {
     }
 }
 
+/// Moves a file, if it is there, to the quarantine, under a name that is free.
 fn move_away(layout: &Layout<'_>, path: &Path) -> Result<(), StorageError> {
+    let storage = layout.storage;
+    if !storage.exists(path)? {
+        return Ok(());
+    }
     let places = [layout.tables(), layout.run(), layout.root().to_owned()];
     let below = places
         .iter()
         .find_map(|folder| path.strip_prefix(folder).ok());
     let target = layout.quarantine().join(below.unwrap_or(path));
-    layout.storage.move_away(path, &target)
+    let folder = target.parent().unwrap_or(&target);
+    storage.ensure_folder(folder)?;
+    let mut free = target.clone();
+    let mut number = 0;
+    while storage.exists(&free)? {
+        number += 1;
+        free = target.with_added_extension(number.to_string());
+    }
+    storage.rename(path, &free)?;
+    let folders = [Some(folder), path.parent()];
+    let mut folders = folders.into_iter().flatten();
+    folders.try_for_each(|folder| storage.sync_folder(folder))
 }
 
 fn examine<'a>(layout: &Layout<'a>) -> Result<(Results<'a>, Verification), ResultsError> {
@@ -251,11 +267,8 @@ fn damage_of(
 fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
     let path = results.part_file(tables::JOBS, part);
     let damaged = |problem: String| Err(ResultsError::damaged(&path, problem));
-    let mut jobs: Vec<RowsOfJob> = Vec::new();
-    let dataset = results.dataset_of(tables::JOBS, part.name);
-    for batch in dataset.rows() {
-        jobs.extend(batch?);
-    }
+    let jobs = results.dataset_of(tables::JOBS, part.name).rows();
+    let jobs: Vec<RowsOfJob> = jobs.collect::<Result<_, _>>()?;
     for (expected, job) in ids(results, part).zip(&jobs) {
         if job.job_id != expected {
             let found = &job.job_id;
@@ -281,23 +294,21 @@ fn check_counts(
     let path = results.part_file(table, part);
     let mut counts = vec![0; jobs.len()];
     let mut at = 0;
-    let dataset = results.dataset_of(table, part.name);
-    for batch in dataset.rows::<RowOfJob>() {
-        for RowOfJob { job_id } in batch? {
-            // Rows stand in the order of the jobs.
-            let passed = jobs[at..].iter().take_while(|job| job.job_id != job_id);
-            at += passed.count();
-            let Some(count) = counts.get_mut(at) else {
-                let problem = format!("it has rows of job {job_id}, which its part does not have");
-                return Err(ResultsError::damaged(&path, problem));
-            };
-            *count += 1;
-        }
+    for row in results.dataset_of(table, part.name).rows() {
+        let RowOfJob { job_id } = row?;
+        // Rows stand in the order of the jobs.
+        let passed = jobs[at..].iter().take_while(|job| job.job_id != job_id);
+        at += passed.count();
+        let Some(count) = counts.get_mut(at) else {
+            let problem = format!("it has rows of job {job_id}, which its part does not have");
+            return Err(ResultsError::damaged(&path, problem));
+        };
+        *count += 1;
     }
     for (job, rows) in jobs.iter().zip(counts) {
         let problem =
             |problem| ResultsError::damaged(&path, format!("of job {} {problem}", job.job_id));
-        job.count(table).check(rows).map_err(problem)?;
+        check_count(rows, &job.count(table)).map_err(problem)?;
     }
     Ok(())
 }

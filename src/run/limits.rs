@@ -89,17 +89,15 @@ pub fn parse_threads(text: &str) -> Result<NonZeroUsize, String> {
     count.ok_or_else(|| format!("must be a whole number from 1 to {MAX_THREADS}"))
 }
 
-/// CPU time that the calling thread has used since some instant, in s.
-fn thread_seconds() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
 /// CPU seconds of the calling thread that a computation takes, and its result.
 pub fn timed<T>(compute: impl FnOnce() -> T) -> (f64, T) {
-    let start = thread_seconds();
+    let used = || {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+    };
+    let start = used();
     let result = compute();
-    (thread_seconds() - start, result)
+    (used() - start, result)
 }
 
 const KILOBYTE: f64 = 1024.0;

@@ -73,12 +73,11 @@ impl Cut {
         if !results.extensions().iter().any(has_time) {
             return Ok(cut);
         }
-        for batch in results.dataset(JOBS)?.rows::<Ended>() {
-            for job in batch? {
-                if job.outcome == JobOutcome::TimeLimit {
-                    cut.jobs += 1;
-                    cut.slips += job.slips.unwrap_or(0);
-                }
+        for job in results.dataset(JOBS)?.rows::<Ended>() {
+            let job = job?;
+            if job.outcome == JobOutcome::TimeLimit {
+                cut.jobs += 1;
+                cut.slips += job.slips.unwrap_or(0);
             }
         }
         Ok(cut)
@@ -214,11 +213,8 @@ impl Tally {
                 jobs,
                 predicted_cost,
                 ..
-            } => {
-                self.jobs += jobs;
-                self.predicted += predicted_cost;
             }
-            RunEvent::RoundBegun {
+            | RunEvent::RoundBegun {
                 jobs,
                 predicted_cost,
                 ..

@@ -96,7 +96,7 @@ pub struct RowBuffer {
     schema: SchemaRef,
     /// One for each column of the row type; `None` for a column that is left out.
     cells: Vec<Option<Cells>>,
-    rows: usize,
+    pub(super) rows: usize,
 }
 
 enum Cells {
@@ -134,14 +134,6 @@ impl RowBuffer {
         }
         self.schema = schema_of(fields);
         self
-    }
-
-    pub const fn len(&self) -> usize {
-        self.rows
-    }
-
-    pub const fn is_empty(&self) -> bool {
-        self.rows == 0
     }
 
     pub const fn schema(&self) -> &SchemaRef {
@@ -259,9 +251,9 @@ mod tests {
         for row in &readings() {
             buffer.push(row);
         }
-        assert_eq!(buffer.len(), 2);
+        assert_eq!(buffer.rows, 2);
         let batch = buffer.take().unwrap();
-        assert!(buffer.is_empty());
+        assert_eq!(buffer.rows, 0);
         batch
     }
 

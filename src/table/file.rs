@@ -24,7 +24,7 @@ use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -167,7 +167,7 @@ impl<R: Row, S: Sink> TableWriter<R, S> {
 
     pub fn push(&mut self, row: &R) -> Result<(), ResultsError> {
         self.buffer.push(row);
-        if self.buffer.len() == GROUP_ROWS {
+        if self.buffer.rows == GROUP_ROWS {
             self.flush()
         } else {
             Ok(())
@@ -177,12 +177,12 @@ impl<R: Row, S: Sink> TableWriter<R, S> {
     /// Appends rows that were read from a file of the same table.
     pub fn copy(&mut self, batch: &Batch, mut rows: Range<usize>) -> Result<(), ResultsError> {
         while !rows.is_empty() {
-            let next = rows.end.min(rows.start + GROUP_ROWS - self.buffer.len());
+            let next = rows.end.min(rows.start + GROUP_ROWS - self.buffer.rows);
             self.buffer
                 .copy(&batch.rows, rows.start..next)
                 .map_err(ResultsError::damage_at(&batch.path))?;
             rows.start = next;
-            if self.buffer.len() == GROUP_ROWS {
+            if self.buffer.rows == GROUP_ROWS {
                 self.flush()?;
             }
         }
@@ -204,7 +204,7 @@ impl<R: Row, S: Sink> TableWriter<R, S> {
 
     /// Writes what is left and the footer, brings the file to the disk.
     pub fn finish(mut self) -> Result<S, ResultsError> {
-        if !self.buffer.is_empty() {
+        if self.buffer.rows > 0 {
             self.flush()?;
         }
         let footer = || -> Result<Vec<u8>, ParquetError> {
@@ -254,30 +254,23 @@ fn check_footer(path: &Path, metadata: &ParquetMetaData, expected: &Footer) -> R
     Ok(())
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RowCount {
-    pub least: u64,
-    pub may_exceed: bool,
-}
-
-impl RowCount {
-    pub fn check(self, rows: u64) -> Result<(), String> {
-        let Self { least, may_exceed } = self;
-        if rows == least || (may_exceed && rows > least) {
-            Ok(())
-        } else {
-            Err(format!(
-                "it has {rows} rows, where the jobs of its part have {least}"
-            ))
-        }
+/// Compares a number of rows with the fewest and the most.
+pub fn check_count(rows: u64, expected: &RangeInclusive<u64>) -> Result<(), String> {
+    if expected.contains(&rows) {
+        return Ok(());
     }
+    let least = expected.start();
+    Err(format!(
+        "it has {rows} rows, where the jobs of its part have {least}"
+    ))
 }
 
 /// A file of a table, and what is known of it: if it differs from that, it is damaged.
 #[derive(Clone)]
 pub struct DataFile {
     pub path: PathBuf,
-    pub rows: Option<RowCount>,
+    /// The fewest, and the most.
+    pub rows: RangeInclusive<u64>,
     pub footer: Arc<Footer>,
 }
 
@@ -286,7 +279,7 @@ impl DataFile {
     pub fn with_footer(path: PathBuf, footer: Footer) -> Self {
         Self {
             path,
-            rows: None,
+            rows: 0..=u64::MAX,
             footer: Arc::new(footer),
         }
     }
@@ -330,9 +323,15 @@ impl<'a> Dataset<'a> {
         self.read(Vec::new())
     }
 
-    /// The same, as rows of one type.
-    pub fn rows<R: Row>(self) -> impl Iterator<Item = Result<Vec<R>, ResultsError>> + use<'a, R> {
-        self.read(R::names()).map(|batch| batch?.rows_of())
+    /// The same, row by row.
+    pub fn rows<R: Row>(self) -> impl Iterator<Item = Result<R, ResultsError>> + use<'a, R> {
+        self.read(R::names()).flat_map(|batch| {
+            let (rows, error) = match batch.and_then(|batch| batch.rows_of()) {
+                Ok(rows) => (rows, None),
+                Err(error) => (Vec::new(), Some(Err(error))),
+            };
+            rows.into_iter().map(Ok).chain(error)
+        })
     }
 
     /// The same, of the columns with these names alone, of which there is at least one; in the order of the file.
@@ -381,10 +380,8 @@ fn open(
         let mut builder = builder.with_batch_size(BATCH_ROWS);
         let metadata = builder.metadata();
         check_footer(path, metadata, &file.footer).map_err(ParquetError::General)?;
-        if let Some(expected) = file.rows {
-            let rows = metadata.file_metadata().num_rows().cast_unsigned();
-            expected.check(rows).map_err(ParquetError::General)?;
-        }
+        let rows = metadata.file_metadata().num_rows().cast_unsigned();
+        check_count(rows, &file.rows).map_err(ParquetError::General)?;
         if !columns.is_empty() {
             let names = columns.iter().map(AsRef::as_ref);
             let mask = ProjectionMask::columns(builder.parquet_schema(), names);
@@ -467,11 +464,8 @@ mod tests {
         assert_eq!(numbers(folder.path()).unwrap(), (0..9).collect::<Vec<_>>());
         let rows = dataset(folder.path())
             .rows()
-            .collect::<Result<Vec<Vec<Number>>, _>>();
-        assert_eq!(
-            rows.unwrap().concat(),
-            (0..9).map(Number::of).collect::<Vec<_>>()
-        );
+            .collect::<Result<Vec<Number>, _>>();
+        assert_eq!(rows.unwrap(), (0..9).map(Number::of).collect::<Vec<_>>());
     }
 
     #[test]
@@ -577,16 +571,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.parquet");
         write(&path, 0..5);
-        let read = |least, may_exceed| {
+        let read = |rows| {
             let file = DataFile {
                 path: path.clone(),
-                rows: Some(RowCount { least, may_exceed }),
+                rows,
                 footer: Arc::new(Footer::empty()),
             };
             file.check(&Disk)
         };
-        assert!(read(5, false).is_ok() && read(5, true).is_ok() && read(4, true).is_ok());
-        for error in [read(4, false), read(6, false), read(6, true)].map(Result::unwrap_err) {
+        let more = |least| read(least..=u64::MAX);
+        assert!(read(5..=5).is_ok() && more(5).is_ok() && more(4).is_ok());
+        for error in [read(4..=4), read(6..=6), more(6)].map(Result::unwrap_err) {
             assert!(
                 error
                     .to_string()

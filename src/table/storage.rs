@@ -10,10 +10,8 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::SystemTime;
 
-/// How often to look whether a lock is free.
-const LOCK_POLL: Duration = Duration::from_millis(if cfg!(test) { 1 } else { 20 });
 /// Most bytes of a file that is read as a whole: more than a part can have whose jobs fit in memory.
 pub const MAX_WHOLE: u64 = 1 << 32;
 
@@ -114,18 +112,12 @@ pub trait Storage: Sync {
         read().map_err(StorageError::at("read", file))
     }
 
-    /// When a file, or a name in a folder, was written last, by the clock of its file system.
-    fn modified(&self, path: &Path) -> Result<SystemTime, StorageError> {
+    /// When a file was written last, by the clock of its file system.
+    fn modified(&self, file: &Path) -> Result<SystemTime, StorageError> {
         // A network file system may have stale answers for what is not opened.
-        let opened = self.open(path);
-        let opened = opened.or_else(|error| open_folder(path).map_err(|_| error))?;
-        let modified = opened.metadata().and_then(|metadata| metadata.modified());
-        modified.map_err(StorageError::at("look up", path))
-    }
-
-    /// Whether files can be moved from one folder to another, as far as that is known.
-    fn is_one_disk(&self, one: &Path, other: &Path) -> bool {
-        disk(one).is_none_or(|one| disk(other).is_none_or(|other| one == other))
+        let metadata = self.open(file)?.metadata();
+        let modified = metadata.and_then(|metadata| metadata.modified());
+        modified.map_err(StorageError::at("look up", file))
     }
 
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
@@ -155,38 +147,6 @@ pub trait Storage: Sync {
         self.ensure_folder_below(top, parent)?;
         self.create_folder(folder)?;
         self.sync_folder(parent)
-    }
-
-    /// Moves a file, if it is there, under a name that is free.
-    fn move_away(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
-        if !self.exists(from)? {
-            return Ok(());
-        }
-        if let Some(folder) = to.parent() {
-            self.ensure_folder(folder)?;
-        }
-        let mut free = to.to_owned();
-        let mut number = 0;
-        while self.exists(&free)? {
-            number += 1;
-            free = to.with_added_extension(number.to_string());
-        }
-        self.rename(from, &free)?;
-        let folders = [free.parent(), from.parent()];
-        let mut folders = folders.into_iter().flatten();
-        folders.try_for_each(|folder| self.sync_folder(folder))
-    }
-
-    /// Tries for a lock until it is free or the time is over.
-    fn wait_for_lock(&self, file: &Path, max_wait: Duration) -> Result<Lock, StorageError> {
-        let begin = Instant::now();
-        loop {
-            let lock = self.lock(file)?;
-            if !matches!(lock, Lock::Taken) || begin.elapsed() >= max_wait {
-                return Ok(lock);
-            }
-            std::thread::sleep(LOCK_POLL);
-        }
     }
 }
 
@@ -265,25 +225,16 @@ fn open_regular(options: &OpenOptions, path: &Path) -> io::Result<File> {
     }
 }
 
-/// Opens a folder: an empty path is that of the present one.
-fn open_folder(path: &Path) -> io::Result<File> {
-    let path = if path == "" { Path::new(".") } else { path };
-    let mut options = File::options();
-    options.read(true);
-    options.custom_flags(libc::O_DIRECTORY);
-    options.open(path)
-}
-
-/// The device of a folder that is there, and the mount: nothing is moved from one to another.
+/// The device of a folder and the mount, if they are known: nothing is moved from one to another.
 #[cfg(target_os = "linux")]
-fn disk(folder: &Path) -> Option<(u32, u32, u64)> {
+pub fn disk(folder: &Path) -> Option<(u32, u32, u64)> {
     use rustix::fs::{AtFlags, CWD, StatxFlags, statx};
     let found = statx(CWD, folder, AtFlags::empty(), StatxFlags::MNT_ID).ok()?;
     Some((found.stx_dev_major, found.stx_dev_minor, found.stx_mnt_id))
 }
 
 #[cfg(not(target_os = "linux"))]
-const fn disk(_: &Path) -> Option<()> {
+pub const fn disk(_: &Path) -> Option<()> {
     None
 }
 
@@ -333,7 +284,11 @@ impl Storage for Disk {
     }
 
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        let synced = open_folder(folder).and_then(|folder| folder.sync_all());
+        // An empty path is that of the present folder.
+        let path = if folder == "" { Path::new(".") } else { folder };
+        let mut options = File::options();
+        options.read(true).custom_flags(libc::O_DIRECTORY);
+        let synced = options.open(path).and_then(|folder| folder.sync_all());
         synced.map_err(StorageError::at("sync", folder))
     }
 

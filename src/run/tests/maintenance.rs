@@ -186,8 +186,8 @@ fn run_all(root: &Path, seeds: u64) -> u64 {
 fn ids(root: &Path) -> Vec<String> {
     let mut ids = Vec::new();
     let results = Results::read(&Layout::new(&Disk, root)).unwrap();
-    for batch in results.dataset("jobs").unwrap().rows() {
-        ids.extend(batch.unwrap().into_iter().map(|names: Names| names.job_id));
+    for names in results.dataset("jobs").unwrap().rows::<Names>() {
+        ids.push(names.unwrap().job_id);
     }
     ids.sort();
     ids

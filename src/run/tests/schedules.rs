@@ -101,7 +101,7 @@ impl Process {
             Self::Read => Ok(Results::read(layout)?
                 .dataset("jobs")?
                 .rows::<Names>()
-                .try_for_each(|batch| batch.map(drop))?),
+                .try_for_each(|names| names.map(drop))?),
         }
     }
 }

@@ -126,8 +126,7 @@ fn a_directory_of_another_version_is_reduced_and_exported_unchanged_and_not_run(
         .dataset("jobs")
         .unwrap()
         .rows::<Names>()
-        .flat_map(|names| names.unwrap())
-        .map(|names| names.job_id)
+        .map(|names| names.unwrap().job_id)
         .collect();
     let own_ids = |sweep: &crate::sweep::Sweep| {
         sweep
