@@ -163,11 +163,14 @@ fn draw_slips(
         let (all, ..) = sample_of_slips(results, sets, None)?;
         return Err(figure.unmatched(&condition, &all).into());
     }
-    let mut note = common(slips.iter().map(|slip| &*slip.0.1)) + &figure.shown_condition() + "; ";
-    if every > 1 {
-        note += &format!("one in {every} of ");
-    }
-    let look = look.with_note(&(note + &format!("{matching} slips")));
+    let part = if every > 1 {
+        format!("one in {every} of ")
+    } else {
+        String::new()
+    };
+    let common = common(slips.iter().map(|slip| &*slip.0.1));
+    let condition = figure.shown_condition();
+    let look = look.with_note(&format!("{common}{condition}; {part}{matching} slips"));
     let quantity = |option, name: &str| Ok(Quantity::of(&slips, option, name)?);
     custom::custom(&quantity, &[], &swept(sets), figure, &look)
 }
