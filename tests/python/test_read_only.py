@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import stickslip
+
 SWEEP = 'name = "a"\n[model]\nN = 5\n[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 3 }\n[record]\nslips = 4\n'
 
 
@@ -48,3 +50,19 @@ def test_results_are_reduced_elsewhere_where_nothing_can_be_written(reader):
     assert not (folder / "r" / "reduced").exists()
     done = run("reduce", "r")
     assert done.returncode == 3 and "r" in done.stderr, done.stderr
+
+
+def test_the_module_reads_them_too(reader):
+    _, folder = reader
+    child = os.fork()
+    if child == 0:
+        sets = 0
+        try:
+            if os.geteuid() == 0:
+                os.setgroups([])
+                os.setgid(65534)
+                os.setuid(65534)
+            sets = len(stickslip.open(folder / "r").sets())
+        finally:
+            os._exit(sets)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 2
