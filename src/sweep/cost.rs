@@ -49,9 +49,9 @@ const STEPS_OF_A_PERIOD: f64 = 250.0;
 const SHAKEN: f64 = 0.4;
 const BREAKS_OF_A_PERIOD: f64 = 0.2;
 const FOLLOWS: f64 = 0.6;
-/// A slider that slips to and fro too fast to come to rest does so by chance: after a reattachment time, and this share
-/// of one more times the square of the blocks.
-const RESTLESS: f64 = 0.02;
+/// A slider that slides, or slips to and fro too fast to come to rest, does so by chance: after two reattachment times
+/// with few blocks, and much later with more than this.
+const RESTLESS_BLOCKS: f64 = 12.0;
 
 /// Predicted CPU time of a job, in s.
 pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: Solver) -> f64 {
@@ -135,22 +135,21 @@ impl Motion {
         let period = TAU / parameters.largest_modulation_frequency();
         let swing = amplitude / (velocity * (interval - delay));
         let follows = swing > FOLLOWS;
-        let restless = follows && period < 2.0 * duration + delay;
         let about_a_slip = RESOLVED_REATTACHMENTS * delay.min(duration)
             + RESOLVED_DAMPINGS / parameters.damping_rate;
         // In a slip each contact breaks, and again as often as it attaches again on the way.
         let breaks_of_a_slip = 1.0 + 1.0 / (delay / duration + reach / (velocity * interval));
-        let slides = velocity > critical;
-        if slides || follows {
-            let given_up = recording.give_up_time(parameters).min(longest);
-            let blocks = parameters.blocks as f64;
-            let time = if slides {
-                given_up
-            } else if restless {
-                let rest = delay * (1.0 + RESTLESS * blocks * blocks);
-                given_up.min(recording.expected_time(rest))
-            } else {
+        if velocity > critical || follows {
+            let is_restless = velocity > critical || period < 2.0 * duration + delay;
+            let crowd = parameters.blocks as f64 / RESTLESS_BLOCKS;
+            let rest = 2.0 * delay * (1.0 + crowd * crowd * crowd * crowd);
+            let given_up = recording.give_up_time(parameters);
+            let time = if !is_restless {
                 recording.expected_time(0.5 * period)
+            } else if rest < given_up {
+                recording.expected_time(rest)
+            } else {
+                given_up.min(longest)
             };
             let fastest = velocity.max(4.0 * amplitude / period);
             let of_slips = breaks_of_a_slip * fastest / (velocity * (interval - delay));
