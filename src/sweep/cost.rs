@@ -26,17 +26,17 @@ const GRID_EVENT: f64 = 250e-9;
 const GRID_STEP_OF_A_BLOCK: f64 = 0.22e-9;
 const GRID_STEP_OVERHEAD: f64 = 10e-9;
 
-/// CPU time of a break with its reattachment in Taylor steps, of a step, and of a step on one block, in s.
-const TAYLOR: [f64; 3] = [650e-9, 170e-9, 3.3e-9];
-const TAYLOR_WITH_LEDGER: [f64; 3] = [1.4e-6, 100e-9, 30e-9];
+/// CPU time in Taylor steps, in s: of a job beside its motion, a break with its reattachment, a step, and a step on one
+/// block. A ledger sets up a quadrature for each job.
+const TAYLOR: [f64; 4] = [0.0, 650e-9, 170e-9, 3.3e-9];
+const TAYLOR_WITH_LEDGER: [f64; 4] = [4e-4, 1.4e-6, 100e-9, 30e-9];
 /// Taylor steps for each break at a tolerance of 1e-3; for each step of the grid that follows the modulation; and the
 /// share of resolved motion that they resolve.
 const TAYLOR_STEPS_OF_A_BREAK: f64 = 0.9;
 const TAYLOR_STEPS_OF_A_GRID_STEP: f64 = 0.3;
 const TAYLOR_SHARE: f64 = 0.6;
-/// CPU time of a job beside its motion, and of its energy ledger, in s.
+/// CPU time of a job beside its motion, in s.
 const JOB_OVERHEAD: f64 = 2e-5;
-const LEDGER_OVERHEAD: f64 = 4e-4;
 
 /// How long motion is resolved about a slip: in reattachment times, or durations of the slip if these are shorter, and
 /// in times in which damping slows it.
@@ -69,7 +69,7 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
         }
         Method::EventDriven => {
             let finer = fourth_root(fourth_root(1e-3 / setting));
-            let [of_a_break, of_a_step, of_a_block] = if recording.energies {
+            let [of_a_job, of_a_break, of_a_step, of_a_block] = if recording.energies {
                 TAYLOR_WITH_LEDGER
             } else {
                 TAYLOR
@@ -78,16 +78,11 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
             let steps = TAYLOR_STEPS_OF_A_BREAK * finer * motion.breaks
                 + TAYLOR_STEPS_OF_A_GRID_STEP * motion.steps_of_periods
                 + resolved / longest_taylor_step(parameters);
-            motion.breaks * of_a_break + steps * (of_a_step + of_a_block * blocks)
+            of_a_job + motion.breaks * of_a_break + steps * (of_a_step + of_a_block * blocks)
         }
         Method::FixedStep => motion.time / setting * (STEP_OVERHEAD + STEP_OF_A_BLOCK * blocks),
     };
-    let of_ledger = if recording.energies {
-        LEDGER_OVERHEAD
-    } else {
-        0.0
-    };
-    JOB_OVERHEAD + of_ledger + of_motion
+    JOB_OVERHEAD + of_motion
 }
 
 /// What a slider is expected to do in a job.
@@ -307,6 +302,13 @@ mod tests {
             ("Delta=5e-6 T=0.002 V0=1e-5", grid, 1444.0),
             ("Delta=1e-5 T=0.005", grid, 148.7),
             ("Delta=1e-5 T=0.0333", grid, 16.9),
+            ("Delta=1.2e-5 T=0.5", grid, 17.0),
+            ("tau_r=0.3 V0=1e-5", grid, 11.9),
+            ("N=1 Ns=1", grid, 0.05),
+            ("N=2 Ns=2 V0=1e-3", grid, 0.096),
+            ("N=10 Ns=5", grid, 0.9),
+            ("N=200 Ns=3 V0=1e-5", taylor, 690.0),
+            ("N=20 Ns=3 V0=1e-6", taylor, 8.5),
         ] {
             let mut parameters = Parameters::default();
             for setting in settings.split_whitespace() {
