@@ -140,17 +140,28 @@ impl Motion {
             let rest = 2.0 * delay * (1.0 + crowd * crowd * crowd * crowd);
             let given_up = recording.give_up_time(parameters);
             let time = if !is_restless {
-                recording.expected_time(0.5 * period)
+                recording.expected_time(interval.min(0.5 * period))
             } else if rest < given_up {
                 recording.expected_time(rest)
             } else {
                 given_up.min(longest)
             };
             let fastest = velocity.max(4.0 * amplitude / period);
-            let of_slips = breaks_of_a_slip * fastest / (velocity * (interval - delay));
-            let rate = of_slips.min(1.0 / (delay + reach / fastest));
+            let sliding = 1.0 / (delay + reach / fastest);
+            let slips = fastest / (velocity * (interval - delay));
+            let rate = if is_restless {
+                sliding
+            } else {
+                sliding.min(breaks_of_a_slip * slips)
+            };
+            let moving = about_a_slip
+                * if is_restless {
+                    contacts * sliding
+                } else {
+                    slips
+                };
             let breaks = contacts * (1.0 + time * rate);
-            return Self::resolved(time, time.min(about_a_slip * breaks), breaks);
+            return Self::resolved(time, time * moving.min(1.0), breaks);
         }
         let time = recording.expected_time(interval);
         let slips = time / interval;
