@@ -148,20 +148,14 @@ impl Motion {
             };
             let fastest = velocity.max(4.0 * amplitude / period);
             let sliding = 1.0 / (delay + reach / fastest);
-            let slips = fastest / (velocity * (interval - delay));
-            let rate = if is_restless {
-                sliding
+            // Without rest, each break is followed by motion.
+            let slips = if is_restless {
+                contacts * sliding
             } else {
-                sliding.min(breaks_of_a_slip * slips)
+                fastest / (velocity * (interval - delay))
             };
-            let moving = about_a_slip
-                * if is_restless {
-                    contacts * sliding
-                } else {
-                    slips
-                };
-            let breaks = contacts * (1.0 + time * rate);
-            return Self::resolved(time, time * moving.min(1.0), breaks);
+            let breaks = contacts * (1.0 + time * sliding.min(breaks_of_a_slip * slips));
+            return Self::resolved(time, time * (about_a_slip * slips).min(1.0), breaks);
         }
         let time = recording.expected_time(interval);
         let slips = time / interval;
