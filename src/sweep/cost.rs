@@ -5,9 +5,10 @@
 //! in basic arithmetic and square roots, so that the same file gives the same parts on every machine. Changing a number
 //! here changes the parts: raise [`PLAN_VERSION`](super::PLAN_VERSION) with it.
 //!
-//! `scripts/predicted-cost` measures jobs of all sweeps of this project, each axis three times as wide, and random ones
-//! with 1 to 500 blocks of 1 to 160 contacts: nine of ten cost half to twice the prediction, and nearly all a fifth to
-//! five times. What it cannot know is when chance ends a job: with few contacts, and where the slider hardly slips.
+//! `scripts/predicted-cost` measures jobs of all sweeps of this project, their axes wider by a factor of 3 at both ends,
+//! and random ones with 1 to 500 blocks of 1 to 160 contacts at 3e-7 to 6e-4 m/s: of 196, 86 % cost half to twice the
+//! prediction, and 99 % a fifth to five times. What it cannot know is when chance ends a job: with few contacts, and
+//! where the slider hardly slips.
 
 use crate::model::Parameters;
 use crate::model::theory::{total_strength, typical_interval};
