@@ -14,6 +14,7 @@ use crate::table::value::floored;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Show what a sweep would run and what is done: jobs, parts, predicted cost. Nothing is written
@@ -36,6 +37,9 @@ pub struct Arguments {
     /// --axis]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Threads [default: those that the batch system grants, else all cores]
+    #[arg(long, value_name = "N", value_parser = limits::parse_threads)]
+    threads: Option<NonZeroUsize>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -58,6 +62,9 @@ struct Forecast<'a> {
     predicted_cpu_seconds: f64,
     predicted_wall_seconds: f64,
     threads: usize,
+    longest_job_cpu_seconds: f64,
+    /// Its command; `None` without jobs.
+    longest_job: Option<String>,
     worker_memory_bytes: f64,
     thread_memory_bytes: f64,
     directory: Option<DirectoryState>,
@@ -93,7 +100,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     if let Some(root) = &root {
         sweep::warn_of_partitions(root, &sweep);
     }
-    let threads = Threads::choose(None, |variable| std::env::var_os(variable))?;
+    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
     let threads = limits::or_all_cores(threads.count);
     let directory = root.map_or(Ok(None), |root| DirectoryState::of(&sweep, root))?;
     let forecast = Forecast::new(&sweep, threads, directory);
@@ -109,6 +116,8 @@ impl<'a> Forecast<'a> {
     fn new(sweep: &'a Sweep, threads: usize, directory: Option<DirectoryState>) -> Self {
         let totals = Plan::new(&[Extension::new(sweep, &[])]).totals();
         let axes = sweep.axes();
+        let longest = totals.longest.as_ref();
+        let longest_cost = longest.map_or(0.0, |job| job.cost);
         Self {
             name: sweep.name(),
             axes: axes
@@ -119,8 +128,10 @@ impl<'a> Forecast<'a> {
             parts: totals.parts,
             slips: floored(totals.slips.round()),
             predicted_cpu_seconds: totals.cost,
-            predicted_wall_seconds: totals.cost / threads as f64,
+            predicted_wall_seconds: (totals.cost / threads as f64).max(longest_cost),
             threads,
+            longest_job_cpu_seconds: longest_cost,
+            longest_job: longest.map(|job| sweep.command(job)),
             worker_memory_bytes: MEMORY,
             thread_memory_bytes: totals.memory + totals.memory_of_slips,
             directory,
@@ -164,6 +175,10 @@ impl<'a> Forecast<'a> {
             ("predicted wall time", format!("{wall_time} on {threads}")),
             ("worker memory", memory),
         ];
+        if let Some(command) = &self.longest_job {
+            let time = output::duration(self.longest_job_cpu_seconds);
+            pairs.push(("longest job", format!("{time}: {command}")));
+        }
         if let Some(bounds) = &self.at_most {
             let sets = bounds.sets;
             let jobs = bounds.jobs;

@@ -29,7 +29,7 @@ const ROUNDING: f64 = 1e-9;
 pub const PART_JOBS: usize = 4096;
 /// Version of how sweeps become parts: values of axes, order, cost and limits. A directory keeps the one that it was
 /// started with.
-pub const PLAN_VERSION: u32 = 7;
+pub const PLAN_VERSION: u32 = 8;
 
 /// A sweep of a directory, and what of it counts there.
 #[derive(Clone, Debug)]
@@ -89,7 +89,7 @@ impl Deref for Part {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Totals {
     pub jobs: u64,
     pub parts: u64,
@@ -100,6 +100,8 @@ pub struct Totals {
     /// Most memory that a job is predicted to take, in bytes, and the slips of the jobs of a part.
     pub memory: f64,
     pub memory_of_slips: f64,
+    /// The first of the jobs with the longest predicted CPU time.
+    pub longest: Option<Job>,
 }
 
 impl Extension {
@@ -251,12 +253,14 @@ impl<'a> Plan<'a> {
             let recording = self.extensions[part.name.extension].sweep.recording();
             let slips = |job: &Job| recording.expected_slips(typical_interval(&job.parameters));
             let slips: f64 = part.jobs.iter().map(slips).sum();
-            totals.jobs += part.job_count as u64;
+            totals.jobs += part.outline.job_count as u64;
             totals.parts += 1;
             totals.slips += slips;
-            totals.cost += part.cost;
-            totals.memory = totals.memory.max(part.memory);
+            totals.cost += part.outline.cost;
+            totals.memory = totals.memory.max(part.outline.memory);
             totals.memory_of_slips = totals.memory_of_slips.max(MEMORY_OF_A_SLIP * slips);
+            let jobs = totals.longest.into_iter().chain(part.jobs);
+            totals.longest = jobs.min_by(|left, right| right.cost.total_cmp(&left.cost));
         }
         totals
     }

@@ -260,7 +260,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
             "plan binary.toml",
             &["binary.toml: is not UTF-8 text; save it as UTF-8"],
         ),
-        ("plan good.toml --threads 2", &["--threads"]),
+        ("plan good.toml --shard 1/2", &["--shard"]),
         ("run", &["<SWEEP.toml|DIR>"]),
         (
             "run missing.toml",

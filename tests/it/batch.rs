@@ -278,6 +278,12 @@ fn threads_are_those_that_a_batch_system_grants() {
         start("openmp", &[], &[openmp, ("HQ_CPUS", "4,5,6")]),
         "on 3 threads (OMP_NUM_THREADS)\n",
     );
+    let planned = |flags: &[&str]| {
+        let command = [&[PROGRAM, "plan", "small.toml", "--json"], flags].concat();
+        json(&run(&folder, &command, &[slurm]).stdout)["threads"].as_u64()
+    };
+    assert_eq!(planned(&[]), Some(2));
+    assert_eq!(planned(&["--threads", "5"]), Some(5));
     let ended = start("bad", &[], &[("NSLOTS", "many")]);
     assert_eq!(ended.code, Some(2), "{}", ended.stderr);
     assert!(

@@ -604,6 +604,26 @@ fn the_help_of_every_command_holds_an_example() {
 }
 
 #[test]
+fn a_plan_names_the_longest_job_which_no_number_of_threads_makes_shorter() {
+    let folder = Folder::new();
+    let text = "name = \"s\"\n[axes]\nN = [9, 100, 20]\nseed = { count = 2 }\n[record]\nslips = 4";
+    folder.write("s.toml", text);
+    let plan = json(&folder.ends(0, "plan s.toml --threads 99 --json").stdout);
+    let command = "stickslip simulate --set N=100 --slips 4";
+    assert_eq!(plan["longest_job"], command);
+    assert_eq!(
+        plan["longest_job_cpu_seconds"],
+        plan["predicted_wall_seconds"]
+    );
+    let printed = folder.ends(0, "plan s.toml").stdout;
+    let line = printed.lines().find(|line| line.starts_with("longest job"));
+    assert!(
+        line.is_some_and(|line| line.ends_with(command)),
+        "{printed}"
+    );
+}
+
+#[test]
 fn a_directory_resumes_without_its_sweep_file() {
     let folder = Folder::new();
     folder.write("tiny.toml", TINY);

@@ -160,6 +160,16 @@ fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing
         &["random numbers: dice -> ", "without [\"start\"]"],
     );
     let mut other = read_text(&text);
+    other.plan_version = PLAN_VERSION - 1;
+    write_both(&layout, 0, &other.text());
+    refused(
+        "[model]\nK = 1e8\n[record]\nslips = 3",
+        &[&format!(
+            "plan version: {} -> {PLAN_VERSION}",
+            PLAN_VERSION - 1
+        )],
+    );
+    let mut other = read_text(&text);
     other.identity = "0".repeat(32);
     write_both(&layout, 0, &other.text());
     refused(
