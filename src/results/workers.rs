@@ -118,14 +118,10 @@ impl Worker {
     }
 }
 
-/// Name of this host, or "unknown".
+/// Name of this host.
 pub fn host() -> String {
-    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    let name = name.or_else(|| std::env::var("HOSTNAME").ok());
-    match name.as_deref().map(str::trim) {
-        None | Some("") => "unknown".to_owned(),
-        Some(name) => name.to_owned(),
-    }
+    let system = rustix::system::uname();
+    system.nodename().to_string_lossy().into_owned()
 }
 
 pub fn plain(host: &str) -> String {

@@ -1,5 +1,7 @@
-"""Cargo.toml has a reason for every crate, and for every one that is there twice; the lock file is always used."""
+"""Cargo.toml has a reason for every crate, and for every one that is there twice, and deny.toml for every known risk; the
+lock file is always used."""
 
+import json
 import re
 import subprocess
 import tomllib
@@ -11,6 +13,7 @@ from conftest import ROOT
 CARGO = re.compile(r"\bcargo (build|clippy|doc|run|test)\b")
 MANIFESTS = [ROOT / path / "Cargo.toml" for path in ("", "src/physics", "python")]
 OWN = ("stickslip", "stickslip-physics")
+DENY = tomllib.loads((ROOT / "deny.toml").read_text())
 
 
 def test_every_crate_has_a_reason():
@@ -35,6 +38,32 @@ def test_every_crate_that_is_there_twice_has_a_reason():
     # In brackets is what wants them.
     named = set(re.findall(r"`([^`]+)`", re.sub(r"\([^)]*\)", "", twice)))
     assert named == {name for name, count in counts.items() if count > 1}
+
+
+def test_every_risk_on_record_is_still_there():
+    locked = {package["name"] for package in tomllib.loads((ROOT / "Cargo.lock").read_text())["package"]}
+    for risk in DENY["advisories"]["ignore"]:
+        crate = risk["reason"].split()[0]
+        assert re.fullmatch(r"RUSTSEC-\d{4}-\d{4}", risk["id"]) and "Ends with" in risk["reason"], risk
+        assert crate in locked, f"{crate} is gone from Cargo.lock: take {risk['id']} out of deny.toml"
+
+
+def is_allowed(expression, licences):
+    """Whether an SPDX expression holds with these licences; an old one has a slash for `OR`."""
+    operators = {"AND": "and", "OR": "or"}
+    term = re.compile(r"[\w.-]+( WITH [\w.-]+)?")
+    return eval(term.sub(lambda found: operators.get(found[0], str(found[0] in licences)), expression.replace("/", " OR ")))
+
+
+def test_all_licences_are_allowed_and_all_that_are_allowed_are_needed():
+    command = ["cargo", "metadata", "--format-version=1", "--locked"]
+    packages = json.loads(subprocess.check_output(command, cwd=ROOT))["packages"]
+    licences = {package["name"]: package["license"] or "none" for package in packages}
+    allowed = set(DENY["licenses"]["allow"])
+    assert len(licences) > 100
+    assert [item for item in licences.items() if not is_allowed(item[1], allowed)] == []
+    needless = [each for each in allowed if all(is_allowed(found, allowed - {each}) for found in licences.values())]
+    assert needless == [], "take them out of deny.toml"
 
 
 def test_users_get_ranges_of_python_packages_and_tests_one_version_each():

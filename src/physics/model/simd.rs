@@ -8,6 +8,8 @@
 //! fused ones once, so all give the same bits.
 //!
 //! `pulp` takes 1.4 % fewer instructions than intrinsics in `unsafe` blocks of our own, and the same time within 1 %.
+//! On ARM the compiler makes NEON of the plain path; that of `pulp` takes 5 % fewer instructions for nine rows, 4 % more
+//! for others.
 //! `fearless_simd` needs no code here, but has AVX-512 from Ice Lake on only, and AVX2 takes 10 to 17 % more time.
 
 use pulp::{Scalar512b as Baseline, WithSimd, bytemuck};
