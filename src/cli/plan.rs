@@ -7,6 +7,7 @@ use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
 use crate::run::limits::{self, Threads};
 use crate::run::{MAX_FAILURES, Overview, status};
+use crate::sets::Digits;
 use crate::sweep::{Bounds, Extension, Plan, Sweep};
 use crate::table::shown::{serialize_path, shown, shown_bytes};
 use crate::table::storage::{Disk, Storage};
@@ -176,7 +177,10 @@ impl<'a> Forecast<'a> {
             ("worker memory", memory),
         ];
         if let Some(command) = &self.longest_job {
-            let time = output::duration(self.longest_job_cpu_seconds);
+            let time = match self.longest_job_cpu_seconds {
+                short if short < 0.1 => format!("{} ms", Digits::THREE.number(1e3 * short)),
+                long => output::duration(long),
+            };
             pairs.push(("longest job", format!("{time}: {command}")));
         }
         if let Some(bounds) = &self.at_most {

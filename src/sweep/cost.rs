@@ -6,8 +6,8 @@
 //! here changes the parts: raise [`PLAN_VERSION`](super::PLAN_VERSION) with it.
 //!
 //! `scripts/predicted-cost` measures jobs of all sweeps of this project, their axes wider by a factor of 3 at both ends,
-//! and random ones with 1 to 500 blocks of 1 to 160 contacts at 3e-7 to 6e-4 m/s: of 196, 86 % cost half to twice the
-//! prediction, and 99 % a fifth to five times. What it cannot know is when chance ends a job: with few contacts, and
+//! and random ones with 1 to 500 blocks of 1 to 160 contacts at 3e-7 to 6e-4 m/s: of 196, 84 % cost half to twice the
+//! prediction, and all a fifth to five times. What it cannot know is when chance ends a job: with few contacts, and
 //! where the slider hardly slips.
 
 use crate::model::Parameters;
