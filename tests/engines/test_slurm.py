@@ -24,9 +24,8 @@ from slurm import Slurm
 ELEMENTS = range(1, 9)
 COMPLETED = {element: ["COMPLETED"] for element in ELEMENTS}
 
-# Some 12 s of CPU time, so that all elements start before the end; and 2 s, where that is not asked.
+# Some 12 s of CPU time, so that all elements start before the end: of 2 s, one element of 16 threads may take all.
 SLIPS = 150
-FEW = 25
 
 # Before the worker in a script: stops its process but for 2 % of the time, so that some work is left on any machine.
 SLOWLY = "(trap '' TERM USR1; while kill -STOP $$; do sleep 0.98; kill -CONT $$; sleep 0.02; done) 2>/dev/null &\n"
@@ -130,7 +129,7 @@ def test_the_commands_of_the_page_on_clusters_run_as_they_are(slurm, program, lo
     environment = slurm.environment | {"PATH": f"{program.parent}:{slurm.environment['PATH']}"}
     for number, screen in enumerate(screens("Slurm")):
         folder = tmp_path / str(number)
-        commands = prepare_screen(screen, folder, FEW)
+        commands = prepare_screen(screen, folder, SLIPS)
         printed = subprocess.check_output(["sh", "-ec", commands], cwd=folder, env=environment, text=True)
         job = printed.removeprefix("Submitted batch job ").strip()
         assert slurm.wait_for(job, 300) == {element: ["COMPLETED"] for element in range(1, 41)}
@@ -138,4 +137,4 @@ def test_the_commands_of_the_page_on_clusters_run_as_they_are(slurm, program, lo
         assert len(list(logs.iterdir())) == 40
         results = logs.parents[1]
         assert_each_part_ran_once(results, workers=2)
-        assert_same(results, local_run(FEW))
+        assert_same(results, local_run(SLIPS))
