@@ -223,6 +223,13 @@ pub(super) mod tests {
             limits.contains("not shown: 4 of 8 sets, without a value or outside the axes"),
             "{limits}"
         );
+        // The lower end of the bar at 1.25 s is 1.125 s.
+        let cut = svg(&CustomFigure {
+            ylim: (Some(1.2), None),
+            ..figure()
+        });
+        let sign = "bars cut at the frame: ";
+        assert!(cut.contains(&format!("{sign}1")) && !plain.contains(sign));
         let label = svg(&CustomFigure {
             ylabel: Some("τ".into()),
             ..figure()

@@ -10,7 +10,7 @@
 //! missing. The same command, started several times, shares the parts. An adaptive sweep runs in rounds: the worker
 //! that first finds all parts done adds those of the next round (`rounds/`), and no worker ends before the last round.
 //! Contract: the bytes of the tables depend on neither threads nor workers nor interruptions. Memory: the parts with a
-//! job in flight.
+//! job in flight, and those whose files are being encoded, with these files.
 
 mod collect;
 pub mod limits;
