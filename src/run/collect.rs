@@ -324,7 +324,8 @@ impl Collector<'_, '_> {
                         needed: job.memory,
                     })?;
                 }
-                if out.jobs > 0 {
+                // A job that may end this process must not take finished parts with it.
+                if !out.is_empty() {
                     work.put_back(job);
                     break;
                 }

@@ -160,14 +160,25 @@ fn run_some_parts(layout: &Layout<'_>, sweep: &Sweep) {
 
 /// Runs where so much memory is allowed; the report, and the seeds and blocks that were run.
 fn run_within(root: &Path, memory: f64, retry_failed: bool) -> (RunReport, Vec<usize>) {
+    let blocks = Mutex::new(Vec::new());
+    let report = run_kernel_within(root, memory, retry_failed, &|job, interrupt| {
+        blocks.lock().unwrap().push(job.parameters.blocks);
+        fine(job, interrupt)
+    });
+    let mut blocks = blocks.into_inner().unwrap();
+    blocks.sort_unstable();
+    (report, blocks)
+}
+
+fn run_kernel_within(
+    root: &Path,
+    memory: f64,
+    retry_failed: bool,
+    kernel: &Kernel<'_>,
+) -> RunReport {
     let text = "name = \"big\"\n[model]\nNs = 100\n[axes]\nN = [3, 100000, 4]\nseed = { count = 2 }\n[record]\nslips = 2\n";
     let sweep = Sweep::parse(text, Path::new("big.toml")).unwrap();
     let stop = AtomicBool::new(false);
-    let blocks = Mutex::new(Vec::new());
-    let kernel = |job: &Job, interrupt: &AtomicBool| {
-        blocks.lock().unwrap().push(job.parameters.blocks);
-        fine(job, interrupt)
-    };
     let options = Options {
         retry_failed,
         ..options(&stop, 2)
@@ -178,11 +189,26 @@ fn run_within(root: &Path, memory: f64, retry_failed: bool) -> (RunReport, Vec<u
             walltime: Walltime::new(joined.begin, None),
             ..*joined
         };
-        limited.run(&kernel, &mut |_| ())
+        limited.run(kernel, &mut |_| ())
     });
-    let mut blocks = blocks.into_inner().unwrap();
-    blocks.sort_unstable();
-    (report.unwrap(), blocks)
+    report.unwrap()
+}
+
+#[test]
+fn a_job_that_may_take_too_much_memory_begins_when_all_that_is_finished_is_committed() {
+    for _ in 0..20 {
+        let root = tempfile::tempdir().unwrap();
+        let committed = Mutex::new(Vec::new());
+        run_kernel_within(root.path(), 3e9, false, &|job, interrupt| {
+            if job.parameters.blocks == 100_000 {
+                let results = Results::read(&Layout::new(&Disk, root.path())).unwrap();
+                let jobs = status(&results, MAX_FAILURES).unwrap().overview.jobs_done;
+                committed.lock().unwrap().push(jobs);
+            }
+            fine(job, interrupt)
+        });
+        assert_eq!(committed.into_inner().unwrap(), [4, 5]);
+    }
 }
 
 #[test]
