@@ -113,7 +113,7 @@ def test_what_a_time_limit_leaves_is_run_by_the_next_array(slurm, array, local_r
     warned, ended = (array.submit("--array=1", is_slow=True) for _ in range(2))
     wait_until(lambda: len(logged(array.results)) == 3, 180, "each element has done a part")
     slurm.call("scontrol", "update", f"JobId={warned}_1", "EndTime=now+45seconds")
-    slurm.call("scontrol", "update", f"JobId={ended}_1", "EndTime=now+1seconds")
+    slurm.call("scontrol", "update", f"JobId={ended}_1", "EndTime=now")
     assert slurm.wait_for(ended, 90) == {1: ["TIMEOUT"]}
     for job in (limited, warned):
         assert slurm.wait_for(job, 90) == {1: ["COMPLETED"]}
