@@ -4,6 +4,10 @@
 //! u(t) = V0 t + Δ_c (cos(2π (t - t_c)/T_c) - 1), with the T_c and Δ_c that the ramp has at t_c. So u and u' are
 //! continuous where cycles join. A [`Drive`] is that of one cycle, the present one; without a ramp, and after it, a
 //! cycle has no end.
+//!
+//! Or the modulation is a pulse of n periods from t_p on, u(t) = V0 t + Δ (1 - cos(2π (t - t_p)/T)): the load rises by
+//! up to 2Δ and returns. It is one cycle that starts at a maximum at t_p - T/2 and lies 2Δ higher, between two without
+//! modulation.
 
 use super::Parameters;
 use super::theory::{eta, load_maximum_phase};
@@ -28,7 +32,98 @@ pub struct Drive {
     pub cycle_start: f64,
     /// Where the next cycle starts, in s; infinite if none does.
     pub cycle_end: f64,
-    ramp: Option<Ramp>,
+    /// How much higher the driven end is than in a lasting modulation, in m: 2Δ in a pulse, else 0.
+    pub lift: f64,
+    course: Course,
+}
+
+/// How the modulation goes on after a cycle.
+#[derive(Clone, Copy, Debug)]
+enum Course {
+    Lasting,
+    Ramp(Ramp),
+    Pulse(Pulse),
+}
+
+/// Periods of the modulation from a time on, without modulation before and after.
+#[derive(Clone, Copy, Debug)]
+struct Pulse {
+    /// From and to, in s.
+    start: f64,
+    end: f64,
+    /// In s, and in m.
+    period: f64,
+    amplitude: f64,
+    eta: f64,
+}
+
+impl Pulse {
+    fn new(parameters: &Parameters) -> Option<Self> {
+        let start = parameters.pulse_start?;
+        let period = parameters.modulation_period?;
+        Some(Self {
+            start,
+            end: start + parameters.pulse_cycles as f64 * period,
+            period,
+            amplitude: parameters.modulation_amplitude,
+            eta: parameters.eta(),
+        })
+    }
+
+    /// When its maximum would have been before it.
+    fn cycle_start(&self) -> f64 {
+        self.start - 0.5 * self.period
+    }
+
+    /// The first t in s with u(t) >= `velocity` `time`.
+    fn first_passage(&self, time: f64, velocity: f64) -> f64 {
+        let eta = self.eta;
+        if time <= self.start || time > self.end + 2.0 * self.amplitude / velocity {
+            return time;
+        }
+        // u is θ + η (cos θ + 1) in units of V0 T/2π.
+        let level = TAU * (time - self.cycle_start()) / self.period - 2.0 * eta;
+        let turn = |maximum: f64| {
+            let highest = maximum + eta * (libm::cos(maximum) - 1.0);
+            TAU * ((level - highest) / TAU).ceil().max(1.0)
+        };
+        let angle = match load_maximum_phase(eta) {
+            Some(maximum) => {
+                let turn = turn(maximum);
+                let begin = if turn > TAU { -PI - maximum } else { -PI };
+                turn + rising_angle(eta, level - turn, [begin, maximum])
+            }
+            None => rising_angle(eta, level, [level, level + 2.0 * eta]),
+        };
+        let passage = self.cycle_start() + angle / TAU * self.period;
+        if passage <= self.end { passage } else { time }
+    }
+}
+
+/// The angle θ with θ + η (cos θ - 1) = `level`, between two where it is less and more and only grows.
+fn rising_angle(eta: f64, level: f64, [mut low, mut high]: [f64; 2]) -> f64 {
+    const STEPS: u32 = 60;
+    let mut angle = 0.5 * (low + high);
+    for _ in 0..STEPS {
+        let (sine, cosine) = libm::sincos(angle);
+        let rest = level - (angle + eta * (cosine - 1.0));
+        if rest > 0.0 {
+            low = angle;
+        } else {
+            high = angle;
+        }
+        let newton = angle + rest / (1.0 - eta * sine);
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
+        if (next - angle).abs() <= f64::EPSILON * TAU {
+            break;
+        }
+        angle = next;
+    }
+    angle
 }
 
 /// A linear ramp of period and amplitude to the turning point and back.
@@ -71,8 +166,7 @@ impl Drive {
     /// The drive of a set of parameters, in its first cycle.
     pub fn new(parameters: &Parameters) -> Self {
         let period = parameters.modulation_period.unwrap_or(0.0);
-        let ramp = Ramp::new(parameters);
-        Self {
+        let lasting = Self {
             stiffness: parameters.drive_stiffness,
             velocity: parameters.drive_velocity,
             amplitude: parameters.modulation_amplitude,
@@ -80,18 +174,59 @@ impl Drive {
             period,
             eta: parameters.eta(),
             cycle_start: 0.0,
-            cycle_end: if ramp.is_some() {
-                period
-            } else {
-                f64::INFINITY
-            },
-            ramp,
+            cycle_end: f64::INFINITY,
+            lift: 0.0,
+            course: Course::Lasting,
+        };
+        if let Some(pulse) = Pulse::new(parameters) {
+            Self {
+                cycle_end: pulse.start,
+                course: Course::Pulse(pulse),
+                ..lasting.still()
+            }
+        } else if let Some(ramp) = Ramp::new(parameters) {
+            Self {
+                cycle_end: period,
+                course: Course::Ramp(ramp),
+                ..lasting
+            }
+        } else {
+            lasting
+        }
+    }
+
+    /// The same without modulation from now on.
+    const fn still(self) -> Self {
+        Self {
+            amplitude: 0.0,
+            angular_frequency: 0.0,
+            period: 0.0,
+            eta: 0.0,
+            cycle_end: f64::INFINITY,
+            lift: 0.0,
+            ..self
         }
     }
 
     /// Begins the next cycle, if there is one.
     pub fn next_cycle(&mut self) {
-        let Some(ramp) = self.ramp else { return };
+        match self.course {
+            Course::Lasting => (),
+            Course::Ramp(ramp) => self.next_of_ramp(&ramp),
+            Course::Pulse(_) if self.is_modulated() => *self = self.still(),
+            Course::Pulse(pulse) => {
+                self.period = pulse.period;
+                self.amplitude = pulse.amplitude;
+                self.angular_frequency = TAU / pulse.period;
+                self.eta = pulse.eta;
+                self.cycle_start = pulse.cycle_start();
+                self.cycle_end = pulse.end;
+                self.lift = 2.0 * pulse.amplitude;
+            }
+        }
+    }
+
+    fn next_of_ramp(&mut self, ramp: &Ramp) {
         let start = self.cycle_end;
         (self.period, self.amplitude) = ramp.at(start);
         self.angular_frequency = TAU / self.period;
@@ -126,10 +261,17 @@ impl Drive {
         }
     }
 
-    /// When the driven end first gets as far as it would be at a time in s of the present cycle without modulation, in
-    /// s: the first t with u(t) >= V0 `time`.
+    /// Whether the modulation is a pulse, over or to come.
+    pub const fn is_pulsed(&self) -> bool {
+        matches!(self.course, Course::Pulse(_))
+    }
+
+    /// When the driven end first gets as far as it would be at a time in s without modulation, in s: the first t with
+    /// u(t) >= V0 `time`. Of a lasting or ramped modulation, the time lies in the present cycle.
     pub fn first_passage(&self, time: f64) -> f64 {
-        const STEPS: u32 = 60;
+        if let Course::Pulse(pulse) = self.course {
+            return pulse.first_passage(time, self.velocity);
+        }
         if !self.is_modulated() {
             return time;
         }
@@ -140,31 +282,12 @@ impl Drive {
         let eta = self.eta;
         let load = |angle: f64| angle + eta * (libm::cos(angle) - 1.0);
         // It grows from 0 to the maximum, and from the minimum on.
-        let (mut low, mut high) = match load_maximum_phase(eta) {
-            Some(maximum) if level <= load(maximum) => (0.0, maximum),
-            Some(maximum) => (PI - maximum, TAU),
-            None => (0.0, TAU),
+        let ends = match load_maximum_phase(eta) {
+            Some(maximum) if level <= load(maximum) => [0.0, maximum],
+            Some(maximum) => [PI - maximum, TAU],
+            None => [0.0, TAU],
         };
-        let mut angle = 0.5 * (low + high);
-        for _ in 0..STEPS {
-            let (sine, cosine) = libm::sincos(angle);
-            let rest = level - (angle + eta * (cosine - 1.0));
-            if rest > 0.0 {
-                low = angle;
-            } else {
-                high = angle;
-            }
-            let newton = angle + rest / (1.0 - eta * sine);
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            if (next - angle).abs() <= f64::EPSILON * TAU {
-                break;
-            }
-            angle = next;
-        }
+        let angle = rising_angle(eta, level, ends);
         self.cycle_start + (whole + angle / TAU) * self.period
     }
 
@@ -175,7 +298,7 @@ impl Drive {
             let (sine, cosine) = libm::sincos(self.phase(time));
             let rate = self.amplitude * self.angular_frequency;
             (
-                ramp + self.amplitude * (cosine - 1.0),
+                ramp + self.amplitude * (cosine - 1.0) + self.lift,
                 self.velocity - rate * sine,
             )
         } else {
@@ -260,6 +383,63 @@ mod tests {
                 assert!(
                     furthest < level + 1e-15,
                     "{number}: {furthest:e} before {level:e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_pulse_joins_smoothly_and_its_first_passage_is_where_a_dense_walk_finds_it() {
+        for (amplitude, period, start, cycles) in [
+            (1e-6, 0.03, 0.1, 1),
+            (1e-7, 0.03, 0.1, 3),
+            (3e-6, 0.002, 0.01, 5),
+            (4.77e-7, 0.03, 0.0, 2),
+            (1e-5, 0.5, 0.3, 1),
+        ] {
+            let mut drive = Drive::new(&Parameters {
+                modulation_amplitude: amplitude,
+                modulation_period: Some(period),
+                pulse_start: Some(start),
+                pulse_cycles: cycles,
+                ..Parameters::default()
+            });
+            let end = start + cycles as f64 * period;
+            let mut walked = drive;
+            for joint in [start, end] {
+                let (before, rate) = drive.motion(joint);
+                assert_eq!(drive.cycle_end, joint);
+                drive.next_cycle();
+                let (after, rate_after) = drive.motion(joint);
+                assert!((before - drive.velocity * joint).abs() < 1e-19 + 1e-15 * before);
+                assert!(
+                    (after - before).abs() < 1e-19 + 1e-15 * before,
+                    "{before} {after}"
+                );
+                assert!(
+                    (rate - rate_after).abs() < 1e-11 * rate.abs(),
+                    "{rate} {rate_after}"
+                );
+            }
+            assert_eq!(drive.cycle_end, f64::INFINITY);
+            let spacing = 1e-4 * period;
+            let mut number = 0_u32;
+            let mut furthest = 0.0;
+            for step in 1..500 {
+                let time = (end + 3.0 * amplitude / drive.velocity) * f64::from(step) / 400.0;
+                let level = drive.velocity * time;
+                while furthest < level - 1e-18 {
+                    number += 1;
+                    let now = spacing * f64::from(number);
+                    walked.advance_to(now);
+                    furthest = walked.motion(now).0.max(furthest);
+                }
+                let passage = drive.first_passage(time);
+                assert!(passage <= time);
+                let seen = spacing * f64::from(number);
+                assert!(
+                    passage <= seen + 1e-12 && passage > seen - 1.01 * spacing,
+                    "{amplitude} {period} {time}: {passage} {seen}"
                 );
             }
         }

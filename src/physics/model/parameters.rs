@@ -56,6 +56,10 @@ fields! {
         RampTime("ramp_time", "", "Duration of the ramp") ramp_time: f64 = 0.0, "s",
             NOT_NEGATIVE and "at most 1e9 T and 1e9 T_to, above 0 only with T_to or Delta_to",
             "duration of the ramp to T_to and Delta_to, and of that back; 0 is off";
+        PulseStart("pulse_start", "t_p", "Start of the pulse") pulse_start: Option<f64> = None, "s", NOT_NEGATIVE and "not with a ramp",
+            "time at which the modulation starts as a pulse that ends after its cycles; null: it lasts";
+        PulseCycles("pulse_cycles", "", "Periods of the pulse") pulse_cycles: u64 = 1, "", COUNT and "above 1 only with pulse_start",
+            "periods of the pulse";
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
         L("L", "L") slider_length: f64 = 0.15, "m", POSITIVE,
             "slider length, enters positions and front speeds only";
@@ -84,8 +88,11 @@ pub struct ParameterError {
 impl Symbol {
     /// Whether it belongs to the modulation: without it, it is at its default.
     pub const fn is_of_modulation(self) -> bool {
-        use Symbol::{Delta, DeltaTo, RampTime, T, TTo};
-        matches!(self, Delta | T | DeltaTo | TTo | RampTime)
+        use Symbol::{Delta, DeltaTo, PulseCycles, PulseStart, RampTime, T, TTo};
+        matches!(
+            self,
+            Delta | T | DeltaTo | TTo | RampTime | PulseStart | PulseCycles
+        )
     }
 }
 
@@ -112,6 +119,8 @@ impl Parameters {
         self.check_rules()?;
         if self.modulation_amplitude == 0.0 {
             self.modulation_period = None;
+            self.pulse_start = None;
+            self.pulse_cycles = 1;
         }
         Ok(self)
     }
@@ -132,6 +141,14 @@ impl Parameters {
                 self.turning_amplitude.is_none() || can_ramp,
             ),
             (Symbol::RampTime, self.ramp_time <= self.max_ramp_time()),
+            (
+                Symbol::PulseStart,
+                self.pulse_start.is_none() || self.ramp_time == 0.0,
+            ),
+            (
+                Symbol::PulseCycles,
+                self.pulse_start.is_some() || self.pulse_cycles == 1,
+            ),
         ];
         match rules.into_iter().find(|(_, holds)| !holds) {
             None => Ok(()),
@@ -209,6 +226,8 @@ impl Parameters {
             turning_period: None,
             turning_amplitude: None,
             ramp_time: 0.0,
+            pulse_start: None,
+            pulse_cycles: 1,
             ..self.clone()
         }
     }

@@ -13,16 +13,16 @@ columns! {
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Modulation {
         period as "T_onset": Option<f64> = "s",
-            "period of the modulation at the onset, T unless ramped; null without modulation";
+            "period of the modulation at the onset, T unless ramped; null without modulation, and with a pulse";
         amplitude as "Delta_onset": f64 = "m",
-            "amplitude of the modulation at the onset, Delta unless ramped; 0 without modulation";
+            "amplitude of the modulation at the onset, Delta unless ramped; 0 without modulation, or outside its pulse";
     }
 }
 
 impl Modulation {
     pub(super) fn of(drive: &Drive) -> Self {
         Self {
-            period: (drive.period > 0.0).then_some(drive.period),
+            period: (drive.period > 0.0 && !drive.is_pulsed()).then_some(drive.period),
             amplitude: drive.amplitude,
         }
     }

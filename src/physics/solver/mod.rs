@@ -8,6 +8,8 @@ mod fixed_step;
 mod harmonic;
 mod ledger;
 mod polynomial;
+#[cfg(test)]
+mod pulse_tests;
 mod segment;
 
 pub use event_driven::{GRID_TOLERANCE, Resolve};

@@ -166,12 +166,18 @@ impl Frame {
         }
     }
 
-    /// Begins the next cycle of a ramped modulation, at the maximum where the two join.
+    /// Begins the next cycle: at the maximum where two of a ramp join, or at the minimum where a pulse begins or ends.
     pub fn next_cycle(&mut self) {
-        let before = self.drive.amplitude;
+        let before = self.drive.lift - self.drive.amplitude;
         self.drive.next_cycle();
-        self.ramp_at_origin += before - self.drive.amplitude;
-        self.swing = [self.drive.amplitude, 0.0];
+        let amplitude = self.drive.amplitude;
+        self.ramp_at_origin += (self.drive.lift - amplitude) - before;
+        let along = if self.drive.lift > 0.0 {
+            -amplitude
+        } else {
+            amplitude
+        };
+        self.swing = [along, 0.0];
     }
 
     /// Moves the origin close to the present time and a displacement. Returns by how much, in s and m.
