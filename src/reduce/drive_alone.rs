@@ -53,8 +53,10 @@ impl Controls {
 
     /// What the drive alone explains of a set with these parameters.
     pub(super) fn explain(&self, plan: Plan<'_>, parameters: &Parameters) -> Explained {
-        let control = plan
-            .control_of(parameters)
+        // Pulses have no phase: see `triggers.rs`.
+        let lasting = Some(parameters).filter(|parameters| parameters.pulse_start.is_none());
+        let control = lasting
+            .and_then(|parameters| plan.control_of(parameters))
             .and_then(|control| self.0.get(&control));
         let passage = |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Passage::of(parameters, slips));
         let passages = control.map(|control| control.iter().map(passage).collect());

@@ -8,6 +8,7 @@
 use super::backbone::{Backbone, BackboneBin};
 use super::crossings::{EdgeRow, edge_rows};
 use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
+use super::triggers::trigger_rows;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
@@ -104,6 +105,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let rounds = RoundsOfSets::of(results);
     let mut set_writer = staged.begin::<SetInRounds>(&rounds.left_out())?;
     let mut histogram_writer = staged.begin::<HistogramBin>(&[])?;
+    let triggers = trigger_rows(gathering.slips.clone(), results.plan(), all_jobs)?;
     let mut pooled = Backbone::default();
     let mut kept = Vec::new();
     gathering.each_set(max_slips, spacing(total), |set, explained| {
@@ -114,11 +116,14 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
             return Ok(());
         }
         summary.sets += 1;
+        summary.slips += row.slips;
+        if row.parameters.pulse_start.is_some() {
+            return Ok(());
+        }
         for bin in histogram(row, &set.intervals) {
             histogram_writer.push(&bin)?;
         }
         pooled.push(&set);
-        summary.slips += row.slips;
         summary.phased_sets += u64::from(row.has_phase);
         for (place, mut point) in points {
             point.has_phase = row.has_phase;
@@ -133,6 +138,9 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     kept.sort_by_key(|(place, _)| *place);
     summary.points = kept.len() as u64;
     staged.write(kept.into_iter().map(|(_, point)| point))?;
+    if !triggers.is_empty() {
+        staged.write(triggers)?;
+    }
     if let Some(refinement) = results.sweep().refinement() {
         staged.write(edge_rows(results, refinement)?)?;
     }

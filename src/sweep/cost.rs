@@ -108,6 +108,10 @@ impl Motion {
     }
 
     fn of(parameters: &Parameters, recording: &Recording) -> Self {
+        if parameters.pulse_start.is_some() {
+            // It is short.
+            return Self::of(&parameters.without_modulation(), recording);
+        }
         let interval = typical_interval(parameters);
         let delay = parameters.reattachment_time;
         let velocity = parameters.drive_velocity;

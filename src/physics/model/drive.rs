@@ -261,9 +261,12 @@ impl Drive {
         }
     }
 
-    /// Whether the modulation is a pulse, over or to come.
-    pub const fn is_pulsed(&self) -> bool {
-        matches!(self.course, Course::Pulse(_))
+    /// When the pulse begins and ends, in s, if there is one.
+    pub const fn pulse(&self) -> Option<[f64; 2]> {
+        match self.course {
+            Course::Pulse(pulse) => Some([pulse.start, pulse.end]),
+            _ => None,
+        }
     }
 
     /// When the driven end first gets as far as it would be at a time in s without modulation, in s: the first t with

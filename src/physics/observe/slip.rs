@@ -22,7 +22,7 @@ columns! {
 impl Modulation {
     pub(super) fn of(drive: &Drive) -> Self {
         Self {
-            period: (drive.period > 0.0 && !drive.is_pulsed()).then_some(drive.period),
+            period: (drive.period > 0.0 && drive.pulse().is_none()).then_some(drive.period),
             amplitude: drive.amplitude,
         }
     }
