@@ -9,7 +9,9 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, renew};
+use stickslip::reduce::{
+    BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, TriggerRow, renew,
+};
 use stickslip::results::exported::{JoinedTable, with_columns};
 use stickslip::results::layout::Layout;
 use stickslip::results::tables::{JOBS, TABLES, recorded_schema};
@@ -160,6 +162,7 @@ fn reduced_columns(results: &Results<'_>, table: &str) -> PyResult<(&'static str
     let all = [
         of::<SetRow>(),
         of::<EdgeRow>(),
+        of::<TriggerRow>(),
         of::<HistogramBin>(),
         of::<BackboneBin>(),
         of::<Point>(),

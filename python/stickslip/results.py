@@ -74,6 +74,10 @@ class Results(Guessed):
         """
         return self._table("edges", columns)
 
+    def triggers(self, columns: Sequence[str] | None = None) -> Table:
+        """One row per job with a pulse: how much earlier (s) its next slip came than without it, and by the drive alone."""
+        return self._table("triggers", columns)
+
     def histograms(self, columns: Sequence[str] | None = None) -> Table:
         """One row per bin of the intervals of a set."""
         return self._table("histograms", columns)

@@ -2,10 +2,10 @@
 
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
-use crate::model::{Selection, Symbol};
+use crate::model::{Selected, Selection, Symbol};
 use crate::reduce::{
-    Condition, EdgeRow, FREQUENCY, Interval, SetRow, Values, ascending, compare, differing,
-    means_of_slips, read_reduced, read_sets, renew,
+    Condition, EdgeRow, FREQUENCY, Interval, Pulses, SetRow, TriggerRow, Values, ascending,
+    compare, differing, means_of_slips, read_reduced, read_sets, renew,
 };
 use crate::results::Results;
 use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, with_decimals};
@@ -154,6 +154,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
             output::print(&format!("so far: {unfinished}\n\n"))?;
         }
         output::print(&table_of_edges(&edges, &rows))?;
+        output::print(&table_of_pulses(&triggers(results)?))?;
     }
     arguments.print(&columns, matching, &rows, &edges)?;
     if arguments.is_text() {
@@ -173,7 +174,9 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     } else {
         FIRST
     };
-    let mut text = table_of_edges(&edges(results)?, &rows) + &aligned(&columns, &rows, first);
+    let mut text = table_of_edges(&edges(results)?, &rows);
+    text += &table_of_pulses(&triggers(results)?);
+    text += &aligned(&columns, &rows, first);
     if let Some(more @ 1..) = count.checked_sub(first as u64) {
         let root = output::quoted_path(results.layout().root());
         text = format!("{text}… {more} more: stickslip show {root}\n");
@@ -327,6 +330,70 @@ fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
         return Ok(Vec::new());
     }
     Ok(read_reduced(results.layout())?)
+}
+
+/// What pulses did; nothing without any.
+fn triggers(results: &Results<'_>) -> Result<Vec<TriggerRow>> {
+    let layout = results.layout();
+    let file = layout.reduced_file(TriggerRow::NAME);
+    if !layout.storage.exists(&file)? {
+        return Ok(Vec::new());
+    }
+    Ok(read_reduced(layout)?)
+}
+
+/// What pulses of each kind did, for people, and a blank line; empty if there are none that say something.
+fn table_of_pulses(triggers: &[TriggerRow]) -> String {
+    let pulses = Pulses::of(triggers);
+    let as_set = |pulses: &Pulses<'_>| {
+        let parameters = &pulses.rows[0].parameters;
+        SetRow {
+            frequency: parameters.frequency(),
+            parameters: Selected::new(parameters.parameters.clone()),
+            ..SetRow::default()
+        }
+    };
+    let rows: Vec<SetRow> = pulses.iter().map(as_set).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let mut columns = TextTable::default();
+    let mut parameters = differing(&rows.iter());
+    parameters.retain(|symbol| *symbol != Symbol::PulseStart);
+    for values in columns_of(parameters.into_iter().map(column_of), &rows) {
+        add_column(&mut columns, &values, &rows, rows.len());
+    }
+    let mean = |quantity: fn(&TriggerRow) -> Option<f64>| {
+        move |pulses: &Pulses<'_>| match pulses.mean(quantity) {
+            (Some(value), Some(Interval { low, high })) => with_interval(value, low, high),
+            (value, _) => value.map_or_else(|| "–".to_owned(), |value| Digits::THREE.number(value)),
+        }
+    };
+    let share = |is_so: Option<bool>| is_so.map(|is_so| f64::from(u8::from(is_so)));
+    let relative = |seconds: Option<f64>, row: &TriggerRow| Some(seconds? / row.tau_control?);
+    columns.numbers("pulses", &pulses, |pulses| pulses.rows.len().to_string());
+    columns.numbers(
+        "advance / ⟨τ⟩",
+        &pulses,
+        mean(|row| relative(row.advance, row)),
+    );
+    columns.numbers(
+        "by the drive",
+        &pulses,
+        mean(|row| relative(row.advance_drive, row)),
+    );
+    columns.numbers("triggered", &pulses, mean(|row| share(row.triggered)));
+    columns.numbers(
+        "by the drive",
+        &pulses,
+        mean(|row| share(row.triggered_drive)),
+    );
+    columns.numbers("delayed", &pulses, mean(|row| share(row.delayed)));
+    let excluded = triggers.iter().filter(|row| row.excluded.is_some()).count();
+    format!(
+        "{columns}{excluded} of {} pulses say nothing\n\n",
+        triggers.len()
+    )
 }
 
 /// Whether a set differs from those of an edge in nothing but the refined axis.

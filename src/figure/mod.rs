@@ -29,6 +29,7 @@ mod picture;
 mod quantity;
 mod simulation;
 mod style;
+mod triggering;
 mod work_precision;
 
 pub use custom::{CustomFigure, Dots};
@@ -41,8 +42,8 @@ pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 use self::quantity::Quantity;
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
-    EdgeRow, SetRow, SlipOfSet, WRITER, advise, means_of_slips, read_reduced, read_sets,
-    sample_of_slips, swept,
+    EdgeRow, SetRow, SlipOfSet, TriggerRow, WRITER, advise, means_of_slips, read_reduced,
+    read_sets, sample_of_slips, swept,
 };
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
@@ -73,6 +74,7 @@ pub const STANDING: &[&str] = &[
     phase_eta::NAME,
     intervals::NAME,
     histograms::NAME,
+    triggering::NAME,
 ];
 
 /// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
@@ -85,7 +87,9 @@ const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
     let _alone = exclusive_lock(layout, WRITER)?;
     let points = read(layout)?;
-    let sets = sets_with_results(layout).map_err(advise(ADVICE))?;
+    let mut sets = sets_with_results(layout).map_err(advise(ADVICE))?;
+    // Slips after a pulse have a figure of their own.
+    sets.retain(|set| set.parameters.pulse_start.is_none());
     let look = &look.with_note(&common_of(&sets));
     let mut pictures: Vec<Picture> = Vec::new();
     pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, look));
@@ -107,6 +111,12 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     }
     if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
         pictures.extend(edge_values::edges(&read(layout)?, look));
+    }
+    if layout
+        .storage
+        .exists(&layout.reduced_file(TriggerRow::NAME))?
+    {
+        pictures.extend(triggering::triggering(&read(layout)?, look));
     }
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
