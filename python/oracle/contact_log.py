@@ -44,8 +44,12 @@ class Parameters:
     T_to: float | None = None
     Delta_to: float | None = None
     ramp_time: float = 0.0
+    pulse_start: float | None = None
+    pulse_cycles: int = 1
     #: A maximum of the modulation, in s, from which its phase is counted.
     cycle_start: float = 0.0
+    #: Added to the displacement of the driven end, in m.
+    lift: float = 0.0
 
     def __post_init__(self) -> None:
         if self.break_on not in ("magnitude", "tension"):
@@ -92,11 +96,18 @@ class Parameters:
         return 2 * np.pi * (((time - self.cycle_start) / self.T) % 1.0) if self.Delta > 0 else 0.0
 
     def drive(self, time: float) -> float:
-        """Displacement V0 t + Δ (cos(2πt/T) - 1) of the driven end, in m."""
-        return self.V0 * time + self.Delta * (np.cos(self.phase(time)) - 1.0)
+        """Displacement V0 t + Δ (cos(2πt/T) - 1) of the driven end, in m, and 2Δ more in a pulse."""
+        return self.V0 * time + self.Delta * (np.cos(self.phase(time)) - 1.0) + self.lift
 
     def cycles(self) -> Iterator[tuple[Self, float]]:
-        """The cycles of a ramped modulation: the parameters of each, and its end in s. The last one is endless."""
+        """The cycles of the modulation: the parameters of each, and its end in s. The last one is endless."""
+        if self.pulse_start is not None:
+            still, end = dataclasses.replace(self, Delta=0.0), self.pulse_start + self.pulse_cycles * self.T
+            yield still, self.pulse_start
+            # It rises from a minimum.
+            yield dataclasses.replace(self, cycle_start=self.pulse_start - 0.5 * self.T, lift=2 * self.Delta), end
+            yield still, np.inf
+            return
         cycle = self
         while self.ramp_time > 0 and cycle.cycle_start < 2 * self.ramp_time:
             end = cycle.cycle_start + cycle.T
@@ -168,8 +179,8 @@ def parser(module: str, description: str) -> argparse.ArgumentParser:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("log", type=Path, help="contact log (Parquet)")
     group = parser.add_argument_group("parameters", "SI units; they override those in the footer of the log")
-    for field in dataclasses.fields(Parameters)[:-1]:
-        kind = {"N": int, "Ns": int, "break_on": str}.get(field.name, float)
+    for field in dataclasses.fields(Parameters)[:-2]:
+        kind = {"N": int, "Ns": int, "pulse_cycles": int, "break_on": str}.get(field.name, float)
         group.add_argument("--" + field.name.replace("_", "-"), dest=field.name, type=kind, default=argparse.SUPPRESS)
     return parser
 

@@ -153,8 +153,8 @@ def main() -> int:
     options = parser.parse_args()
     try:
         log, parameters = contact_log.read(options)
-        if parameters.ramp_time > 0:
-            raise LogError("the modulation is ramped, which is not followed here; the oracle follows it")
+        if parameters.ramp_time > 0 or parameters.pulse_start is not None:
+            raise LogError("the modulation is ramped or a pulse, which is not followed here; the oracle follows both")
         # A few more than are compared: within the limits, two breaks may come in either order.
         replay = Replay(parameters, log, options.breaks + parameters.Ns, np.inf).run()
         wanted = min(options.breaks, len(replay.rows))

@@ -176,8 +176,12 @@ fn read_reduced(
     table: &'static str,
     columns: Vec<FieldRef>,
 ) -> Result<Table, Error> {
-    if table == EdgeRow::NAME && results.sweep().refinement().is_none() {
-        let problem = "has no edges: its sweep file has no [refine]";
+    if results.optional_tables().contains(&(table, false)) {
+        let needed = match table {
+            EdgeRow::NAME => "[refine]",
+            _ => "pulse_start",
+        };
+        let problem = format!("has no {table}: its sweep file has no {needed}");
         return Err(ResultsError::refused(results.layout().root(), problem).into());
     }
     let names: Vec<String> = columns.iter().map(|field| field.name().clone()).collect();

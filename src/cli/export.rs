@@ -11,7 +11,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
-/// Write slips, jobs, sets and edges of a results directory to a folder: one file each, with all swept parameters
+/// Write slips, jobs and reduced sets of a results directory to a folder: one file each, with all swept parameters
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -2,10 +2,10 @@
 
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
-use crate::model::{Selected, Selection, Symbol};
+use crate::model::{Parameters, Selected, Selection, Symbol};
 use crate::reduce::{
     Condition, EdgeRow, FREQUENCY, Interval, Pulses, SetRow, TriggerRow, Values, ascending,
-    compare, differing, means_of_slips, read_reduced, read_sets, renew,
+    compare, differing, means_of_slips, read_optional, read_sets, renew,
 };
 use crate::results::Results;
 use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, with_decimals};
@@ -145,7 +145,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
     } else {
         chosen_columns(results, usual, &arguments.columns, &rows)?
     };
-    let mut edges = edges(results)?;
+    let mut edges: Vec<EdgeRow> = read_optional(results.layout())?;
     if arguments.condition.is_some() {
         edges.retain(|edge| rows.iter().any(|row| is_on_line(row, edge)));
     }
@@ -154,7 +154,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
             output::print(&format!("so far: {unfinished}\n\n"))?;
         }
         output::print(&table_of_edges(&edges, &rows))?;
-        output::print(&table_of_pulses(&triggers(results)?))?;
+        output::print(&table_of_pulses(&read_optional(results.layout())?))?;
     }
     arguments.print(&columns, matching, &rows, &edges)?;
     if arguments.is_text() {
@@ -174,8 +174,8 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     } else {
         FIRST
     };
-    let mut text = table_of_edges(&edges(results)?, &rows);
-    text += &table_of_pulses(&triggers(results)?);
+    let mut text = table_of_edges(&read_optional(results.layout())?, &rows);
+    text += &table_of_pulses(&read_optional(results.layout())?);
     text += &aligned(&columns, &rows, first);
     if let Some(more @ 1..) = count.checked_sub(first as u64) {
         let root = output::quoted_path(results.layout().root());
@@ -324,74 +324,55 @@ fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: u
     columns.add(values.is_worded(), label.short(unit), cells);
 }
 
-/// The edges that a sweep has found; none for a sweep that looks for none.
-fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
-    if results.sweep().refinement().is_none() {
-        return Ok(Vec::new());
-    }
-    Ok(read_reduced(results.layout())?)
-}
-
-/// What pulses did; nothing without any.
-fn triggers(results: &Results<'_>) -> Result<Vec<TriggerRow>> {
-    let layout = results.layout();
-    let file = layout.reduced_file(TriggerRow::NAME);
-    if !layout.storage.exists(&file)? {
-        return Ok(Vec::new());
-    }
-    Ok(read_reduced(layout)?)
-}
-
-/// What pulses of each kind did, for people, and a blank line; empty if there are none that say something.
-fn table_of_pulses(triggers: &[TriggerRow]) -> String {
-    let pulses = Pulses::of(triggers);
-    let as_set = |pulses: &Pulses<'_>| {
-        let parameters = &pulses.rows[0].parameters;
-        SetRow {
-            frequency: parameters.frequency(),
-            parameters: Selected::new(parameters.parameters.clone()),
-            ..SetRow::default()
-        }
+/// The parameters but one in which some rows differ.
+fn parameters_but(symbol: Symbol, rows: impl Iterator<Item = Parameters>) -> TextTable {
+    let as_set = |parameters: Parameters| SetRow {
+        frequency: parameters.frequency(),
+        parameters: Selected::new(parameters),
+        ..SetRow::default()
     };
-    let rows: Vec<SetRow> = pulses.iter().map(as_set).collect();
-    if rows.is_empty() {
-        return String::new();
-    }
-    let mut columns = TextTable::default();
+    let rows: Vec<SetRow> = rows.map(as_set).collect();
     let mut parameters = differing(&rows.iter());
-    parameters.retain(|symbol| *symbol != Symbol::PulseStart);
+    parameters.retain(|other| *other != symbol);
+    let mut columns = TextTable::default();
     for values in columns_of(parameters.into_iter().map(column_of), &rows) {
         add_column(&mut columns, &values, &rows, rows.len());
     }
-    let mean = |quantity: fn(&TriggerRow) -> Option<f64>| {
-        move |pulses: &Pulses<'_>| match pulses.mean(quantity) {
-            (Some(value), Some(Interval { low, high })) => with_interval(value, low, high),
-            (value, _) => value.map_or_else(|| "–".to_owned(), |value| Digits::THREE.number(value)),
-        }
-    };
-    let share = |is_so: Option<bool>| is_so.map(|is_so| f64::from(u8::from(is_so)));
-    let relative = |seconds: Option<f64>, row: &TriggerRow| Some(seconds? / row.tau_control?);
+    columns
+}
+
+/// What pulses did, for people, and a blank line; empty if none says something.
+fn table_of_pulses(triggers: &[TriggerRow]) -> String {
+    let pulses = Pulses::of(triggers);
+    if pulses.is_empty() {
+        return String::new();
+    }
+    let parameters = pulses.iter().map(|pulses| pulses.parameters.clone());
+    let mut columns = parameters_but(Symbol::PulseStart, parameters);
     columns.numbers("pulses", &pulses, |pulses| pulses.rows.len().to_string());
-    columns.numbers(
-        "advance / ⟨τ⟩",
-        &pulses,
-        mean(|row| relative(row.advance, row)),
-    );
-    columns.numbers(
-        "by the drive",
-        &pulses,
-        mean(|row| relative(row.advance_drive, row)),
-    );
-    columns.numbers("triggered", &pulses, mean(|row| share(row.triggered)));
-    columns.numbers(
-        "by the drive",
-        &pulses,
-        mean(|row| share(row.triggered_drive)),
-    );
-    columns.numbers("delayed", &pulses, mean(|row| share(row.delayed)));
-    let excluded = triggers.iter().filter(|row| row.excluded.is_some()).count();
+    type Quantity = fn(&TriggerRow) -> Option<[f64; 2]>;
+    let quantities: [(&str, Quantity); 2] = [
+        ("advance/⟨τ⟩", TriggerRow::advances),
+        ("triggered", TriggerRow::triggers),
+    ];
+    for (name, quantity) in quantities {
+        for (head, which) in [(name, 0), ("by the drive", 1), ("excess", 2)] {
+            columns.numbers(head, &pulses, |pulses| {
+                match pulses.means(quantity).map(|means| means[which]) {
+                    Some((value, Some(Interval { low, high }))) => with_interval(value, low, high),
+                    Some((value, None)) => Digits::THREE.number(value),
+                    None => "–".to_owned(),
+                }
+            });
+        }
+    }
+    let silent = triggers.iter().filter(|row| row.advance.is_none()).count();
+    let noise = triggers[0].noise.map(|noise| {
+        format!("; pulses of 1e-12 m at most advance slips by up to {noise:.1e} s, by the error of the solver")
+    });
+    let noise = noise.unwrap_or_default();
     format!(
-        "{columns}{excluded} of {} pulses say nothing\n\n",
+        "{columns}without a slip to compare: {silent} of {} pulses{noise}\n\n",
         triggers.len()
     )
 }
@@ -422,19 +403,9 @@ fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
     let Some(first) = edges.first() else {
         return String::new();
     };
-    let mut columns = TextTable::default();
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
-    let as_set = |edge: &EdgeRow| SetRow {
-        frequency: edge.parameters.frequency(),
-        parameters: edge.parameters.clone(),
-        ..SetRow::default()
-    };
-    let rows: Vec<SetRow> = edges.iter().map(as_set).collect();
-    let mut parameters = differing(&rows.iter());
-    parameters.retain(|symbol| *symbol != axis);
-    for values in columns_of(parameters.into_iter().map(column_of), &rows) {
-        add_column(&mut columns, &values, &rows, rows.len());
-    }
+    let parameters = edges.iter().map(|edge| edge.parameters.parameters.clone());
+    let mut columns = parameters_but(axis, parameters);
     let label = label(&first.axis);
     let brackets = edges.iter().map(|edge| edge.bracket_high);
     let (factor, unit) = label.scale(brackets.fold(0.0, f64::max));

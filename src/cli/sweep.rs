@@ -26,11 +26,11 @@ macro_rules! presets {
 }
 
 /// By question, as their names sort.
-const PRESETS: [Preset; 24] = presets! {
+const PRESETS: [Preset; 26] = presets! {
     "choices" "choices-startup" "drag" "drag-strong" "energies" "fig2" "fig3" "fig3-precise" "fig4" "friction"
     "friction-drives" "locking-contacts" "locking-disorder" "locking-drive-alone" "locking-edge" "locking-map"
     "locking-size" "locking-staircase" "locking-stiff-drive" "locking-tongue" "sliding-edge" "sliding-regimes"
-    "sliding-velocity" "stochasticity"
+    "sliding-velocity" "stochasticity" "tide" "triggering"
 };
 
 /// Former names of presets, and what stands in their place.

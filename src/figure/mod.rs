@@ -42,8 +42,8 @@ pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 use self::quantity::Quantity;
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
-    EdgeRow, SetRow, SlipOfSet, TriggerRow, WRITER, advise, means_of_slips, read_reduced,
-    read_sets, sample_of_slips, swept,
+    EdgeRow, SetRow, SlipOfSet, TriggerRow, WRITER, advise, means_of_slips, read_optional,
+    read_reduced, read_sets, sample_of_slips, swept,
 };
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
@@ -109,15 +109,10 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
         }
         pictures.extend(map);
     }
-    if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
-        pictures.extend(edge_values::edges(&read(layout)?, look));
-    }
-    if layout
-        .storage
-        .exists(&layout.reduced_file(TriggerRow::NAME))?
-    {
-        pictures.extend(triggering::triggering(&read(layout)?, look));
-    }
+    let edges: Vec<EdgeRow> = read_optional(layout).map_err(advise(ADVICE))?;
+    pictures.extend(edge_values::edges(&edges, look));
+    let triggers: Vec<TriggerRow> = read_optional(layout).map_err(advise(ADVICE))?;
+    pictures.extend(triggering::triggering(&triggers, look));
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
     }

@@ -25,6 +25,8 @@ const MAX_AMPLITUDES: usize = 5;
 /// Bins of the place in the cycle.
 const BINS: u32 = 10;
 
+type Quantity = fn(&TriggerRow) -> Option<[f64; 2]>;
+
 /// Means at some places, with their intervals, and those of the drive alone.
 struct Series {
     ink: Ink,
@@ -34,29 +36,28 @@ struct Series {
 }
 
 impl Series {
-    fn new(ink: Ink) -> Self {
-        Self {
+    /// The means of a quantity over the pulses at each place.
+    fn new<'a>(
+        ink: Ink,
+        quantity: Quantity,
+        places: impl Iterator<Item = (f64, Option<Pulses<'a>>)>,
+    ) -> Self {
+        let mut series = Self {
             ink,
             dots: Vec::new(),
             bars: Vec::new(),
             by_drive: Vec::new(),
+        };
+        for (x, pulses) in places {
+            let means = pulses.and_then(|pulses| pulses.means(quantity));
+            if let Some([(seen, interval), (by_drive, _), _]) = means {
+                series.dots.push((x, seen));
+                let ends = interval.map(|Interval { low, high }| (x, (low, high)));
+                series.bars.extend(ends);
+                series.by_drive.push((x, by_drive));
+            }
         }
-    }
-
-    /// Adds the means over some pulses of what is seen and what the drive alone gives.
-    fn add(
-        &mut self,
-        x: f64,
-        pulses: &Pulses<'_>,
-        seen: impl Fn(&TriggerRow) -> Option<f64>,
-        by_drive: impl Fn(&TriggerRow) -> Option<f64>,
-    ) {
-        let (mean, interval) = pulses.mean(seen);
-        self.dots.extend(mean.map(|mean| (x, mean)));
-        self.bars
-            .extend(interval.map(|Interval { low, high }| (x, (low, high))));
-        let (mean, _) = pulses.mean(by_drive);
-        self.by_drive.extend(mean.map(|mean| (x, mean)));
+        series
     }
 
     fn values(&self) -> impl Iterator<Item = f64> + '_ {
@@ -77,46 +78,37 @@ impl Series {
 /// `None` if no job says what its pulse did, or they differ in the velocity or in the number of periods.
 pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let all = Pulses::of(rows);
-    let value = |pulses: &Pulses<'_>, symbol| pulses.rows[0].parameters.get(symbol).number();
+    let value = |pulses: &Pulses<'_>, symbol| pulses.parameters.get(symbol).number();
     let values = |symbol| ascending(all.iter().filter_map(|pulses| value(pulses, symbol)));
     let amplitudes = values(Symbol::Delta);
+    // High frequencies first.
     let periods = values(Symbol::T);
     let is_one = values(Symbol::V0).len() == 1 && values(Symbol::PulseCycles).len() == 1;
     if !is_one || periods.len() > INKS.len() || amplitudes.len() > MAX_AMPLITUDES {
         return None;
     }
     let of = |amplitude: f64, period: f64| {
-        let is_of = |pulses: &&Pulses<'_>| {
-            value(pulses, Symbol::Delta) == Some(amplitude)
-                && value(pulses, Symbol::T) == Some(period)
+        let wanted = [(Symbol::Delta, amplitude), (Symbol::T, period)];
+        let is_wanted = |pulses: &&Pulses<'_>| {
+            let mut wanted = wanted.iter();
+            wanted.all(|&(symbol, number)| value(pulses, symbol) == Some(number))
         };
-        all.iter().find(is_of)
+        all.iter().find(is_wanted)
     };
-    // High frequencies first, as their periods ascend.
     let inks = || periods.iter().copied().zip(INKS);
     let responses = |amplitude: f64| {
         let series = inks().map(|(period, ink)| {
-            let mut series = Series::new(ink);
-            for bin in 0..BINS {
-                let ends = [bin, bin + 1].map(|edge| f64::from(edge) / f64::from(BINS));
-                let pulses = of(amplitude, period).map(|pulses| pulses.between(ends[0], ends[1]));
-                let relative =
-                    |seconds: Option<f64>, row: &TriggerRow| Some(seconds? / row.tau_control?);
-                if let Some(pulses) = pulses {
-                    series.add(
-                        0.5 * (ends[0] + ends[1]),
-                        &pulses,
-                        |row| relative(row.advance, row),
-                        |row| relative(row.advance_drive, row),
-                    );
-                }
-            }
-            series
+            let bins = (0..BINS).map(|bin| {
+                let [low, high] = [bin, bin + 1].map(|edge| f64::from(edge) / f64::from(BINS));
+                let pulses = of(amplitude, period).map(|pulses| pulses.between(low, high));
+                (0.5 * (low + high), pulses)
+            });
+            Series::new(ink, TriggerRow::advances, bins)
         });
         series.collect::<Vec<_>>()
     };
-    let panels: Vec<Vec<Series>> = amplitudes.iter().map(|&each| responses(each)).collect();
-    let (low, high) = widened(bounds(panels.iter().flatten().flat_map(Series::values))?);
+    let responses: Vec<Vec<Series>> = amplitudes.iter().map(|&each| responses(each)).collect();
+    let (low, high) = widened(bounds(responses.iter().flatten().flat_map(Series::values))?);
     let advance = Axis::linear("Advance / ⟨τ⟩", low, high);
     let place = Axis::linear("Place in the cycle p", 0.0, 1.0);
     let amplitude = label(Symbol::Delta.key());
@@ -127,22 +119,12 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
         panel.heading = Some(amplitude.setting(*value, Digits::THREE));
         panel
     };
-    let mut panels: Vec<Panel<'_>> = panels.into_iter().zip(&amplitudes).map(panel).collect();
+    let mut panels: Vec<Panel<'_>> = responses.into_iter().zip(&amplitudes).map(panel).collect();
     let (x_label, factor) = axis_of(Symbol::Delta.key(), amplitudes.iter().copied());
-    let share = |is_so: Option<bool>| is_so.map(|is_so| f64::from(u8::from(is_so)));
     let shares = inks().map(|(period, ink)| {
-        let mut series = Series::new(ink);
-        for &amplitude in &amplitudes {
-            if let Some(pulses) = of(amplitude, period) {
-                series.add(
-                    factor * amplitude,
-                    pulses,
-                    |row| share(row.triggered),
-                    |row| share(row.triggered_drive),
-                );
-            }
-        }
-        series
+        let places = amplitudes.iter();
+        let places = places.map(|&amplitude| (factor * amplitude, of(amplitude, period).cloned()));
+        Series::new(ink, TriggerRow::triggers, places)
     });
     let shares: Vec<Series> = shares.collect();
     let most = shares.iter().flat_map(Series::values).fold(0.0, f64::max);

@@ -8,6 +8,7 @@
 use super::confidence::{MIN_VALUES, OF_INTERVALS, OF_PHASES, ROUNDING, Unseen};
 use super::sequence::{Centred, Sequences, Sum, unit};
 use super::set::{Cycles, FinishedSet};
+use super::triggers::{Cycle, Excluded};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;
@@ -20,9 +21,11 @@ use std::f64::consts::TAU;
 
 columns! {
     #[derive(Clone, Copy, Debug)]
-    struct Onset {
+    pub(super) struct Onset {
         onset: f64;
         interval: Option<f64>;
+        nucleation: f64;
+        duration: f64;
     }
 }
 
@@ -53,30 +56,45 @@ impl Controls {
 
     /// What the drive alone explains of a set with these parameters.
     pub(super) fn explain(&self, plan: Plan<'_>, parameters: &Parameters) -> Explained {
-        // Pulses have no phase: see `triggers.rs`.
-        let lasting = Some(parameters).filter(|parameters| parameters.pulse_start.is_none());
-        let control = lasting
-            .and_then(|parameters| plan.control_of(parameters))
-            .and_then(|control| self.0.get(&control));
-        let passage = |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Passage::of(parameters, slips));
-        let passages = control.map(|control| control.iter().map(passage).collect());
-        Explained {
+        let mut explained = Explained {
             is_control: plan.is_control(parameters),
-            passages,
+            ..Explained::default()
+        };
+        let control = plan.control_of(parameters);
+        let Some(control) = control.and_then(|control| self.0.get(&control)) else {
+            return explained;
+        };
+        let slips = control.values().flatten();
+        let intervals = Sequences::of([slips.filter_map(|slip| Some([slip.interval?]))]);
+        explained.tau_control = intervals.estimate().value();
+        if parameters.pulse_start.is_some() {
+            let cycle = |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Cycle::of(parameters, slips));
+            explained.cycles = control.iter().map(cycle).collect();
+        } else {
+            let passage =
+                |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Passage::of(parameters, slips));
+            explained.passages = Some(control.iter().map(passage).collect());
         }
+        explained
     }
 }
 
-/// What the drive alone explains of a set: the passages by their seeds; `None` without a control.
+/// What the drive alone explains of a set.
 #[derive(Debug, Default)]
 pub(super) struct Explained {
     is_control: bool,
+    /// Mean interval of the control, in s.
+    pub(super) tau_control: Option<f64>,
+    /// By their seeds; `None` without a control, or if the modulation is a pulse.
     passages: Option<BTreeMap<u64, Passage>>,
+    /// The cycle of the control in which a pulse begins, by their seeds.
+    pub(super) cycles: BTreeMap<u64, Result<Cycle, Excluded>>,
 }
 
 impl Explained {
     pub(super) fn add_to(&self, set: &mut FinishedSet) {
         set.row.is_control = self.is_control;
+        set.row.tau_control = self.tau_control;
         let Some(passages) = &self.passages else {
             return;
         };
@@ -256,6 +274,8 @@ mod tests {
             let slip = |(onset, last): (&f64, Option<&f64>)| Onset {
                 onset: *onset,
                 interval: last.map(|last| onset - last),
+                nucleation: *onset,
+                duration: 0.0,
             };
             onsets.iter().zip(lasts).map(slip).collect::<Vec<_>>()
         };
@@ -359,6 +379,8 @@ mod tests {
         let slip = |onset: &f64| Onset {
             onset: *onset,
             interval: None,
+            nucleation: *onset,
+            duration: 0.0,
         };
         let passages = onsets.iter().map(|onsets| {
             let slips: Vec<Onset> = onsets.iter().map(slip).collect();

@@ -60,7 +60,7 @@ pub(super) fn of_chosen<T>(
 /// The jobs of a directory, whose slips are still to be gathered.
 pub(super) struct Gathering<'a> {
     pub(super) sets: Vec<SetJobs>,
-    pub(super) slips: Dataset<'a>,
+    slips: Dataset<'a>,
     is_wanted: Wanted<'a>,
     plan: Plan<'a>,
     controls: Controls,

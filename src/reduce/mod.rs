@@ -34,8 +34,8 @@ pub(crate) use pool::{Pool, PooledJob};
 pub(crate) use reduction::RoundOfSet;
 pub(crate) use reduction::WRITER;
 pub use reduction::{
-    HistogramBin, NoJobs, ReductionSummary, SetInRounds, advise, error_over_target, read_reduced,
-    read_sets, reduce, renew,
+    HistogramBin, NoJobs, ReductionSummary, SetInRounds, advise, error_over_target, read_optional,
+    read_reduced, read_sets, reduce, renew,
 };
 pub use sequence::quantile;
 pub use slips::{SlipOfSet, means_of_slips, sample_of_slips};

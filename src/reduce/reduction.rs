@@ -6,9 +6,9 @@
 //! times.
 
 use super::backbone::{Backbone, BackboneBin};
-use super::crossings::{EdgeRow, edge_rows};
+use super::crossings::edge_rows;
 use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
-use super::triggers::trigger_rows;
+use super::triggers::{note_delays, trigger_rows};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
@@ -67,11 +67,13 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
     let _alone = exclusive_lock(layout, WRITER)?;
     let (commit, summary) = stage(results, max_slips)?;
     results.publish(commit)?;
-    let edges = layout.reduced_file(EdgeRow::NAME);
-    if results.sweep().refinement().is_none() && layout.storage.exists(&edges)? {
-        // Left by an earlier sweep.
-        layout.refuse_link(&edges)?;
-        layout.storage.remove(&edges)?;
+    for (table, is_there) in results.optional_tables() {
+        let file = layout.reduced_file(table);
+        if !is_there && layout.storage.exists(&file)? {
+            // Left by an earlier sweep.
+            layout.refuse_link(&file)?;
+            layout.storage.remove(&file)?;
+        }
     }
     Ok(summary)
 }
@@ -105,10 +107,11 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let rounds = RoundsOfSets::of(results);
     let mut set_writer = staged.begin::<SetInRounds>(&rounds.left_out())?;
     let mut histogram_writer = staged.begin::<HistogramBin>(&[])?;
-    let triggers = trigger_rows(gathering.slips.clone(), results.plan(), all_jobs)?;
+    let mut triggers = Vec::new();
     let mut pooled = Backbone::default();
     let mut kept = Vec::new();
     gathering.each_set(max_slips, spacing(total), |set, explained| {
+        triggers.extend(trigger_rows(&set, explained));
         let (set, points) = set.finish_with(explained);
         let row = &set.row;
         set_writer.push(&(row.clone(), rounds.of_set(row)))?;
@@ -138,7 +141,8 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     kept.sort_by_key(|(place, _)| *place);
     summary.points = kept.len() as u64;
     staged.write(kept.into_iter().map(|(_, point)| point))?;
-    if !triggers.is_empty() {
+    if results.plan().sweeps().any(Sweep::has_pulses) {
+        note_delays(&mut triggers);
         staged.write(triggers)?;
     }
     if let Some(refinement) = results.sweep().refinement() {
@@ -328,12 +332,12 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Results<'a>> {
         let file = DataFile::with_footer(layout.reduced_file(table), source.clone());
         file.check(layout.storage).is_ok()
     };
-    let edges = results.sweep().refinement().map(|_| EdgeRow::NAME);
+    let mut optional = results.optional_tables().into_iter();
     if is_current(SetRow::NAME)
         && is_current(HistogramBin::NAME)
         && is_current(BackboneBin::NAME)
         && is_current(Point::NAME)
-        && edges.is_none_or(is_current)
+        && optional.all(|(table, is_there)| !is_there || is_current(table))
     {
         return Ok(results.clone());
     }
@@ -372,6 +376,15 @@ pub fn advise(advice: &'static str) -> impl Fn(ResultsError) -> anyhow::Error {
 pub fn read_reduced<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
     let file = layout.reduced_file(R::NAME);
     Dataset::new(layout.storage, vec![file]).rows().collect()
+}
+
+/// The same; none of a table that this directory does not have.
+pub fn read_optional<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsError> {
+    if layout.storage.exists(&layout.reduced_file(R::NAME))? {
+        read_reduced(layout)
+    } else {
+        Ok(Vec::new())
+    }
 }
 
 /// The rows of the reduced sets, controls left out, in order.

@@ -20,7 +20,7 @@ const WHOLE_TURN: f64 = 1.5 * PI;
 /// bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlipStats {
-    onset: f64,
+    pub(super) onset: f64,
     /// Interval before it, in s.
     pub(super) interval: f64,
     /// The interval in periods of the modulation at its end.

@@ -5,20 +5,20 @@
 //! at its onset. Without an exact counterfactual, experiments compare catalogues before and after waves (van der Elst
 //! and Savage, J. Geophys. Res. 120 (2015), 10.1002/2014JB011611).
 
-use super::sequence::{Estimate, Sequences};
-use super::set::SetJobs;
+use super::drive_alone::{Explained, Onset};
+use super::gather::Gathered;
+use super::sequence::Sequences;
 use crate::model::{Drive, Parameters, Selected, Selection, Symbol};
-use crate::results::ResultsError;
-use crate::results::tables::JobOfSlip;
-use crate::sweep::Plan;
 use crate::table::columns::{Interval, columns};
-use crate::table::file::Dataset;
 use crate::table::tables;
 use crate::table::value::words;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// Amplitude in m up to which a pulse moves nothing: what advances by it shows the error of the solver.
 const NO_PULSE: f64 = 1e-12;
+
+/// Seeds that a mean needs for an interval.
+const MIN_SEEDS: usize = 8;
 
 /// The parameters of a row: those of the pulse, and of the drive.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,148 +70,92 @@ columns! {
 
 tables! { TriggerRow = "triggers", "One row per job with a pulse, if there are any"; }
 
-columns! {
-    /// When a slip begins, and when its first and last contact break.
-    #[derive(Clone, Copy, Debug)]
-    struct Times {
-        onset: f64;
-        interval: Option<f64>;
-        nucleation: f64;
-        duration: f64;
-    }
+/// The cycle of a control in which a pulse begins, with what the drive alone makes of its next slip. Times in s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cycle {
+    /// Onsets before and after the pulse begins, and the one after, if there is one.
+    last: f64,
+    free: f64,
+    following: Option<f64>,
+    passage: f64,
+    pulse: [f64; 2],
 }
 
-/// Slips of jobs, by their seeds.
-type Jobs = BTreeMap<u64, Vec<Times>>;
-
-/// The rows of the sets that have a pulse, set by set, in the order of their seeds.
-///
-/// Memory: 40 bytes for each slip of a control, 80 for each pulsed job.
-pub(super) fn trigger_rows(
-    slips: Dataset<'_>,
-    plan: Plan<'_>,
-    sets: &[SetJobs],
-) -> Result<Vec<TriggerRow>, ResultsError> {
-    let pulsed = sets
-        .iter()
-        .filter(|set| set.parameters.pulse_start.is_some());
-    let pulsed: Vec<&SetJobs> = pulsed.collect();
-    let control = |set: &SetJobs| plan.control_of(&set.parameters);
-    let mut controls: HashMap<String, Jobs> = pulsed
-        .iter()
-        .filter_map(|set| Some((control(set)?, Jobs::new())))
-        .collect();
-    let mut runs: HashMap<String, (f64, Jobs)> = pulsed
-        .iter()
-        .filter_map(|set| {
-            Some((
-                set.set_id.clone(),
-                (set.parameters.pulse_start?, Jobs::new()),
-            ))
+impl Cycle {
+    /// Of the slips of the control of a job with these parameters, in order.
+    pub(super) fn of(parameters: &Parameters, control: &[Onset]) -> Result<Self, Excluded> {
+        let drive = Drive::new(parameters);
+        let pulse = drive.pulse().unwrap_or_default();
+        let [start, _] = pulse;
+        let number = control.partition_point(|slip| slip.onset <= start);
+        let free = control.get(number).ok_or(Excluded::AfterLast)?;
+        let last = number.checked_sub(1).map(|before| control[before]);
+        let last = last.ok_or(Excluded::BeforeFirst)?;
+        if start < last.nucleation + last.duration || free.nucleation <= start {
+            return Err(Excluded::WithinSlip);
+        }
+        Ok(Self {
+            last: last.onset,
+            free: free.onset,
+            following: control.get(number + 1).map(|slip| slip.onset),
+            passage: drive.first_passage(free.onset),
+            pulse,
         })
-        .collect();
-    for row in slips.rows::<(JobOfSlip, Times)>() {
-        let (job, slip) = row?;
-        if let Some(control) = controls.get_mut(&job.set_id) {
-            control.entry(job.seed).or_default().push(slip);
-        } else if let Some((start, run)) = runs.get_mut(&job.set_id)
-            && slip.onset > *start
-        {
-            let after = run.entry(job.seed).or_default();
-            // The next, and the one after it.
-            if after.len() < 2 {
-                after.push(slip);
-            }
-        }
     }
-    let mut rows = Vec::new();
-    for set in pulsed {
-        let none = Jobs::new();
-        let controls = control(set)
-            .and_then(|id| controls.get(&id))
-            .unwrap_or(&none);
-        let run = runs.get(&set.set_id).map_or(&none, |(_, run)| run);
-        let intervals = controls.values().flatten().filter_map(|slip| slip.interval);
-        let intervals: Vec<f64> = intervals.collect();
-        let tau_control =
-            (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
-        for &seed in &set.finished {
-            let after = run.get(&seed).map_or(&[][..], Vec::as_slice);
-            let control = controls.get(&seed).map(Vec::as_slice);
-            rows.push(TriggerRow {
-                set_id: set.set_id.clone(),
-                tau_control,
-                ..row_of(&set.parameters, seed, control, after)
-            });
-        }
-    }
-    note_delays(&mut rows);
-    Ok(rows)
-}
 
-/// The row of a job, from the slips of its control and those of its own after the pulse began.
-fn row_of(
-    parameters: &Parameters,
-    seed: u64,
-    control: Option<&[Times]>,
-    after: &[Times],
-) -> TriggerRow {
-    let parameters = Parameters {
-        seed,
-        ..parameters.clone()
-    };
-    let row = TriggerRow {
-        eta: parameters.eta(),
-        ..TriggerRow::default()
-    };
-    let found = find(&parameters, control, after, &row);
-    TriggerRow {
-        parameters: Selected::new(parameters),
-        ..found.unwrap_or_else(|excluded| TriggerRow {
-            excluded: Some(excluded),
-            ..row
+    /// The row of a pulse with these onsets after its start.
+    fn row(&self, onsets: &[f64]) -> Result<TriggerRow, Excluded> {
+        let next = *onsets.first().ok_or(Excluded::AfterLast)?;
+        let [start, end] = self.pulse;
+        let interval = self.free - self.last;
+        let is_triggered = |onset: f64| Some(onset <= end && self.free > end);
+        Ok(TriggerRow {
+            cycle: Some(interval),
+            place: Some((start - self.last) / interval),
+            advance: Some(self.free - next),
+            advance_drive: Some(self.free - self.passage),
+            next_advance: self
+                .following
+                .zip(onsets.get(1))
+                .map(|(free, next)| free - next),
+            triggered: is_triggered(next),
+            triggered_drive: is_triggered(self.passage),
+            ..TriggerRow::default()
         })
     }
 }
 
-fn find(
-    parameters: &Parameters,
-    control: Option<&[Times]>,
-    after: &[Times],
-    row: &TriggerRow,
-) -> Result<TriggerRow, Excluded> {
-    let control = control.ok_or(Excluded::NoControl)?;
-    let drive = Drive::new(parameters);
-    let [start, end] = drive.pulse().unwrap_or_default();
-    let number = control.partition_point(|slip| slip.onset <= start);
-    let free = control.get(number).ok_or(Excluded::AfterLast)?;
-    let before = number.checked_sub(1).ok_or(Excluded::BeforeFirst)?;
-    let last = control[before];
-    if start < last.nucleation + last.duration || free.nucleation <= start {
-        return Err(Excluded::WithinSlip);
-    }
-    let next = after.first().ok_or(Excluded::AfterLast)?;
-    let cycle = free.onset - last.onset;
-    let passage = drive.first_passage(free.onset);
-    let is_triggered = |onset: f64| Some(onset <= end && free.onset > end);
-    let following = control.get(number + 1).zip(after.get(1));
-    Ok(TriggerRow {
-        cycle: Some(cycle),
-        place: Some((start - last.onset) / cycle),
-        advance: Some(free.onset - next.onset),
-        advance_drive: Some(free.onset - passage),
-        next_advance: following.map(|(free, next)| free.onset - next.onset),
-        triggered: is_triggered(next.onset),
-        triggered_drive: is_triggered(passage),
-        ..row.clone()
-    })
+/// The rows of a set, in the order of its seeds, before [`note_delays`]; none without a pulse.
+pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<TriggerRow> {
+    let Gathered { jobs, slips, .. } = set;
+    let Some(start) = jobs.parameters.pulse_start else {
+        return Vec::new();
+    };
+    let row = |&seed: &u64| {
+        let onsets = slips.of_job(seed).iter().map(|slip| slip.onset);
+        let after: Vec<f64> = onsets.filter(|onset| *onset > start).collect();
+        let cycle = explained.cycles.get(&seed).copied();
+        let row = cycle
+            .unwrap_or(Err(Excluded::NoControl))
+            .and_then(|cycle| cycle.row(&after));
+        let parameters = Parameters {
+            seed,
+            ..jobs.parameters.clone()
+        };
+        TriggerRow {
+            set_id: jobs.set_id.clone(),
+            eta: parameters.eta(),
+            parameters: Selected::new(parameters),
+            tau_control: explained.tau_control,
+            ..row.unwrap_or_else(TriggerRow::excluded)
+        }
+    };
+    jobs.finished.iter().map(row).collect()
 }
 
 /// Says which advances are larger than those by no pulse at all.
-fn note_delays(rows: &mut [TriggerRow]) {
-    let without = rows
-        .iter()
-        .filter(|row| row.parameters.modulation_amplitude <= NO_PULSE);
+pub(super) fn note_delays(rows: &mut [TriggerRow]) {
+    let without = rows.iter().filter(|row| row.is_nothing());
     let noise = without.filter_map(|row| row.advance).map(f64::abs);
     let noise = noise.reduce(f64::max);
     for row in rows {
@@ -221,9 +165,39 @@ fn note_delays(rows: &mut [TriggerRow]) {
     }
 }
 
-/// The pulses of one drive velocity, amplitude, period and number of periods that say something.
+impl TriggerRow {
+    fn excluded(why: Excluded) -> Self {
+        Self {
+            excluded: Some(why),
+            ..Self::default()
+        }
+    }
+
+    /// Whether the pulse moves nothing.
+    fn is_nothing(&self) -> bool {
+        self.parameters.modulation_amplitude <= NO_PULSE
+    }
+
+    /// The advance as seen and by the drive alone, over the mean interval.
+    pub fn advances(&self) -> Option<[f64; 2]> {
+        let mean = self.tau_control?;
+        Some([self.advance? / mean, self.advance_drive? / mean])
+    }
+
+    /// Whether the slip is triggered as seen and by the drive alone: 1 or 0.
+    pub fn triggers(&self) -> Option<[f64; 2]> {
+        let number = |is_so: bool| f64::from(u8::from(is_so));
+        Some([number(self.triggered?), number(self.triggered_drive?)])
+    }
+}
+
+/// A mean and its interval.
+pub type Mean = (f64, Option<Interval>);
+
+/// The pulses that differ in their start and seed alone, and say something.
 #[derive(Clone, Debug)]
 pub struct Pulses<'a> {
+    pub parameters: Parameters,
     pub rows: Vec<&'a TriggerRow>,
 }
 
@@ -231,46 +205,60 @@ impl<'a> Pulses<'a> {
     /// All but those that move nothing, in the order of the rows.
     pub fn of(rows: &'a [TriggerRow]) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
-        let known = rows.iter().filter(|row| row.advance.is_some());
-        for row in known.filter(|row| row.parameters.modulation_amplitude > NO_PULSE) {
-            let is_same = |pulses: &&mut Self| {
-                let other = &pulses.rows[0].parameters;
-                let start = other.pulse_start;
-                let seed = other.seed;
-                let alike = Parameters {
-                    pulse_start: start,
-                    seed,
-                    ..row.parameters.parameters.clone()
-                };
-                alike == **other
+        for row in rows
+            .iter()
+            .filter(|row| row.advance.is_some() && !row.is_nothing())
+        {
+            let parameters = Parameters {
+                pulse_start: None,
+                seed: 0,
+                ..row.parameters.parameters.clone()
             };
-            match all.iter_mut().find(is_same) {
+            match all
+                .iter_mut()
+                .find(|pulses| pulses.parameters == parameters)
+            {
                 Some(pulses) => pulses.rows.push(row),
-                None => all.push(Self { rows: vec![row] }),
+                None => all.push(Self {
+                    parameters,
+                    rows: vec![row],
+                }),
             }
         }
         all
     }
 
-    /// The mean of a quantity, with its interval over seeds; both `None` without a value.
-    pub fn mean(
-        &self,
-        quantity: impl Fn(&TriggerRow) -> Option<f64>,
-    ) -> (Option<f64>, Option<Interval>) {
-        let mut jobs: BTreeMap<u64, Vec<[f64; 1]>> = BTreeMap::new();
-        for row in &self.rows {
-            let job = jobs.entry(row.parameters.seed).or_default();
-            job.extend(quantity(row).map(|value| [value]));
-        }
-        let mean: Estimate<1> = Sequences::of(jobs.into_values()).estimate();
-        (mean.value(), mean.interval())
+    /// Means of a quantity: as seen, by the drive alone, and of the difference; `None` without values. Pulses of a seed
+    /// meet the same slip, so intervals need [`MIN_SEEDS`].
+    pub fn means(&self, quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>) -> Option<[Mean; 3]> {
+        let mean = |of: fn([f64; 2]) -> f64| {
+            let mut seeds: BTreeMap<u64, Vec<[f64; 1]>> = BTreeMap::new();
+            for row in &self.rows {
+                if let Some(values) = quantity(row) {
+                    seeds
+                        .entry(row.parameters.seed)
+                        .or_default()
+                        .push([of(values)]);
+                }
+            }
+            let has_interval = seeds.len() >= MIN_SEEDS;
+            let mean = Sequences::of(seeds.into_values()).estimate();
+            let interval = mean.interval().filter(|_| has_interval);
+            Some((mean.value()?, interval))
+        };
+        Some([
+            mean(|[seen, _]| seen)?,
+            mean(|[_, by_drive]| by_drive)?,
+            mean(|[seen, by_drive]| seen - by_drive)?,
+        ])
     }
 
     /// Those that begin between two shares of the interval of the control.
     pub fn between(&self, low: f64, high: f64) -> Self {
-        let mut rows = self.rows.clone();
-        rows.retain(|row| row.place.is_some_and(|place| (low..high).contains(&place)));
-        Self { rows }
+        let mut some = self.clone();
+        some.rows
+            .retain(|row| row.place.is_some_and(|place| (low..high).contains(&place)));
+        some
     }
 }
 
@@ -290,74 +278,93 @@ mod tests {
         parameters.validated().unwrap()
     }
 
-    fn slips(onsets: &[f64]) -> Vec<Times> {
-        let slip = |&onset: &f64| Times {
+    fn row(start: f64, amplitude: f64, after: &[f64]) -> TriggerRow {
+        let slip = |onset: f64| Onset {
             onset,
             interval: None,
             nucleation: onset - 0.001,
             duration: 0.006,
         };
-        onsets.iter().map(slip).collect()
+        let control = [1.0, 1.1, 1.21, 1.3].map(slip);
+        let parameters = pulsed(start, amplitude);
+        let row = Cycle::of(&parameters, &control).and_then(|cycle| cycle.row(after));
+        TriggerRow {
+            parameters: Selected::new(parameters),
+            ..row.unwrap_or_else(TriggerRow::excluded)
+        }
     }
 
     #[test]
     fn the_next_onset_is_compared_with_that_of_the_control_and_with_the_drive_alone() {
-        let control = slips(&[1.0, 1.1, 1.21, 1.3]);
-        let row = |start: f64, after: &[f64]| {
-            row_of(&pulsed(start, 1e-6), 4, Some(&control), &slips(after))
-        };
         let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
-        let triggered = row(1.15, &[1.16, 1.28]);
-        assert_eq!(triggered.parameters.seed, 4);
+        let triggered = row(1.15, 1e-6, &[1.16, 1.28]);
         assert!(near(triggered.cycle, 0.11) && near(triggered.place, 0.05 / 0.11));
         assert!(near(triggered.advance, 0.05) && near(triggered.next_advance, 0.02));
         assert_eq!(triggered.triggered, Some(true));
         // The drive rises by 2 Δ = 2 µm, as far as in 20 ms: too early for a slip 60 ms later.
-        assert_eq!(
-            (triggered.advance_drive, triggered.triggered_drive),
-            (Some(0.0), Some(false))
-        );
-        let by_drive = row(1.195, &[1.2]);
-        assert!(by_drive.advance_drive > Some(0.005) && by_drive.triggered_drive == Some(false));
-        assert_eq!(
-            row(1.195, &[1.2]).triggered,
-            Some(false),
-            "the control slips within the pulse"
-        );
-        assert!(row(1.185, &[1.19]).triggered_drive == Some(true));
-        for (start, excluded) in [
-            (0.9, Excluded::BeforeFirst),
-            (1.1, Excluded::WithinSlip),
-            (1.104, Excluded::WithinSlip),
-            (1.2095, Excluded::WithinSlip),
-            (1.31, Excluded::AfterLast),
+        let by_drive = [
+            triggered.advance_drive,
+            triggered.triggers().map(|[_, it]| it),
+        ];
+        assert_eq!(by_drive, [Some(0.0); 2]);
+        // The control slips within the pulse.
+        let early = row(1.195, 1e-6, &[1.2]);
+        assert!(early.advance_drive > Some(0.005));
+        assert_eq!(early.triggers(), Some([0.0, 0.0]));
+        assert_eq!(row(1.185, 1e-6, &[1.19]).triggers(), Some([1.0, 1.0]));
+        for (start, after, excluded) in [
+            (0.9, &[2.0][..], Excluded::BeforeFirst),
+            (1.1, &[2.0], Excluded::WithinSlip),
+            (1.104, &[2.0], Excluded::WithinSlip),
+            (1.2095, &[2.0], Excluded::WithinSlip),
+            (1.31, &[2.0], Excluded::AfterLast),
+            (1.15, &[], Excluded::AfterLast),
         ] {
-            assert_eq!(row(start, &[2.0]).excluded, Some(excluded), "{start}");
+            assert_eq!(row(start, 1e-6, after).excluded, Some(excluded), "{start}");
         }
-        assert_eq!(row(1.15, &[]).excluded, Some(Excluded::AfterLast));
-        let alone = row_of(&pulsed(1.0, 1e-6), 0, None, &[]);
-        assert_eq!(alone.excluded, Some(Excluded::NoControl));
     }
 
     #[test]
     fn what_pulses_of_nothing_advance_is_noise() {
-        let control = slips(&[1.0, 1.1, 1.2]);
-        let row = |amplitude: f64, next: f64| {
-            row_of(&pulsed(1.13, amplitude), 0, Some(&control), &slips(&[next]))
-        };
         let mut rows = [
-            row(1e-15, 1.2 + 2e-9),
-            row(1e-7, 1.2 - 1e-9),
-            row(1e-7, 1.19),
+            row(1.13, 1e-15, &[1.21 + 2e-9]),
+            row(1.13, 1e-7, &[1.21 - 1e-9]),
+            row(1.13, 1e-7, &[1.2]),
         ];
         note_delays(&mut rows);
         assert!(
             rows.iter()
                 .all(|row| (row.noise.unwrap() - 2e-9).abs() < 1e-15)
         );
-        assert_eq!(
-            rows.map(|row| row.delayed),
-            [Some(false), Some(false), Some(true)]
+        let [none, small, large] = rows;
+        assert_eq!([none.delayed, small.delayed], [Some(false); 2]);
+        assert_eq!(large.delayed, Some(true));
+    }
+
+    #[test]
+    fn pulses_that_differ_in_start_and_seed_alone_have_one_mean_and_an_interval_by_seeds() {
+        let of_seed = |seed: u64, amplitude: f64, advance: f64| {
+            let mut row = row(1.15, amplitude, &[1.21 - advance]);
+            row.tau_control = Some(0.1);
+            row.parameters.parameters.seed = seed;
+            row.parameters.parameters.pulse_start = Some(1.15 + 1e-3 * advance);
+            row
+        };
+        let mut rows = vec![of_seed(0, 1e-15, 0.0), of_seed(0, 2e-7, 0.02)];
+        rows.extend((0..20).map(|seed| of_seed(seed, 1e-7, 0.01 + 1e-4 * seed as f64)));
+        let pulses = Pulses::of(&rows);
+        let counts: Vec<usize> = pulses.iter().map(|pulses| pulses.rows.len()).collect();
+        assert_eq!(counts, [1, 20]);
+        let [seen, by_drive, excess] = pulses[1].means(TriggerRow::advances).unwrap();
+        assert!(
+            (seen.0 - 0.1095).abs() < 1e-9 && by_drive.0 == 0.0,
+            "{seen:?}"
         );
+        let interval = excess.1.unwrap();
+        assert!(interval.low < seen.0 && seen.0 < interval.high);
+        assert!(interval.high - interval.low < 0.01);
+        let [(mean, interval), ..] = pulses[0].means(TriggerRow::advances).unwrap();
+        assert!((mean - 0.2).abs() < 1e-9 && interval.is_none());
+        assert_eq!(pulses[1].between(0.0, 0.3).rows.len(), 0);
     }
 }

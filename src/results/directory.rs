@@ -408,6 +408,13 @@ impl<'a> Results<'a> {
         tables_of(self.sweep().recording())
     }
 
+    /// Reduced tables that not all directories have, and whether this one has them.
+    pub fn optional_tables(&self) -> [(&'static str, bool); 2] {
+        let has_edges = self.sweep().refinement().is_some();
+        let has_pulses = self.plan().sweeps().any(Sweep::has_pulses);
+        [("edges", has_edges), ("triggers", has_pulses)]
+    }
+
     pub fn job_id(&self, part: &Part, position: usize) -> String {
         self.extensions[part.name.extension]
             .sweep

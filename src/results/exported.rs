@@ -48,7 +48,7 @@ pub struct ExportedFile {
 }
 
 impl Results<'_> {
-    /// Writes the tables, with reduced sets and edges, to a new folder, all or none. `progress` gets the number of
+    /// Writes the tables, with reduced sets, edges and triggers, to a new folder, all or none. `progress` gets the number of
     /// finished parts of tables, and of all.
     pub fn export(
         &self,
@@ -85,8 +85,11 @@ impl Results<'_> {
         let mut columns = vec!["table,column,unit,meaning\n".to_owned()];
         let joined = |table| JoinedTable::new(self, table, &self.exported_columns(table));
         let joined = self.tables().map(|table| (table, Some(joined(table))));
-        let edges = self.sweep().refinement().map(|_| "edges");
-        let reduced = iter::once("sets").chain(edges).map(|table| (table, None));
+        let optional = self.optional_tables().into_iter();
+        let optional = optional.filter_map(|(table, is_there)| is_there.then_some(table));
+        let reduced = iter::once("sets")
+            .chain(optional)
+            .map(|table| (table, None));
         for (table, joined) in joined.chain(reduced) {
             let name = format!("{table}.{}", format.word());
             let path = to.draft.path().join(&name);

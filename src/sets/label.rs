@@ -155,6 +155,7 @@ pub fn symbol_of(symbol: Symbol) -> String {
     match name.split_once('_') {
         Some((letter, "s")) => format!("{letter}ₛ"),
         Some((letter, "r")) => format!("{letter}ᵣ"),
+        Some((letter, "p")) => format!("{letter}ₚ"),
         Some((letter, "to")) => format!("{letter}ₜₒ"),
         Some(_) if description.symbol.is_empty() => name.replace('_', " "),
         // There is no letter for other subscripts: figures set them lower.

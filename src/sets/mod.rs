@@ -66,6 +66,7 @@ columns! {
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_bound as "tau_mean_bound": Option<f64> = "s",
             "lower bound of tau_mean, if it is null as a job gave up", "⟨τ⟩, at least" "Least mean interval";
+        tau_control: Option<f64> = "s", "mean interval of the control; null without a control", "⟨τ⟩, control" "Mean interval of the control";
         tau_off as "tau_mean_off": Option<f64> = "",
             "relative bias of tau_mean where `max_time` cut intervals; null if it cut none", "tau mean off" "Relative bias of the mean interval";
         tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals", "σ(τ)" "S.d. of the intervals";

@@ -65,6 +65,12 @@ impl Sweep {
         })
     }
 
+    /// Whether the modulation may be a pulse.
+    pub fn has_pulses(&self) -> bool {
+        let key = Symbol::PulseStart.key();
+        self.base.pulse_start.is_some() || self.swept().any(|swept| swept == key)
+    }
+
     /// Keys of all axes.
     pub fn swept(&self) -> impl Iterator<Item = &'static str> {
         let quantities = self.axes.iter().flat_map(Axis::quantities);

@@ -44,6 +44,17 @@ def test_the_oracle_and_scipy_confirm_a_log(log):
     assert check.returncode == 0, check.stdout + check.stderr
 
 
+def test_the_oracle_confirms_a_pulse(stickslip, tmp_path):
+    file = tmp_path / "pulse.parquet"
+    flags = ("--set", "N=9", "--set", "Delta=1e-6", "--set", "frequency=58", "--set", "pulse_start=0.02")
+    stickslip("simulate", *flags, "--set", "pulse_cycles=2", "--time", 0.07, "--tolerance", 1e-10, "--contacts", file)
+    found = json.loads(run("oracle", file).stdout)
+    assert found["within_limits"] and found["breaks"] > 100
+    assert found["worst_residual"] < 1e-9 and found["worst_time_error"] < 1e-11
+    # It is the pulse that it follows.
+    assert run("oracle", file, "--pulse-start", 0.0201).returncode == 1
+
+
 def test_a_break_that_the_log_leaves_out_is_missed(log):
     def without_first_break(table):
         row = compute.index(table["event"], "break").as_py()

@@ -17,11 +17,13 @@ from conftest import ROOT
 CHEAP = ("drag", "drag-strong", "locking-contacts", "sliding-velocity")
 #: Pictures of a single simulation, which test_redraw.py draws, and of timings, which differ each time.
 OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "predicted-cost.png", "speed-against-error.png"}
-#: Custom figures: the flags of `stickslip plot`, as in scripts/reproduce.
+#: Custom figures: the flags of `stickslip plot`, as in scripts/reproduce, a line for each.
 OWN = {
     "fig3-precise": "--x eta --y phase_mean --colour V0 --log x",
     "locking-drive-alone": "--x eta --y resultant_excess --colour V0 --log x",
     "locking-staircase": "--x T --y tau_50/T --colour Delta --log y",
+    "tide": """--x T/tau_control --y phase_mean --colour V0 --log x
+        --x T/tau_control --y resultant_excess --colour V0 --log x""",
 }
 
 
@@ -96,7 +98,8 @@ def test_results_that_are_there_give_their_pictures_again(stickslip, tmp_path, s
         pytest.skip(f"{results} is not there; scripts/reproduce {sweep} makes it")
     for folder in ("reduced", "run"):
         shutil.copytree(results / folder, tmp_path / folder)
-    stickslip("plot", tmp_path, *OWN.get(sweep, "").split())
+    for flags in OWN.get(sweep, "").split("\n"):
+        stickslip("plot", tmp_path, *flags.split())
     for picture in pictures_of(sweep):
         picture.assert_drawn(tmp_path)
 

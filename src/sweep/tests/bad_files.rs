@@ -93,7 +93,7 @@ fn unknown_and_missing_keys_are_refused_with_the_nearest_known() {
             &[
                 "humidity = 3",
                 "allowed are ",
-                "and 14 more (docs/sweeps.md)",
+                "and 16 more (docs/sweeps.md)",
             ],
         ),
         (
