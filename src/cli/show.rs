@@ -359,8 +359,11 @@ fn table_of_pulses(triggers: &[TriggerRow]) -> String {
         for (head, which) in [(name, 0), ("by the drive", 1), ("excess", 2)] {
             columns.numbers(head, &pulses, |pulses| {
                 match pulses.means(quantity).map(|means| means[which]) {
-                    Some((value, Some(Interval { low, high }))) => with_interval(value, low, high),
-                    Some((value, None)) => Digits::THREE.number(value),
+                    // Exact for the control's slips, whose error the excess has.
+                    Some((value, Some(Interval { low, high }))) if which != 1 => {
+                        with_interval(value, low, high)
+                    }
+                    Some((value, _)) => Digits::THREE.number(value),
                     None => "–".to_owned(),
                 }
             });

@@ -131,7 +131,7 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let x = Axis::of_data(&x_label, amplitudes.iter().map(|value| factor * value))?;
     let y = Axis::linear("Share of triggered slips", 0.0, 1.05 * most.max(0.01));
     let mut last = Panel::inside(HEIGHT, x, y, shares.into_iter().flat_map(Series::layers));
-    last.heading = Some("slips within the pulse that would have come later".to_owned());
+    last.heading = Some("within the pulse, later without it".to_owned());
     panels.push(last);
     let frequency = label("frequency");
     let legend = inks().map(|(period, ink)| {
