@@ -29,6 +29,7 @@ mod kills;
 mod moved;
 mod outputs;
 mod program;
+mod pulses;
 mod ramp;
 mod regimes;
 mod released;

@@ -506,6 +506,16 @@ def test_sweeps_in_rounds_have_edges_and_say_whether_targets_are_met(tmp_path, o
     assert min(pa.table(refined.jobs())["seed"].to_pylist()) == 7
     with pytest.raises(module.ResultsError, match="refine"):
         opened.edges()
+    with pytest.raises(module.ResultsError, match="pulse_start"):
+        opened.triggers()
+
+
+def test_pulses_have_a_table_of_what_they_did(tmp_path):
+    axes = {"pulse_start": [0.5, 0.52], "seed": {"count": 3}}
+    sweep = {"name": "pulses", "model": {"N": 10, "Ns": 5, "Delta": 1e-6, "frequency": 29}, "axes": axes}
+    results = module.run({**sweep, "record": {"time": 0.7, "control": True}}, tmp_path / "pulses", progress=False)
+    triggers = pa.table(results.triggers(["seed", "place", "advance", "advance_drive", "excluded"]))
+    assert len(triggers) == 2 * 3 and min(triggers["advance_drive"].drop_null().to_pylist()) >= 0
 
 
 def test_a_column_of_a_table_has_its_name(opened):

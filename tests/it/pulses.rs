@@ -1,0 +1,98 @@
+//! Pulses in the built program: what they advance, beside their controls and the drive alone.
+
+use crate::program::{Cell, Folder};
+use std::fs;
+
+const SWEEP: &str = "name = \"pulses\"\n[model]\nN = 10\nNs = 5\nfrequency = 29\n[axes]\n\
+                     pulse_start = [0.5, 0.51, 0.52, 0.53, 0.54, 9]\nDelta = [1e-15, 1e-6]\nseed = { count = 9 }\n\
+                     [record]\ntime = 0.7\ncontrol = true\n";
+
+#[test]
+fn pulses_advance_slips_beside_their_controls_and_the_drive_alone() {
+    let folder = Folder::new();
+    folder.write("pulses.toml", SWEEP);
+    let ended = folder.ends(0, "run pulses.toml --out out");
+    assert!(ended.stdout.contains("triggered"), "{}", ended.stdout);
+    let shown = folder.ends(0, "show out").stdout;
+    assert!(shown.contains("advance/⟨τ⟩") && shown.contains("by the error of the solver"));
+
+    let triggers = folder.file("out/reduced/triggers.parquet");
+    assert_eq!(triggers.cells.len(), 6 * 2 * 9);
+    let advances = triggers.reals("advance");
+    assert!(advances.len() > 60, "{}", advances.len());
+    assert!(
+        triggers
+            .reals("place")
+            .iter()
+            .all(|place| (0.0..1.0).contains(place))
+    );
+    assert!(
+        triggers
+            .reals("advance_drive")
+            .iter()
+            .all(|advance| *advance >= 0.0)
+    );
+    // All runs end before 9 s.
+    let excluded = triggers
+        .column("excluded")
+        .filter(|cell| **cell == Cell::Text("after the last slip".to_owned()));
+    assert_eq!(excluded.count(), 2 * 9);
+    let noise = triggers.reals("noise")[0];
+    let amplitudes = triggers.reals("Delta");
+    let rows = || amplitudes.iter().zip(triggers.column("advance"));
+    let advances = |least: f64| {
+        rows().filter_map(move |(amplitude, cell)| match cell {
+            Cell::Real(bits) if *amplitude >= least => Some(f64::from_bits(*bits).abs()),
+            _ => None,
+        })
+    };
+    assert!(
+        noise < 0.01 && advances(1e-6).fold(0.0, f64::max) > 2.0 * noise,
+        "{noise}"
+    );
+
+    // They have no phase, and no figure but their own.
+    let slips = folder.table("out", "slips");
+    assert!(slips.reals("phase").is_empty() && slips.reals("T_onset").is_empty());
+    for (figure, is_there) in [("triggering", true), ("phi-eta", false), ("tau-T", false)] {
+        assert_eq!(
+            folder.path(&format!("out/figures/{figure}.svg")).exists(),
+            is_there,
+            "{figure}"
+        );
+    }
+    folder.ends(0, "export out --out exported --format csv");
+    assert_eq!(
+        fs::read_to_string(folder.path("exported/triggers.csv"))
+            .unwrap()
+            .lines()
+            .count(),
+        1 + 6 * 2 * 9
+    );
+    // It is made again like the other reduced data.
+    fs::remove_file(folder.path("out/reduced/triggers.parquet")).unwrap();
+    assert_eq!(folder.ends(0, "show out").stdout, shown);
+}
+
+#[test]
+fn a_sweep_without_controls_or_pulses_says_so() {
+    let folder = Folder::new();
+    folder.write(
+        "alone.toml",
+        &SWEEP
+            .replace("control = true\n", "")
+            .replace("0.51, 0.52, 0.53, 0.54, ", ""),
+    );
+    folder.ends(0, "run alone.toml --out out");
+    let why = folder.file("out/reduced/triggers.parquet");
+    assert!(why.texts("excluded").iter().all(|why| *why == "no control"));
+    assert!(!folder.ends(0, "show out").stdout.contains("triggered"));
+    folder.write(
+        "plain.toml",
+        &SWEEP.replace("pulse_start = [0.5, 0.51, 0.52, 0.53, 0.54, 9]\n", ""),
+    );
+    folder.ends(0, "run plain.toml --out plain");
+    assert!(!folder.path("plain/reduced/triggers.parquet").exists());
+    let refused = folder.ends(2, "simulate --set Delta=1e-6 --set T=0.03 --set pulse_start=1 --set ramp_time=1 --set T_to=0.1");
+    assert!(refused.stderr.contains("pulse_start"), "{}", refused.stderr);
+}
