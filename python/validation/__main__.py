@@ -10,7 +10,7 @@ from pathlib import Path
 from stickslip import ResultsError
 from stickslip.tables import MissingResult
 
-from . import beyond, friction, intervals, phase
+from . import beyond, friction, intervals, phase, triggering
 from .document import figure, paragraph, table
 
 #: The paper's statements by the figures that show them.
@@ -32,6 +32,8 @@ QUESTIONS = (
     beyond.staircase,
     beyond.dependences,
     phase.stiff_drive,
+    triggering.pulses,
+    triggering.tides,
     beyond.choices,
     beyond.energies,
 )

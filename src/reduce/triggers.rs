@@ -52,19 +52,18 @@ columns! {
     pub struct TriggerRow {
         set_id: String = "", "hash of all that defines the job but the seed";
         parameters: Selected<OfPulse>;
-        eta: f64 = "", "2 pi Delta / (T V0) of the pulse";
-        tau_control: Option<f64> = "s", "mean interval of the controls of the set";
-        cycle: Option<f64> = "s", "interval between the onsets of the control before and after the pulse begins";
-        place: Option<f64> = "", "share of this interval that is over when the pulse begins";
-        advance: Option<f64> = "s", "how much earlier the next onset comes than that of the control";
+        tau_control: Option<f64> = "s", "mean interval of the control";
+        cycle: Option<f64> = "s", "interval of the control in which the pulse begins";
+        place: Option<f64> = "", "share of it that is over then";
+        advance: Option<f64> = "s", "how much earlier the next onset comes";
         advance_drive: Option<f64> = "s", "the same by the drive alone";
-        next_advance: Option<f64> = "s", "how much earlier the onset after the next comes";
-        triggered: Option<bool> = "", "whether the next onset lies within the pulse, and that of the control after its end";
+        next_advance: Option<f64> = "s", "how much earlier the one after it comes";
+        triggered: Option<bool> = "", "whether the next onset lies within the pulse, and without it after";
         triggered_drive: Option<bool> = "", "the same by the drive alone";
-        delayed: Option<bool> = "", "whether it is not triggered, and earlier by more than `noise`; null without `noise`";
-        noise: Option<f64> = "s", "largest advance, of either sign, by pulses of at most 1e-12 m in this directory";
+        delayed: Option<bool> = "", "whether it is not triggered, and `advance` above `noise`";
+        noise: Option<f64> = "s", "largest advance, of either sign, by pulses up to 1e-12 m here";
         excluded: Option<Excluded> = "",
-            "why nothing is known: there is `no control`, or the pulse begins `before the first slip` that is recorded, `within a slip`, or `after the last slip` with one after it";
+            "why these are null: `no control`, or the pulse begins `before the first slip`, `within a slip` or `after the last slip`";
     }
 }
 
@@ -144,7 +143,6 @@ pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<Trigger
         };
         TriggerRow {
             set_id: jobs.set_id.clone(),
-            eta: parameters.eta(),
             parameters: Selected::new(parameters),
             tau_control: explained.tau_control,
             ..row.unwrap_or_else(TriggerRow::excluded)

@@ -57,7 +57,7 @@ fields! {
             NOT_NEGATIVE and "at most 1e9 T and 1e9 T_to, above 0 only with T_to or Delta_to",
             "duration of the ramp to T_to and Delta_to, and of that back; 0 is off";
         PulseStart("pulse_start", "t_p", "Start of the pulse") pulse_start: Option<f64> = None, "s", NOT_NEGATIVE and "not with a ramp",
-            "time at which the modulation starts as a pulse that ends after its cycles; null: it lasts";
+            "start of the modulation as a pulse; null: it lasts";
         PulseCycles("pulse_cycles", "", "Periods of the pulse") pulse_cycles: u64 = 1, "", COUNT and "above 1 only with pulse_start",
             "periods of the pulse";
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
