@@ -2,7 +2,7 @@
 //! amplitude; and the share of triggered slips against the amplitude. Both beside the drive alone.
 
 use super::axis::{Axis, bounds, widened};
-use super::frame::{Ends, LEFT, Layout, Place};
+use super::frame::{Ends, LEFT, Layout};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
@@ -11,7 +11,7 @@ use super::style::{
     BAR_WIDTH, BLACK, Dot, INKS, Ink, Look, RADIUS, REFERENCE, Stroke, drive_alone,
 };
 use crate::model::Symbol;
-use crate::reduce::{Interval, Pulses, TriggerRow, ascending};
+use crate::reduce::{Mean, Pulses, TriggerRow, ascending};
 use crate::sets::{Digits, label};
 
 pub(super) const NAME: &str = "triggering";
@@ -27,12 +27,10 @@ const BINS: u32 = 10;
 
 type Quantity = fn(&TriggerRow) -> Option<[f64; 2]>;
 
-/// Means at some places, with their intervals, and those of the drive alone.
+/// Means at some places: as seen, with their intervals, and by the drive alone.
 struct Series {
     ink: Ink,
-    dots: Vec<Place>,
-    bars: Vec<(f64, Ends)>,
-    by_drive: Vec<Place>,
+    means: Vec<(f64, [Mean; 3])>,
 }
 
 impl Series {
@@ -40,37 +38,38 @@ impl Series {
     fn new<'a>(
         ink: Ink,
         quantity: Quantity,
-        places: impl Iterator<Item = (f64, Option<Pulses<'a>>)>,
+        places: impl Iterator<Item = (f64, Pulses<'a>)>,
     ) -> Self {
-        let mut series = Self {
+        let means = places.filter_map(|(x, pulses)| Some((x, pulses.means(quantity)?)));
+        Self {
             ink,
-            dots: Vec::new(),
-            bars: Vec::new(),
-            by_drive: Vec::new(),
-        };
-        for (x, pulses) in places {
-            let means = pulses.and_then(|pulses| pulses.means(quantity));
-            if let Some([(seen, interval), (by_drive, _), _]) = means {
-                series.dots.push((x, seen));
-                let ends = interval.map(|Interval { low, high }| (x, (low, high)));
-                series.bars.extend(ends);
-                series.by_drive.push((x, by_drive));
-            }
+            means: means.collect(),
         }
-        series
+    }
+
+    fn bars(&self) -> impl Iterator<Item = (f64, Ends)> + '_ {
+        let means = self.means.iter();
+        means
+            .filter_map(|&(x, [(_, interval), ..])| interval.map(|ends| (x, (ends.low, ends.high))))
     }
 
     fn values(&self) -> impl Iterator<Item = f64> + '_ {
-        let bars = self.bars.iter().flat_map(|(_, (low, high))| [*low, *high]);
-        let dots = self.dots.iter().chain(&self.by_drive);
-        dots.map(|(_, value)| *value).chain(bars)
+        let bars = self.bars().flat_map(|(_, (low, high))| [low, high]);
+        let means = self.means.iter();
+        let means = means.flat_map(|(_, [seen, by_drive, _])| [seen.0, by_drive.0]);
+        means.chain(bars)
     }
 
     fn layers<'a>(self) -> [Layer<'a>; 3] {
+        let places = |which: usize| {
+            let means = self.means.iter();
+            means.map(|(x, means)| (*x, means[which].0)).collect()
+        };
+        let bars = self.bars().collect();
         [
-            Layer::Curve(self.by_drive, drive_alone(self.ink)),
-            Layer::Bars(self.bars, Stroke::solid(self.ink, BAR_WIDTH)),
-            Layer::Dots(self.dots, Dot::solid(self.ink, RADIUS)),
+            Layer::Curve(places(1), drive_alone(self.ink)),
+            Layer::Bars(bars, Stroke::solid(self.ink, BAR_WIDTH)),
+            Layer::Dots(places(0), Dot::solid(self.ink, RADIUS)),
         ]
     }
 }
@@ -88,20 +87,18 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
         return None;
     }
     let of = |amplitude: f64, period: f64| {
-        let wanted = [(Symbol::Delta, amplitude), (Symbol::T, period)];
-        let is_wanted = |pulses: &&Pulses<'_>| {
-            let mut wanted = wanted.iter();
-            wanted.all(|&(symbol, number)| value(pulses, symbol) == Some(number))
-        };
-        all.iter().find(is_wanted)
+        all.iter().find(|pulses| {
+            let own = [Symbol::Delta, Symbol::T].map(|symbol| value(pulses, symbol));
+            own == [Some(amplitude), Some(period)]
+        })
     };
     let inks = || periods.iter().copied().zip(INKS);
     let responses = |amplitude: f64| {
         let series = inks().map(|(period, ink)| {
-            let bins = (0..BINS).map(|bin| {
+            let bins = (0..BINS).filter_map(|bin| {
                 let [low, high] = [bin, bin + 1].map(|edge| f64::from(edge) / f64::from(BINS));
-                let pulses = of(amplitude, period).map(|pulses| pulses.between(low, high));
-                (0.5 * (low + high), pulses)
+                let pulses = of(amplitude, period)?.between(low, high);
+                Some((0.5 * (low + high), pulses))
             });
             Series::new(ink, TriggerRow::advances, bins)
         });
@@ -123,7 +120,7 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let (x_label, factor) = axis_of(Symbol::Delta.key(), amplitudes.iter().copied());
     let shares = inks().map(|(period, ink)| {
         let places = amplitudes.iter();
-        let places = places.map(|&amplitude| (factor * amplitude, of(amplitude, period).cloned()));
+        let places = places.filter_map(|&each| Some((factor * each, of(each, period)?.clone())));
         Series::new(ink, TriggerRow::triggers, places)
     });
     let shares: Vec<Series> = shares.collect();

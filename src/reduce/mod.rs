@@ -39,7 +39,7 @@ pub use reduction::{
 };
 pub use sequence::quantile;
 pub use slips::{SlipOfSet, means_of_slips, sample_of_slips};
-pub use triggers::{Pulses, TriggerRow};
+pub use triggers::{Mean, Pulses, TriggerRow};
 pub use values::{
     Condition, Values, ascending, differing, has_even_steps, is_same, is_spread, swept,
 };

@@ -81,7 +81,7 @@ impl<const D: usize> Sequences<D> {
         self.jobs.iter().map(of_job).collect()
     }
 
-    /// Their components along a unit vector.
+    /// Their scalar products with a vector.
     pub(super) fn along(&self, direction: &[f64; D]) -> Sequences<1> {
         let component = |value: &[f64; D]| {
             let products = value.iter().zip(direction).map(|(x, part)| x * part);

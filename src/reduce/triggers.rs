@@ -107,16 +107,14 @@ impl Cycle {
         let next = *onsets.first().ok_or(Excluded::AfterLast)?;
         let [start, end] = self.pulse;
         let interval = self.free - self.last;
+        let following = self.following.zip(onsets.get(1));
         let is_triggered = |onset: f64| Some(onset <= end && self.free > end);
         Ok(TriggerRow {
             cycle: Some(interval),
             place: Some((start - self.last) / interval),
             advance: Some(self.free - next),
             advance_drive: Some(self.free - self.passage),
-            next_advance: self
-                .following
-                .zip(onsets.get(1))
-                .map(|(free, next)| free - next),
+            next_advance: following.map(|(free, next)| free - next),
             triggered: is_triggered(next),
             triggered_drive: is_triggered(self.passage),
             ..TriggerRow::default()
@@ -203,19 +201,15 @@ impl<'a> Pulses<'a> {
     /// All but those that move nothing, in the order of the rows.
     pub fn of(rows: &'a [TriggerRow]) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
-        for row in rows
-            .iter()
-            .filter(|row| row.advance.is_some() && !row.is_nothing())
-        {
+        let says = |row: &&TriggerRow| row.advance.is_some() && !row.is_nothing();
+        for row in rows.iter().filter(says) {
             let parameters = Parameters {
                 pulse_start: None,
                 seed: 0,
                 ..row.parameters.parameters.clone()
             };
-            match all
-                .iter_mut()
-                .find(|pulses| pulses.parameters == parameters)
-            {
+            let mut known = all.iter_mut();
+            match known.find(|pulses| pulses.parameters == parameters) {
                 Some(pulses) => pulses.rows.push(row),
                 None => all.push(Self {
                     parameters,
@@ -229,26 +223,20 @@ impl<'a> Pulses<'a> {
     /// Means of a quantity: as seen, by the drive alone, and of the difference; `None` without values. Pulses of a seed
     /// meet the same slip, so intervals need [`MIN_SEEDS`].
     pub fn means(&self, quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>) -> Option<[Mean; 3]> {
-        let mean = |of: fn([f64; 2]) -> f64| {
-            let mut seeds: BTreeMap<u64, Vec<[f64; 1]>> = BTreeMap::new();
-            for row in &self.rows {
-                if let Some(values) = quantity(row) {
-                    seeds
-                        .entry(row.parameters.seed)
-                        .or_default()
-                        .push([of(values)]);
-                }
+        let mut seeds: BTreeMap<u64, Vec<[f64; 2]>> = BTreeMap::new();
+        for row in &self.rows {
+            if let Some(values) = quantity(row) {
+                seeds.entry(row.parameters.seed).or_default().push(values);
             }
-            let has_interval = seeds.len() >= MIN_SEEDS;
-            let mean = Sequences::of(seeds.into_values()).estimate();
+        }
+        let has_interval = seeds.len() >= MIN_SEEDS;
+        let all = Sequences::of(seeds.into_values());
+        let mean = |direction: [f64; 2]| {
+            let mean = all.along(&direction).estimate();
             let interval = mean.interval().filter(|_| has_interval);
             Some((mean.value()?, interval))
         };
-        Some([
-            mean(|[seen, _]| seen)?,
-            mean(|[_, by_drive]| by_drive)?,
-            mean(|[seen, by_drive]| seen - by_drive)?,
-        ])
+        Some([mean([1.0, 0.0])?, mean([0.0, 1.0])?, mean([1.0, -1.0])?])
     }
 
     /// Those that begin between two shares of the interval of the control.
