@@ -222,10 +222,7 @@ impl Study {
         for (set, parameters) in self.sets.iter().enumerate() {
             report(&format!("{}: first breaks", set_in_words(parameters)));
             let first = self.first_seed;
-            let of_first = Parameters {
-                seed: first,
-                ..parameters.clone()
-            };
+            let of_first = parameters.with_seed(first);
             let mut first_breaks = Reference::new(&of_first, self.breaks);
             let tightest = taylor(TIGHTEST_TOLERANCE);
             simulated(&of_first, tightest, &mut first_breaks)?;
@@ -286,17 +283,11 @@ impl Study {
         seeds: Range<u64>,
     ) -> Result<Vec<Slip>> {
         let slips = |seed: u64| {
-            let parameters = Parameters {
-                seed,
-                ..parameters.clone()
-            };
-            Ok(measured(&parameters, solver, &self.recording())?.1.slips)
+            let (_, measured) = measured(&parameters.with_seed(seed), solver, &self.recording())?;
+            Ok(measured.slips)
         };
-        Ok(seeds
-            .into_par_iter()
-            .map(slips)
-            .collect::<Result<Vec<_>>>()?
-            .concat())
+        let slips: Result<Vec<_>> = seeds.into_par_iter().map(slips).collect();
+        Ok(slips?.concat())
     }
 
     fn break_times(
@@ -323,10 +314,7 @@ impl Study {
     fn ensembles(&self, parameters: &Parameters) -> Result<Vec<Ensemble>> {
         let mut ensembles = vec![Ensemble::default(); self.solvers.len()];
         for seed in self.first_seed..self.first_seed + self.seeds {
-            let parameters = Parameters {
-                seed,
-                ..parameters.clone()
-            };
+            let parameters = parameters.with_seed(seed);
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
                 let is_stretch = self.is_stretch_only(&parameters, solver);
                 let mut recording = self.recording();
@@ -366,10 +354,8 @@ fn measured(
 ) -> Result<(f64, Measurements)> {
     let (cpu_seconds, measured) =
         limits::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
-    Ok((
-        cpu_seconds,
-        measured.with_context(|| in_words(parameters, solver))?,
-    ))
+    let measured = measured.with_context(|| in_words(parameters, solver))?;
+    Ok((cpu_seconds, measured))
 }
 
 fn in_words(parameters: &Parameters, solver: Solver) -> String {

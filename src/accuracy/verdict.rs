@@ -151,11 +151,8 @@ fn tighter(findings: &Findings, rows: &[&MethodRow]) -> Option<String> {
     let row = rows.first()?;
     let error = row.break_times.median? * TIGHTER;
     let is_tighter = |other: &&MethodRow| {
-        other.parameters == row.parameters
-            && other
-                .break_times
-                .median
-                .is_some_and(|median| median < error)
+        let median = other.break_times.median;
+        other.parameters == row.parameters && median.is_some_and(|median| median < error)
     };
     let cheapest = findings
         .methods

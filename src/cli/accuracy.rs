@@ -127,10 +127,7 @@ fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, f64)>> {
         let slips = sweep
             .recording()
             .expected_slips(typical_interval(&job.parameters));
-        let set = Parameters {
-            seed: 0,
-            ..job.parameters
-        };
+        let set = job.parameters.with_seed(0);
         match sets.iter_mut().find(|(known, _)| *known == set) {
             Some((_, sum)) => *sum += slips,
             None => sets.push((set, slips)),

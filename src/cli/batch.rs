@@ -310,12 +310,10 @@ fn with_units(time: Duration) -> String {
         (seconds % HOUR / MINUTE, "m"),
         (seconds % MINUTE, "s"),
     ];
-    let mut text = String::new();
-    for (number, unit) in parts.into_iter().filter(|(number, _)| *number > 0) {
-        text += &number.to_string();
-        text += unit;
-    }
-    text
+    let parts = parts.into_iter().filter(|(number, _)| *number > 0);
+    parts
+        .map(|(number, unit)| format!("{number}{unit}"))
+        .collect()
 }
 
 #[cfg(test)]

@@ -66,14 +66,9 @@ pub fn pairs(pairs: &[(&str, String)]) -> Result<()> {
 }
 
 /// A table for people: columns of cells, each below its head. Without any head, there is no line for heads.
+/// Columns of words stand to the left, others to the right.
 #[derive(Default)]
-pub struct TextTable(Vec<TextColumn>);
-
-struct TextColumn {
-    /// Words stand to the left, numbers to the right.
-    is_worded: bool,
-    cells: Vec<String>,
-}
+pub struct TextTable(Vec<(bool, Vec<String>)>);
 
 impl TextTable {
     pub fn words<R>(&mut self, head: impl Into<String>, rows: &[R], cell: impl Fn(&R) -> String) {
@@ -86,26 +81,31 @@ impl TextTable {
 
     pub fn add(&mut self, is_worded: bool, head: String, cells: impl Iterator<Item = String>) {
         let cells = std::iter::once(head).chain(cells).collect();
-        self.0.push(TextColumn { is_worded, cells });
+        self.0.push((is_worded, cells));
     }
 }
 
 impl fmt::Display for TextTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = |cell: &String| cell.chars().count();
-        let width = |column: &TextColumn| column.cells.iter().map(width).max().unwrap_or(0);
-        let widths: Vec<usize> = self.0.iter().map(width).collect();
-        let lines = self.0.first().map_or(0, |column| column.cells.len());
-        let has_heads = self.0.iter().any(|column| !column.cells[0].is_empty());
+        let columns = self.0.iter().map(|(_, cells)| cells);
+        let widths = columns.clone().map(|cells| cells.iter().map(width).max());
+        let widths: Vec<usize> = widths.map(Option::unwrap_or_default).collect();
+        let lines = columns.clone().next().map_or(0, Vec::len);
+        let has_heads = columns.clone().any(|cells| !cells[0].is_empty());
         for line in usize::from(!has_heads)..lines {
-            let padded = self.0.iter().zip(&widths).map(|(column, &width)| {
-                let cell = &column.cells[line];
-                if column.is_worded {
-                    format!("{cell:width$}")
-                } else {
-                    format!("{cell:>width$}")
-                }
-            });
+            let padded = self
+                .0
+                .iter()
+                .zip(&widths)
+                .map(|((is_worded, cells), &width)| {
+                    let cell = &cells[line];
+                    if *is_worded {
+                        format!("{cell:width$}")
+                    } else {
+                        format!("{cell:>width$}")
+                    }
+                });
             writeln!(f, "{}", padded.collect::<Vec<_>>().join("  ").trim_end())?;
         }
         Ok(())

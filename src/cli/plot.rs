@@ -211,12 +211,10 @@ fn limits(text: &str) -> Result<Limits, &'static str> {
     const WANTED: &str = "must be LOW:HIGH with finite numbers, such as 1e-6:1e-3, 0: or :5";
     let end = |text: &str| match text.trim() {
         "" => Ok(None),
-        number => number
-            .parse()
-            .ok()
-            .filter(|end: &f64| end.is_finite())
-            .map(Some)
-            .ok_or(WANTED),
+        number => match number.parse() {
+            Ok(end) if f64::is_finite(end) => Ok(Some(end)),
+            _ => Err(WANTED),
+        },
     };
     match text.split_once(':') {
         Some((low, high)) if text.trim() != ":" => Ok((end(low)?, end(high)?)),

@@ -73,9 +73,15 @@ impl Progress {
                     let others = output::count(*others as u64, "worker");
                     place = format!("{place}, shared with {others}");
                 }
-                self.begin(&format!(
+                self.say(&format!(
                     "running {jobs}, {jobs_there} there already; predicted: {time} on {place}"
                 ));
+                self.begin = Instant::now();
+                self.bar = ProgressBar::new(u64::from(RESOLUTION));
+                let template = "{elapsed_precise} [{bar:30}] {msg}";
+                if let Ok(style) = ProgressStyle::with_template(template) {
+                    self.bar.set_style(style.progress_chars("=> "));
+                }
             }
             RunEvent::PartCommitted { .. } => self.has_results = true,
             RunEvent::RoundBegun { jobs, rounds, .. } => {
@@ -124,16 +130,6 @@ impl Progress {
                 }
             }
             _ => {}
-        }
-    }
-
-    /// Says what is to be done, and begins the bar.
-    fn begin(&mut self, line: &str) {
-        self.say(line);
-        self.begin = Instant::now();
-        self.bar = ProgressBar::new(u64::from(RESOLUTION));
-        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
-            self.bar.set_style(style.progress_chars("=> "));
         }
     }
 

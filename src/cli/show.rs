@@ -169,11 +169,7 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let rows = sets(results, MAX_READ)?;
     let columns = usual_columns(&usual_names(&rows), &rows);
     // A line that says how many more there are is as long as one of these.
-    let first = if count <= FIRST as u64 + 1 {
-        FIRST + 1
-    } else {
-        FIRST
-    };
+    let first = FIRST + usize::from(count == FIRST as u64 + 1);
     let mut text = table_of_edges(&read_optional(results.layout())?, &rows);
     text += &table_of_pulses(&read_optional(results.layout())?);
     text += &aligned(&columns, &rows, first);

@@ -52,7 +52,12 @@ impl Axis {
     }
 
     fn linear_with(label: &str, low: f64, high: f64, max_ticks: f64) -> Self {
-        let high = above(low, high);
+        // Also where the data are a single value.
+        let high = if high > low {
+            high
+        } else {
+            low + low.abs().max(1.0)
+        };
         let largest = low.abs().max(high.abs());
         let is_small = largest < WRITTEN_OUT.start
             && decimals(nice_step((high - low) / max_ticks)) > MAX_DECIMALS;
@@ -277,15 +282,6 @@ pub(super) fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
             let (low, high) = bounds.unwrap_or((value, value));
             Some((value.min(low), value.max(high)))
         })
-}
-
-/// The upper end of an axis, also where the data are a single value.
-fn above(low: f64, high: f64) -> f64 {
-    if high > low {
-        high
-    } else {
-        low + low.abs().max(1.0)
-    }
 }
 
 #[expect(

@@ -392,10 +392,9 @@ impl Chart<'_> {
         let is_still = |set: &usize| {
             shows_intervals && self.slides(*set) && self.sets[*set].tau_mean.is_none()
         };
-        let still: Vec<usize> = (0..count).filter(is_still).collect();
-        if !still.is_empty() {
-            let slide = still.len();
-            notes.push(format!("{slide} of {count} sets slide: no intervals"));
+        let still = (0..count).filter(is_still).count();
+        if still > 0 {
+            notes.push(format!("{still} of {count} sets slide: no intervals"));
         }
         let mut quantities = self.ys.iter().chain([&self.x]);
         let shows_phase = quantities.any(|shown| shows_phase(shown.name()));

@@ -179,9 +179,6 @@ impl Page {
             .iter()
             .map(|height| height + layout.row_gap + layout.heading)
             .sum();
-        let letter = u8::try_from(number)
-            .ok()
-            .and_then(|index| b'a'.checked_add(index));
         let start = |column: usize| MARGIN + column as f64 * (layout.width + layout.column_gap);
         // The same in all columns, so that they are labelled alike.
         let end = if columns > 1 {
@@ -200,7 +197,7 @@ impl Page {
             x,
             y,
             heading: layout.heading,
-            letter: letter.filter(|_| self.count > 1).map(char::from),
+            letter: ('a'..='z').nth(number).filter(|_| self.count > 1),
             is_lowest: number + columns >= self.count,
         }
     }

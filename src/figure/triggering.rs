@@ -25,8 +25,6 @@ const MAX_AMPLITUDES: usize = 5;
 /// Bins of the place in the cycle.
 const BINS: u32 = 10;
 
-type Quantity = fn(&TriggerRow) -> Option<[f64; 2]>;
-
 /// Means at some places: as seen, with their intervals, and by the drive alone.
 struct Series {
     ink: Ink,
@@ -34,19 +32,6 @@ struct Series {
 }
 
 impl Series {
-    /// The means of a quantity over the pulses at each place.
-    fn new<'a>(
-        ink: Ink,
-        quantity: Quantity,
-        places: impl Iterator<Item = (f64, Pulses<'a>)>,
-    ) -> Self {
-        let means = places.filter_map(|(x, pulses)| Some((x, pulses.means(quantity)?)));
-        Self {
-            ink,
-            means: means.collect(),
-        }
-    }
-
     fn bars(&self) -> impl Iterator<Item = (f64, Ends)> + '_ {
         let means = self.means.iter();
         means
@@ -98,9 +83,10 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
             let bins = (0..BINS).filter_map(|bin| {
                 let [low, high] = [bin, bin + 1].map(|edge| f64::from(edge) / f64::from(BINS));
                 let pulses = of(amplitude, period)?.between(low, high);
-                Some((0.5 * (low + high), pulses))
+                Some((0.5 * (low + high), pulses.means(TriggerRow::advances)?))
             });
-            Series::new(ink, TriggerRow::advances, bins)
+            let means = bins.collect();
+            Series { ink, means }
         });
         series.collect::<Vec<_>>()
     };
@@ -120,8 +106,12 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let (x_label, factor) = axis_of(Symbol::Delta.key(), amplitudes.iter().copied());
     let shares = inks().map(|(period, ink)| {
         let places = amplitudes.iter();
-        let places = places.filter_map(|&each| Some((factor * each, of(each, period)?.clone())));
-        Series::new(ink, TriggerRow::triggers, places)
+        let shares = places.filter_map(|&amplitude| {
+            let means = of(amplitude, period)?.means(TriggerRow::triggers)?;
+            Some((factor * amplitude, means))
+        });
+        let means = shares.collect();
+        Series { ink, means }
     });
     let shares: Vec<Series> = shares.collect();
     let most = shares.iter().flat_map(Series::values).fold(0.0, f64::max);

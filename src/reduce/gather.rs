@@ -117,10 +117,7 @@ impl<'a> Gathering<'a> {
             let (job, slip) = row?;
             if last.as_ref() != Some(&job) {
                 let is_wanted = |&index: &usize| {
-                    (self.is_wanted)(&Parameters {
-                        seed: job.seed,
-                        ..sets[index].jobs.parameters.clone()
-                    })
+                    (self.is_wanted)(&sets[index].jobs.parameters.with_seed(job.seed))
                 };
                 found = index.get(&job.set_id).copied().filter(is_wanted);
                 last = Some(job);

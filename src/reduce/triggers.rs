@@ -135,10 +135,7 @@ pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<Trigger
         let row = cycle
             .unwrap_or(Err(Excluded::NoControl))
             .and_then(|cycle| cycle.row(&after));
-        let parameters = Parameters {
-            seed,
-            ..jobs.parameters.clone()
-        };
+        let parameters = jobs.parameters.with_seed(seed);
         TriggerRow {
             set_id: jobs.set_id.clone(),
             parameters: Selected::new(parameters),

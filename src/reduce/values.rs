@@ -47,22 +47,15 @@ impl Values {
         let mut intervals = Vec::new();
         let mut given = Vec::new();
         for row in rows {
-            let mut at = 0;
-            let mut interval = (None, None);
+            let mut cells = Vec::with_capacity(columns.len());
             row.cells(&mut |cell| {
-                if at == column {
-                    numbers.push(cell.number().filter(|number| number.is_finite()));
+                if cells.len() == column {
                     given.push(word(cell));
                 }
-                if ends.is_some_and(|(low, _)| at == low) {
-                    interval.0 = cell.number();
-                }
-                if ends.is_some_and(|(_, high)| at == high) {
-                    interval.1 = cell.number();
-                }
-                at += 1;
+                cells.push(cell.number());
             });
-            intervals.push(interval.0.zip(interval.1));
+            numbers.push(cells[column].filter(|number| number.is_finite()));
+            intervals.push(ends.and_then(|(low, high)| cells[low].zip(cells[high])));
         }
         let words: BTreeSet<String> = given.iter().flatten().cloned().collect();
         let words: Vec<String> = words.into_iter().collect();

@@ -19,6 +19,7 @@ use crate::reduce::{WRITER, advise, renew};
 use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
+use crate::results::log::now;
 use crate::run::{RunEvent, status};
 use crate::sets::FOUND;
 use crate::sweep::{PLAN_VERSION, Rounds, SYNONYMS, Sweep};
@@ -34,7 +35,7 @@ use serde_json::{Value as Json, json};
 use sha2::{Digest, Sha256};
 use std::io::{self, Write};
 use std::path::PathBuf;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 /// What to do about a table that cannot be read.
 const ADVICE: &str = "`stickslip verify` says what to do about damage";
@@ -79,9 +80,7 @@ fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<Json> {
     let sets = Sets::read(layout, sweep, sets_every).map_err(&damaged)?;
     let slips =
         Slips::read(results, &sets.places, census.slips.div_ceil(sets_every)).map_err(&damaged)?;
-    let written = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .map_or(0.0, |time| time.as_secs_f64());
+    let written = now();
     let parameters = Symbol::ALL
         .into_iter()
         .filter(|&symbol| symbol != Symbol::Seed)

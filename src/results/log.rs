@@ -125,7 +125,8 @@ struct Line {
     event: RunEvent,
 }
 
-fn now() -> f64 {
+/// Seconds since 1970 UTC.
+pub fn now() -> f64 {
     SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .map_or(0.0, |time| time.as_secs_f64())

@@ -73,17 +73,8 @@ fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option<u64> {
         return None;
     }
     let now = seeds as f64;
-    // NaN is no prediction, and gets the most.
     let predicted = (now * error * error).ceil().max(least as f64);
-    let few = (1.25 * now).ceil();
-    let many = 2.0 * now;
-    let next = if predicted <= few {
-        few
-    } else if predicted <= many {
-        predicted
-    } else {
-        many
-    };
+    let next = predicted.clamp((1.25 * now).ceil(), 2.0 * now);
     let next = floored(next) as u64;
     Some(next.max(seeds + 1).min(most))
 }

@@ -12,6 +12,7 @@
 use super::quantity::{Point, Quantity};
 use crate::model::theory::to_twelve_digits;
 use crate::model::{Parameters, Symbol, Value};
+use crate::table::value::Field as _;
 use std::cmp::Ordering;
 
 /// Most rows of an axis whose rows are held in memory.
@@ -146,10 +147,7 @@ impl Axis {
         let begin = table.sorted.partition_point(|row| order(row).is_lt());
         let found = table.sorted[begin..].iter();
         let found = found.take_while(|row| order(row).is_eq());
-        let seed = |row: &u32| match seeds.values[*row as usize] {
-            Value::Count(seed) => Some(seed),
-            _ => None,
-        };
+        let seed = |row: &u32| u64::from_value(seeds.values[*row as usize]);
         Some(found.filter_map(seed).take(most).collect())
     }
 

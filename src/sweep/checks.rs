@@ -394,11 +394,9 @@ impl Sweep {
             (None, Quantity::Parameter(symbol)) => vec![self.base.get(symbol)],
             (None, _) => Vec::new(),
         };
-        let real = |value| match value {
-            Value::Real(real) => Some(real),
-            _ => None,
-        };
-        let mut reals: Vec<f64> = values.into_iter().filter_map(real).collect();
+        let reals = values.into_iter();
+        let reals = reals.filter(|value| matches!(value, Value::Real(_)));
+        let mut reals: Vec<f64> = reals.filter_map(Value::number).collect();
         reals.sort_unstable_by(f64::total_cmp);
         reals.dedup();
         reals

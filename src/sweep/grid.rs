@@ -143,11 +143,7 @@ impl Sweep {
         let mut axes = self.axes.iter();
         let seeds = axes.find_map(|axis| axis.seeds(parameters, tried));
         let seeds = seeds.unwrap_or_else(|| vec![self.base.seed]);
-        let with_seed = |seed| Parameters {
-            seed,
-            ..parameters.clone()
-        };
-        let mut jobs = seeds.into_iter().map(with_seed);
+        let mut jobs = seeds.into_iter().map(|seed| parameters.with_seed(seed));
         jobs.find_map(|job| self.find_in_grid(&job))
     }
 

@@ -218,6 +218,14 @@ impl Parameters {
         )
     }
 
+    /// The same in another realisation.
+    pub fn with_seed(&self, seed: u64) -> Self {
+        Self {
+            seed,
+            ..self.clone()
+        }
+    }
+
     /// These parameters without modulation, in canonical form: see [`Symbol::is_of_modulation`].
     pub fn without_modulation(&self) -> Self {
         Self {
