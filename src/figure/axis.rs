@@ -268,10 +268,8 @@ pub(super) fn widened((low, high): (f64, f64)) -> (f64, f64) {
 pub(super) fn angle_bounds(angles: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = bounds(angles).unwrap_or((-PI, PI));
     let low = (low / FRAC_PI_2).floor() * FRAC_PI_2;
-    (
-        low,
-        ((high / FRAC_PI_2).ceil() * FRAC_PI_2).max(low + FRAC_PI_2),
-    )
+    let high = (high / FRAC_PI_2).ceil() * FRAC_PI_2;
+    (low, high.max(low + FRAC_PI_2))
 }
 
 /// Least and largest of the values that can be.
@@ -338,10 +336,8 @@ fn number(value: f64, decimals: usize) -> String {
 
 fn plain_power(mantissa: f64, power: i32) -> String {
     let more = i32::from(mantissa.fract() != 0.0);
-    number(
-        mantissa * libm::exp10(f64::from(power)),
-        usize::try_from(more - power).unwrap_or(0),
-    )
+    let decimals = usize::try_from(more - power).unwrap_or(0);
+    number(mantissa * libm::exp10(f64::from(power)), decimals)
 }
 
 fn halves_of_pi(angle: f64) -> String {

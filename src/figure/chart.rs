@@ -334,10 +334,8 @@ impl Chart<'_> {
             entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
         }
         if inside.iter().any(|&set| self.slides(set)) {
-            entries.push(entry(
-                Mark::Ring(BLACK, WHITE, RADIUS, RADIUS - HOLE),
-                "sliding",
-            ));
+            let mark = Mark::Ring(BLACK, WHITE, RADIUS, RADIUS - HOLE);
+            entries.push(entry(mark, "sliding"));
         }
         if self.ys.iter().any(|y| y.name() == "slip_share") {
             let [mixed, sliding] = Regime::MIN_SHARES;
@@ -361,17 +359,12 @@ impl Chart<'_> {
 
     /// Swept parameters that nothing shows.
     fn pooled(&self) -> Option<String> {
-        let asked = [Some(&self.x), self.colour.as_ref()]
-            .into_iter()
-            .flatten()
-            .chain(&self.ys)
-            .map(|quantity| &quantity.column);
+        let asked = self.ys.iter().chain([&self.x]).chain(&self.colour);
+        let asked = asked.map(|quantity| &quantity.column);
         let sources = asked.chain(&self.panels).flat_map(|values| &values.sources);
         let shown: Vec<Option<Symbol>> = sources.map(|source| parameter(source)).collect();
-        let pooled = self
-            .swept
-            .iter()
-            .filter(|swept| !shown.contains(&parameter(swept.name())));
+        let is_pooled = |swept: &&Values| !shown.contains(&parameter(swept.name()));
+        let pooled = self.swept.iter().filter(is_pooled);
         let symbols: Vec<String> = pooled.map(|swept| swept.label().symbol).collect();
         (!symbols.is_empty())
             .then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))

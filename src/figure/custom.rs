@@ -95,12 +95,7 @@ pub(super) fn custom<'a>(
     shown.extend(panels.iter().flat_map(Quantity::parameters));
     let is_free =
         |swept: &&Values| parameter(swept.name()).is_some_and(|symbol| !shown.contains(&symbol));
-    let next = || {
-        swept
-            .iter()
-            .find(is_free)
-            .map(|next| next.name().to_owned())
-    };
+    let next = || Some(swept.iter().find(is_free)?.name().to_owned());
     // Formulas have letters that no file name should have.
     let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';
     let name = format!("{}-{}", y.name(), x.name()).replace(|letter| !is_plain(letter), "-");

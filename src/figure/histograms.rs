@@ -128,11 +128,8 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
         |set: &&SetRow| !is_identical(set) || !others.iter().any(|other| is_twin(set, other));
     // Sets come in the order of Δ and then T.
     let mut shown: Vec<&SetRow> = sets.iter().filter(is_shown).collect();
-    shown.sort_by(|left, right| {
-        left.parameters
-            .modulation_frequency()
-            .total_cmp(&right.parameters.modulation_frequency())
-    });
+    let frequency = |set: &SetRow| set.parameters.modulation_frequency();
+    shown.sort_by(|left, right| frequency(left).total_cmp(&frequency(right)));
     let mut others = differing(&shown.iter().copied());
     others.retain(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T));
     let names = [Symbol::Delta.key(), FREQUENCY].into_iter();

@@ -90,7 +90,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     let mut sets = sets_with_results(layout).map_err(advise(ADVICE))?;
     // Slips after a pulse have a figure of their own.
     sets.retain(|set| set.parameters.pulse_start.is_none());
-    let look = &look.with_note(&common_of(&sets));
+    let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
     pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, look));
     pictures.extend(intervals::intervals(&points, look));
@@ -152,7 +152,8 @@ fn draw_sets(
             Ok(Quantity::of_values(option, mean))
         })
     };
-    let look = look.with_note(&(common_of(&sets) + &figure.shown_condition()));
+    let common = common(sets.iter().map(|set| &*set.parameters));
+    let look = look.with_note(&(common + &figure.shown_condition()));
     custom::custom(&quantity, &sets, &swept(&sets), figure, &look)
 }
 
@@ -258,10 +259,6 @@ fn setting(parameters: &Parameters, symbol: Symbol) -> String {
         Value::Real(real) => label(symbol.key()).setting(real, Digits::THREE),
         value => format!("{} = {value}", symbol_of(symbol)),
     }
-}
-
-fn common_of(sets: &[SetRow]) -> String {
-    common(sets.iter().map(|set| &*set.parameters))
 }
 
 /// What some parameters have in common, in symbols.

@@ -55,11 +55,9 @@ pub(super) fn phase_eta(points: &[Point], bins: &[BackboneBin], look: &Look) -> 
     let (least, most) = bounds(cells.iter().map(|cell| cell.1))?;
     let shades = Axis::logarithmic("density (1/rad)", least, most.max(10.0 * least));
     let averages = averages(bins, &columns);
-    let x = Axis::logarithmic(
-        &label("eta").axis(""),
-        columns.first()?.edges.0,
-        columns.last()?.edges.1,
-    );
+    let low = columns.first()?.edges.0;
+    let high = columns.last()?.edges.1;
+    let x = Axis::logarithmic(&label("eta").axis(""), low, high);
     let has_curves = x.high > 1.0;
     let entries = [
         (

@@ -7,7 +7,7 @@ use super::hues::Hues;
 use super::style::INKS;
 use crate::model::Symbol;
 use crate::reduce::{FREQUENCY, Values, ascending, has_even_steps, is_spread, quantile};
-use crate::sets::{Label, label};
+use crate::sets::label;
 use crate::table::columns::Row;
 
 const MAX_WORDS: usize = 12;
@@ -118,13 +118,9 @@ impl Quantity<'_> {
         swept.find(|symbol| own.contains(symbol))
     }
 
-    pub(super) fn typeset(&self) -> Label {
-        self.column.label()
-    }
-
     pub(super) fn axis_label(&self) -> String {
         self.label
-            .map_or_else(|| self.typeset().axis(self.unit), str::to_owned)
+            .map_or_else(|| self.column.label().axis(self.unit), str::to_owned)
     }
 
     /// Each value once, ascending.
@@ -170,7 +166,7 @@ impl Quantity<'_> {
         let label = self.axis_label();
         let short_label = self
             .label
-            .map_or_else(|| self.typeset().short(self.unit), str::to_owned);
+            .map_or_else(|| self.column.label().short(self.unit), str::to_owned);
         if self.column.is_worded() {
             let mut axis = self.axis_of_words(&label)?;
             axis.short_label = short_label;
@@ -264,7 +260,7 @@ impl Quantity<'_> {
         let known = values.numbers.iter().flatten();
         let known = known.map(|value| self.factor * value);
         let word = |value: f64| values.setting(value / self.factor);
-        Ok(Hues::of(&self.typeset().short(self.unit), known, word))
+        Ok(Hues::of(&self.column.label().short(self.unit), known, word))
     }
 }
 
