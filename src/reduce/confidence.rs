@@ -165,8 +165,8 @@ impl Centred<2> {
 /// The mean of independent values, and its interval.
 #[cfg(test)]
 pub(crate) fn mean_of(values: &[f64]) -> (Option<f64>, Option<Interval>) {
-    let values = values.iter().map(|&value| [value]).collect();
-    let mean = super::sequence::Sequences::independent(values).estimate();
+    let values = values.iter().map(|&value| [[value]]);
+    let mean = super::sequence::Sequences::of(values).estimate();
     (mean.value(), mean.interval())
 }
 

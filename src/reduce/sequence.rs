@@ -32,11 +32,6 @@ impl<const D: usize> Sequences<D> {
         }
     }
 
-    /// Jobs of one value each: independent values.
-    pub(super) fn independent(values: Vec<[f64; D]>) -> Self {
-        Self::of(values.into_iter().map(|value| [value]))
-    }
-
     pub(super) fn estimate(self) -> Estimate<D> {
         self.centred().mean
     }
@@ -267,8 +262,7 @@ impl Sum {
     /// The difference of the lengths of two such means, less itself: the mean of what pairs of these add to it.
     pub(super) fn difference(sums: &[Self], less: &[Self]) -> Estimate<1> {
         let added = Self::added(sums).into_iter().zip(Self::added(less));
-        let added = added.map(|(of_one, less)| [of_one - less]);
-        Sequences::independent(added.collect()).estimate()
+        Sequences::of(added.map(|(of_one, less)| [[of_one - less]])).estimate()
     }
 
     /// What each of these adds to the length of their mean, times their number.
@@ -365,7 +359,7 @@ mod tests {
         let mut draws = Draws::new(3);
         let levels: Vec<f64> = (0..50).map(|_| draws.normal()).collect();
         let still = Sequences::of(levels.iter().map(|&level| [[level]; 10])).estimate();
-        let once = Sequences::independent(levels.iter().map(|&level| [level]).collect()).estimate();
+        let once = Sequences::of(levels.iter().map(|&level| [[level]])).estimate();
         assert!((still.variance(&[1.0]) / once.variance(&[1.0]) - 1.0).abs() < 1e-12);
         assert_eq!((still.freedom(), once.freedom()), (Some(49.0), Some(49.0)));
         let of = |jobs: &[usize]| {

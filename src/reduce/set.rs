@@ -113,16 +113,16 @@ impl SetSlips {
 }
 
 fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) {
-    let drops = estimate(jobs, |slip| Some([slip.drop]));
+    let drops = sequences(jobs, |slip| Some([slip.drop])).estimate();
     // A longer interval ends at a force that is higher by the additional drop.
     let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_mean(&drops));
     row.drop_mean = drops.value();
     row.drop_interval = drops.interval_with(unseen);
-    let peak_forces = estimate(jobs, |slip| Some([slip.peak_force]));
+    let peak_forces = sequences(jobs, |slip| Some([slip.peak_force])).estimate();
     row.peak_force_mean = peak_forces.value();
     row.peak_force_interval = peak_forces.interval_with(unseen);
     let square = drops.square_of_deviation();
-    let squares = estimate(jobs, |slip| Some([square(slip.drop)]));
+    let squares = sequences(jobs, |slip| Some([square(slip.drop)])).estimate();
     let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&drops));
     (row.drop_deviation, row.drop_deviation_interval) = squares.deviation(unseen);
 }
@@ -200,14 +200,6 @@ fn sequences<const D: usize>(
     Sequences::of(jobs.iter().map(|job| job.iter().filter_map(&quantity)))
 }
 
-/// Its mean.
-fn estimate<const D: usize>(
-    jobs: &[&[SlipStats]],
-    quantity: impl Fn(&SlipStats) -> Option<[f64; D]>,
-) -> Estimate<D> {
-    sequences(jobs, quantity).estimate()
-}
-
 /// Intervals between slips, in some unit.
 struct Intervals<'a> {
     jobs: &'a [&'a [SlipStats]],
@@ -239,7 +231,7 @@ impl<'a> Intervals<'a> {
         if !self.running.is_empty() {
             return Estimate::default();
         }
-        estimate(self.jobs, |slip| non_nan((self.length)(slip)).map(&value))
+        sequences(self.jobs, |slip| non_nan((self.length)(slip)).map(&value)).estimate()
     }
 
     /// A quantile of all intervals; `None` if that interval still ran.
@@ -320,16 +312,6 @@ columns! {
     }
 }
 
-impl JobFacts {
-    fn averages(&self) -> Option<JobAverages> {
-        Some(JobAverages {
-            time: self.averaged_time?,
-            friction: self.mean_friction?,
-            slip_share: self.slip_share?,
-        })
-    }
-}
-
 /// What the jobs table says about a set.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SetJobs {
@@ -374,8 +356,15 @@ impl SetJobs {
         self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
         self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
         self.cut += u64::from(job.outcome == JobOutcome::TimeLimit);
-        self.averages
-            .extend(job.averages().map(|of_job| (seed, of_job)));
+        let averages = || {
+            let averages = JobAverages {
+                time: job.averaged_time?,
+                friction: job.mean_friction?,
+                slip_share: job.slip_share?,
+            };
+            Some((seed, averages))
+        };
+        self.averages.extend(averages());
         // Earlier versions also wrote one for jobs that `max_time` ended.
         if job.outcome == JobOutcome::NoSlips {
             let running = job.running_interval.map(|interval| (seed, interval));
@@ -422,8 +411,8 @@ impl SetJobs {
         let average = sum(&|job| job.time * of(job)) / time;
         let weight = self.averages.len() as f64 / time;
         let jobs = self.averages.values();
-        let pseudo = jobs.map(|job| [average + (of(job) - average) * job.time * weight]);
-        Sequences::independent(pseudo.collect()).estimate()
+        let pseudo = jobs.map(|job| [[average + (of(job) - average) * job.time * weight]]);
+        Sequences::of(pseudo).estimate()
     }
 }
 
