@@ -48,12 +48,10 @@ pub(super) fn unit_of_formula(formula: &Expression<usize>, columns: &[Column]) -
 /// The power of a base unit in a unit such as `N/m`; NaN for an unknown one.
 fn power(unit: &str, base: usize) -> f64 {
     let power = |part: &str| {
-        UNITS
-            .iter()
-            .find(|known| known.0 == part)
-            .map(|known| known.1[base])
+        let known = UNITS.iter().find(|known| known.0 == part);
+        known.map_or(f64::NAN, |known| known.1[base])
     };
-    let mut powers = unit.split('/').map(|part| power(part).unwrap_or(f64::NAN));
+    let mut powers = unit.split('/').map(power);
     let above = powers.next().unwrap_or(0.0);
     above - powers.sum::<f64>()
 }

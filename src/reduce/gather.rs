@@ -164,13 +164,10 @@ pub(super) fn sets_of(
 
 /// The order of sets in every table.
 fn by_parameters(left: &Parameters, right: &Parameters) -> Ordering {
-    let order = |&symbol: &Symbol| {
-        let values = (left.get(symbol), right.get(symbol));
-        match values {
-            (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
-            (Value::Count(left), Value::Count(right)) => left.cmp(&right),
-            (left, right) => left.to_string().cmp(&right.to_string()),
-        }
+    let order = |&symbol: &Symbol| match (left.get(symbol), right.get(symbol)) {
+        (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
+        (Value::Count(left), Value::Count(right)) => left.cmp(&right),
+        (left, right) => left.to_string().cmp(&right.to_string()),
     };
     let mut orders = AllButSeed::SYMBOLS.iter().map(order);
     let order = orders.find(|order| order.is_ne());

@@ -16,7 +16,7 @@ const MAX_SLIPS: usize = 20_000;
 
 columns! {
     /// What comes after a slip.
-    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Following {
         next_interval: Option<f64> = "s", "time to the next onset; null for the last of a job";
     }
@@ -50,11 +50,8 @@ fn each_slip(
             give(place, before);
         }
         let parameters = sets[place].parameters.clone();
-        let following = Following {
-            next_interval: None,
-        };
-        let loading = Loading::of(&parameters);
-        last = Some((place, ((job, parameters), (loading, slip, following))));
+        let measured = (Loading::of(&parameters), slip, Following::default());
+        last = Some((place, ((job, parameters), measured)));
     }
     if let Some((place, slip)) = last {
         give(place, slip);

@@ -132,9 +132,8 @@ pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<Trigger
         let onsets = slips.of_job(seed).iter().map(|slip| slip.onset);
         let after: Vec<f64> = onsets.filter(|onset| *onset > start).collect();
         let cycle = explained.cycles.get(&seed).copied();
-        let row = cycle
-            .unwrap_or(Err(Excluded::NoControl))
-            .and_then(|cycle| cycle.row(&after));
+        let cycle = cycle.unwrap_or(Err(Excluded::NoControl));
+        let row = cycle.and_then(|cycle| cycle.row(&after));
         let parameters = jobs.parameters.with_seed(seed);
         TriggerRow {
             set_id: jobs.set_id.clone(),
