@@ -143,8 +143,9 @@ impl Bias {
         let others = sample.others.min(reference.others);
         // Without two realisations of each there is no error.
         let freedom = (others >= 1.0).then_some(others);
-        let about = |bias: f64, errors: [f64; 2]| {
-            let half = student_at(CONFIDENCE, freedom?) * libm::hypot(errors[0], errors[1]);
+        let about = |bias: f64, error: fn(&Sample) -> f64| {
+            let error = libm::hypot(error(sample), error(reference));
+            let half = student_at(CONFIDENCE, freedom?) * error;
             Some(Interval {
                 low: bias - half,
                 high: bias + half,
@@ -152,13 +153,10 @@ impl Bias {
         };
         Self {
             of_mean,
-            interval_of_mean: about(of_mean, [sample.error_of_mean, reference.error_of_mean]),
+            interval_of_mean: about(of_mean, |sample| sample.error_of_mean),
             freedom,
             of_deviation,
-            interval_of_deviation: about(
-                of_deviation,
-                [sample.error_of_deviation, reference.error_of_deviation],
-            ),
+            interval_of_deviation: about(of_deviation, |sample| sample.error_of_deviation),
         }
     }
 

@@ -17,32 +17,27 @@ pub fn shows_bias(row: &BiasRow, comparisons: usize) -> bool {
 }
 
 fn can_tell(row: &BiasRow) -> bool {
-    row.bias.freedom.is_some() && row.slips.min(row.reference_slips) >= MIN_SLIPS
+    row.bias.freedom.is_some() && fewest_slips(row) >= MIN_SLIPS
+}
+
+fn fewest_slips(row: &BiasRow) -> u64 {
+    row.slips.min(row.reference_slips)
 }
 
 /// The lines, the answer first.
 pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
     let own = SolverColumns::from(study.own);
-    let compared: Vec<&BiasRow> = findings
-        .biases
-        .iter()
-        .filter(|row| row.solver == own)
-        .collect();
-    let rows: Vec<&MethodRow> = findings
-        .methods
-        .iter()
-        .filter(|row| row.solver == own)
-        .collect();
+    let compared = findings.biases.iter().filter(|row| row.solver == own);
+    let compared: Vec<&BiasRow> = compared.collect();
+    let rows = findings.methods.iter().filter(|row| row.solver == own);
+    let rows: Vec<&MethodRow> = rows.collect();
     let subject = if study.slips_of_sets.is_empty() {
         "The solver"
     } else {
         "Your sweep"
     };
-    let Some(slips) = compared
-        .iter()
-        .map(|row| row.slips.min(row.reference_slips))
-        .min()
-    else {
+    let slips = compared.iter().map(|row| fewest_slips(row));
+    let Some(slips) = slips.min() else {
         return vec![format!(
             "{subject} ({own}): not compared, as its slips would take too long"
         )];
@@ -54,15 +49,10 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         .iter()
         .filter(|row| shows_bias(row, comparisons))
         .max_by(|a, b| excess(a).total_cmp(&excess(b)));
-    let intervals: Vec<&BiasRow> = compared
-        .iter()
-        .copied()
-        .filter(|row| row.quantity == "interval")
-        .collect();
-    let shown = intervals
-        .iter()
-        .map(|row| percent(row, by_chance(row)))
-        .fold(0.0, f64::max);
+    let mut intervals = compared.clone();
+    intervals.retain(|row| row.quantity == "interval");
+    let shown = intervals.iter().map(|row| percent(row, by_chance(row)));
+    let shown = shown.fold(0.0, f64::max);
     let finding = match most {
         _ if !compared.iter().all(|row| can_tell(row)) => {
             format!("too few slips: {slips} per solver; take more --seeds or --slips")

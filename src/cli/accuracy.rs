@@ -164,11 +164,8 @@ fn study_text(study: &Study, findings: &Findings) -> String {
 
 /// A line for each solver at a set; -> before that of the sweep.
 fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
-    let rows: Vec<&MethodRow> = findings
-        .methods
-        .iter()
-        .filter(|row| *row.parameters == *set)
-        .collect();
+    let rows = findings.methods.iter();
+    let rows: Vec<&MethodRow> = rows.filter(|row| *row.parameters == *set).collect();
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     let mut columns = TextTable::default();
     columns.words("   solver", &rows, |row| {
@@ -183,11 +180,8 @@ fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
         let times = row.break_times.median.zip(row.break_times.largest);
         or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
     });
-    let intervals = findings
-        .biases
-        .iter()
-        .filter(|row| row.quantity == "interval");
-    let comparisons = intervals.count();
+    let biases = findings.biases.iter();
+    let comparisons = biases.filter(|row| row.quantity == "interval").count();
     columns.numbers("interval (%)", &rows, |row| {
         or_none(findings.bias_of(row, "interval").and_then(|row| {
             let scale = 100.0 / row.reference_mean.abs();
