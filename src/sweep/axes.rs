@@ -65,20 +65,17 @@ impl Axis {
         let mut ranked: Vec<_> = (0..).take(columns[0].values.len()).map(ranks).collect();
         ranked.sort_unstable_by(|left, right| left.partial_cmp(right).unwrap_or(Ordering::Equal));
         let mut is_first = vec![false; ranked.len()];
-        let mut repeated: Vec<(u32, u32)> = Vec::new();
+        let mut repeated: Vec<(usize, usize)> = Vec::new();
         for group in ranked.chunk_by(|(left, ..), (right, ..)| left == right) {
             let rows = group.iter().map(|&(.., row)| row);
             is_first[rows.clone().min().unwrap_or_default() as usize] = true;
             let value = |row: u32| period.map(|period| period.values[row as usize]);
             let neighbours = rows.clone().zip(rows.skip(1));
             let same = neighbours.filter(|&(a, b)| value(a) == value(b));
-            repeated.extend(same.map(|(a, b)| (a.max(b), a.min(b))));
+            repeated.extend(same.map(|(a, b)| (a.max(b) as usize, a.min(b) as usize)));
         }
         if let Some((later, earlier)) = repeated.into_iter().min() {
-            return Err(Repeated {
-                earlier: earlier as usize,
-                later: later as usize,
-            });
+            return Err(Repeated { earlier, later });
         }
         Ok(Self::Table(Table {
             columns,

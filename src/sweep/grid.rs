@@ -67,8 +67,7 @@ impl Sweep {
 
     /// Whether the modulation may be a pulse.
     pub fn has_pulses(&self) -> bool {
-        let key = Symbol::PulseStart.key();
-        self.base.pulse_start.is_some() || self.swept().any(|swept| swept == key)
+        self.base.pulse_start.is_some() || self.moves(Symbol::PulseStart)
     }
 
     /// Keys of all axes.

@@ -168,10 +168,8 @@ impl<'a> Source<'a> {
                 written.push_str(lines.nth(self.line(at) - 1).unwrap_or_default());
             }
             let problem = error.message();
-            self.refuse(
-                at,
-                format!("{written}: {problem}; the file must be TOML 1.0"),
-            )
+            let problem = format!("{written}: {problem}; the file must be TOML 1.0");
+            self.refuse(at, problem)
         })
     }
 
