@@ -103,9 +103,11 @@ impl<'a> Layout<'a> {
     }
 
     pub(super) fn parts_in(&self, folder: &Path) -> Result<BTreeSet<PartName>, StorageError> {
-        let names = self.names_in(folder)?.into_iter();
-        Ok(names
-            .filter_map(|name| PartName::of_path(name.as_ref()))
+        let part = |name: OsString| PartName::of_path(name.as_ref());
+        Ok(self
+            .names_in(folder)?
+            .into_iter()
+            .filter_map(part)
             .collect())
     }
 

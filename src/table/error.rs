@@ -85,19 +85,14 @@ impl ResultsError {
 
 impl fmt::Display for ResultsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            kind,
-            path,
-            problem,
-        } = self;
-        let path = shown(path);
-        match kind {
+        let path = shown(&self.path);
+        match self.kind {
             ErrorKind::Damaged => write!(
                 f,
                 "{path}: damaged: {}; `stickslip verify` on the results directory reports how to repair it",
-                shown_text(problem)
+                shown_text(&self.problem)
             ),
-            _ => write!(f, "{path}: {problem}"),
+            _ => write!(f, "{path}: {}", self.problem),
         }
     }
 }

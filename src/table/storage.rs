@@ -268,14 +268,10 @@ impl Storage for Disk {
     }
 
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
-        let copied = || -> io::Result<()> {
-            let bytes = fs::read(from)?;
-            File::create_new(to)?.write_all(&bytes)
-        };
         let is_there = |error: &io::Error| error.kind() == io::ErrorKind::AlreadyExists;
         let mut made = fs::hard_link(from, to);
         if made.as_ref().is_err_and(|error| !is_there(error)) {
-            made = copied();
+            made = fs::read(from).and_then(|bytes| File::create_new(to)?.write_all(&bytes));
         }
         match made {
             Err(error) if is_there(&error) => Ok(false),
