@@ -83,13 +83,10 @@ impl Pulse {
         }
         // u is θ + η (cos θ + 1) in units of V0 T/2π.
         let level = TAU * (time - self.cycle_start()) / self.period - 2.0 * eta;
-        let turn = |maximum: f64| {
-            let highest = maximum + eta * (libm::cos(maximum) - 1.0);
-            TAU * ((level - highest) / TAU).ceil().max(1.0)
-        };
         let angle = match load_maximum_phase(eta) {
             Some(maximum) => {
-                let turn = turn(maximum);
+                let highest = maximum + eta * (libm::cos(maximum) - 1.0);
+                let turn = TAU * ((level - highest) / TAU).ceil().max(1.0);
                 let begin = if turn > TAU { -PI - maximum } else { -PI };
                 turn + rising_angle(eta, level - turn, [begin, maximum])
             }

@@ -127,10 +127,8 @@ impl SlipObserver {
     fn averages(&self) -> Option<Averages> {
         let (start, end) = match self.span.settled {
             Some(settled) => {
-                let start_up_end = self
-                    .span
-                    .start_up_end
-                    .filter(|_| !self.measured.slips.is_empty());
+                let has_slips = !self.measured.slips.is_empty();
+                let start_up_end = self.span.start_up_end.filter(|_| has_slips);
                 (start_up_end.unwrap_or(settled), self.sliding())
             }
             None => (self.span.start_up_end?, self.span.last_slip_end),
