@@ -455,12 +455,8 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
     let is_lopsided = crosses || (value - low - half).abs() > LOPSIDED * half;
     // Two digits of an error that begins with 1, and of ends.
     let exponent = libm::floor(libm::log10(half));
-    let digits = if is_lopsided || half / libm::exp10(exponent) < 1.95 {
-        1.0
-    } else {
-        0.0
-    } - exponent;
-    let digits = floored(digits).min(18);
+    let has_two = is_lopsided || half / libm::exp10(exponent) < 1.95;
+    let digits = floored(f64::from(u8::from(has_two)) - exponent).min(18);
     let half = with_decimals(half, digits);
     let [value, low, high] = [value, low, high].map(|end| with_decimals(end, digits));
     if is_lopsided {

@@ -86,12 +86,10 @@ impl Report<'_> {
         let parts = output::count(verification.parts, "part");
         let jobs = output::count(verification.jobs, "job");
         let megabytes = verification.bytes as f64 / 1e6;
+        let files = format!("{}, {megabytes:.1} MB", verification.files);
         output::pairs(&[
             ("intact", format!("{parts} with {jobs}")),
-            (
-                "files",
-                format!("{}, {megabytes:.1} MB", verification.files),
-            ),
+            ("files", files),
             ("missing", self.missing()),
             ("damaged", self.damaged()),
         ])?;

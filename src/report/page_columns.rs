@@ -182,7 +182,10 @@ impl Sets {
         for (row, number) in read_sets(layout).zip(0_u64..) {
             let row = row?;
             if number.is_multiple_of(spacing) {
-                sets.push(sweep, &row);
+                sets.commands.push(sweep.command_of_set(&row.parameters));
+                sets.histograms.push(Vec::new());
+                sets.columns.push(&row, exact);
+                sets.places.insert(row.set_id.clone(), shown.len());
                 shown.push(row);
             }
         }
@@ -200,14 +203,6 @@ impl Sets {
             }
         }
         Ok(sets)
-    }
-
-    fn push(&mut self, sweep: &Sweep, row: &SetRow) {
-        let parameters = &row.parameters.parameters;
-        self.commands.push(sweep.command_of_set(parameters));
-        self.histograms.push(Vec::new());
-        self.columns.push(row, exact);
-        self.places.insert(row.set_id.clone(), self.places.len());
     }
 }
 

@@ -82,11 +82,10 @@ pub fn or_all_cores(count: Option<NonZeroUsize>) -> usize {
 }
 
 pub fn parse_threads(text: &str) -> Result<NonZeroUsize, String> {
-    let count = text
-        .parse()
-        .ok()
-        .filter(|count: &NonZeroUsize| count.get() <= MAX_THREADS);
-    count.ok_or_else(|| format!("must be a whole number from 1 to {MAX_THREADS}"))
+    match text.parse::<NonZeroUsize>() {
+        Ok(count) if count.get() <= MAX_THREADS => Ok(count),
+        _ => Err(format!("must be a whole number from 1 to {MAX_THREADS}")),
+    }
 }
 
 /// CPU seconds of the calling thread that a computation takes, and its result.
