@@ -313,7 +313,8 @@ fn with_units(time: Duration) -> String {
     let parts = parts.into_iter().filter(|(number, _)| *number > 0);
     parts
         .map(|(number, unit)| format!("{number}{unit}"))
-        .collect()
+        .collect::<Vec<_>>()
+        .concat()
 }
 
 #[cfg(test)]

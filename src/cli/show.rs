@@ -346,9 +346,8 @@ fn table_of_pulses(triggers: &[TriggerRow]) -> String {
     let parameters = pulses.iter().map(|pulses| pulses.parameters.clone());
     let mut columns = parameters_but(Symbol::PulseStart, parameters);
     columns.numbers("pulses", &pulses, |pulses| pulses.rows.len().to_string());
-    type Quantity = fn(&TriggerRow) -> Option<[f64; 2]>;
-    let quantities: [(&str, Quantity); 2] = [
-        ("advance/⟨τ⟩", TriggerRow::advances),
+    let quantities = [
+        ("advance/⟨τ⟩", TriggerRow::advances as fn(&TriggerRow) -> _),
         ("triggered", TriggerRow::triggers),
     ];
     for (name, quantity) in quantities {

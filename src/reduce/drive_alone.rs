@@ -20,8 +20,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
 
 columns! {
+    /// When a slip begins, and when its contacts begin to break and for how long.
     #[derive(Clone, Copy, Debug)]
-    pub(super) struct Onset {
+    pub(super) struct Times {
         onset: f64;
         interval: Option<f64>;
         nucleation: f64;
@@ -31,7 +32,7 @@ columns! {
 
 /// The slips of the controls of a directory, by the ids of their sets and by seeds; empty without `control = true`.
 #[derive(Debug, Default)]
-pub(super) struct Controls(HashMap<String, BTreeMap<u64, Vec<Onset>>>);
+pub(super) struct Controls(HashMap<String, BTreeMap<u64, Vec<Times>>>);
 
 impl Controls {
     pub(super) fn read<'a>(
@@ -39,13 +40,13 @@ impl Controls {
         plan: Plan<'_>,
         sets: impl Iterator<Item = &'a Parameters>,
     ) -> Result<Self, ResultsError> {
-        let mut controls: HashMap<String, BTreeMap<u64, Vec<Onset>>> = sets
+        let mut controls: HashMap<String, BTreeMap<u64, Vec<Times>>> = sets
             .filter_map(|set| Some((plan.control_of(set)?, BTreeMap::new())))
             .collect();
         if controls.is_empty() {
             return Ok(Self::default());
         }
-        for row in slips.rows::<(JobOfSlip, Onset)>() {
+        for row in slips.rows::<(JobOfSlip, Times)>() {
             let (job, onset) = row?;
             if let Some(set) = controls.get_mut(&job.set_id) {
                 set.entry(job.seed).or_default().push(onset);
@@ -68,11 +69,11 @@ impl Controls {
         let intervals = Sequences::of([slips.filter_map(|slip| Some([slip.interval?]))]);
         explained.tau_control = intervals.estimate().value();
         if parameters.pulse_start.is_some() {
-            let cycle = |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Cycle::of(parameters, slips));
+            let cycle = |(&seed, slips): (&u64, &Vec<Times>)| (seed, Cycle::of(parameters, slips));
             explained.cycles = control.iter().map(cycle).collect();
         } else {
             let passage =
-                |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Passage::of(parameters, slips));
+                |(&seed, slips): (&u64, &Vec<Times>)| (seed, Passage::of(parameters, slips));
             explained.passages = Some(control.iter().map(passage).collect());
         }
         explained
@@ -221,7 +222,7 @@ struct Passage {
 
 impl Passage {
     /// Of the slips of a job without modulation, in order, under that of these parameters.
-    fn of(parameters: &Parameters, slips: &[Onset]) -> Self {
+    fn of(parameters: &Parameters, slips: &[Times]) -> Self {
         let mut drive = Drive::new(parameters);
         let mut passage = |time: f64| {
             drive.advance_to(time);
@@ -271,7 +272,7 @@ mod tests {
         let parameters = sweep.jobs().next().unwrap().parameters;
         let slips = |onsets: &Vec<f64>| {
             let lasts = std::iter::once(None).chain(onsets.iter().map(Some));
-            let slip = |(onset, last): (&f64, Option<&f64>)| Onset {
+            let slip = |(onset, last): (&f64, Option<&f64>)| Times {
                 onset: *onset,
                 interval: last.map(|last| onset - last),
                 nucleation: *onset,
@@ -376,14 +377,14 @@ mod tests {
             modulation_period: Some(1.0 / FREQUENCY),
             ..Parameters::default()
         };
-        let slip = |onset: &f64| Onset {
+        let slip = |onset: &f64| Times {
             onset: *onset,
             interval: None,
             nucleation: *onset,
             duration: 0.0,
         };
         let passages = onsets.iter().map(|onsets| {
-            let slips: Vec<Onset> = onsets.iter().map(slip).collect();
+            let slips: Vec<Times> = onsets.iter().map(slip).collect();
             Passage::of(&parameters.clone().validated().unwrap(), &slips)
                 .phases
                 .into_iter()

@@ -5,7 +5,7 @@
 //! at its onset. Without an exact counterfactual, experiments compare catalogues before and after waves (van der Elst
 //! and Savage, J. Geophys. Res. 120 (2015), 10.1002/2014JB011611).
 
-use super::drive_alone::{Explained, Onset};
+use super::drive_alone::{Explained, Times};
 use super::gather::Gathered;
 use super::sequence::Sequences;
 use crate::model::{Drive, Parameters, Selected, Selection, Symbol};
@@ -82,7 +82,7 @@ pub(super) struct Cycle {
 
 impl Cycle {
     /// Of the slips of the control of a job with these parameters, in order.
-    pub(super) fn of(parameters: &Parameters, control: &[Onset]) -> Result<Self, Excluded> {
+    pub(super) fn of(parameters: &Parameters, control: &[Times]) -> Result<Self, Excluded> {
         let drive = Drive::new(parameters);
         let pulse = drive.pulse().unwrap_or_default();
         let [start, _] = pulse;
@@ -261,7 +261,7 @@ mod tests {
     }
 
     fn row(start: f64, amplitude: f64, after: &[f64]) -> TriggerRow {
-        let slip = |onset: f64| Onset {
+        let slip = |onset: f64| Times {
             onset,
             interval: None,
             nucleation: onset - 0.001,
