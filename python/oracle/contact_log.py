@@ -45,7 +45,7 @@ class Parameters:
     Delta_to: float | None = None
     ramp_time: float = 0.0
     pulse_start: float | None = None
-    pulse_cycles: int = 1
+    pulse_cycles: int | None = None
     #: A maximum of the modulation, in s, from which its phase is counted.
     cycle_start: float = 0.0
     #: Added to the displacement of the driven end, in m.

@@ -156,7 +156,7 @@ mod tests {
                 6,
                 "N=70 Ns=20 M=11.5 K=1e8 Kd=4e7 ki=5e6 fs=1.37 dfs=0.0069 tau_r=0.005 gamma=6462 \
                 V0=1e-4 Delta=0 T=none T_to=none Delta_to=none ramp_time=0 \
-                pulse_start=none pulse_cycles=1 FN=4000 L=0.15 break_on=magnitude seed=0 \
+                pulse_start=none pulse_cycles=none FN=4000 L=0.15 break_on=magnitude seed=0 \
                 solver.method=event-driven solver.tolerance=0.001 solver.resolve=auto record.slips=40 record.time=none record.discard=5 \
                 record.max_time=none record.max_events=1000000000 record.precursor_size=none record.precursors=false \
                 record.drop_size=none record.energies=false record.control=false record.give_up_after=none"
@@ -173,6 +173,7 @@ mod tests {
             turning_amplitude: Some(2e-6),
             ramp_time: 1.0,
             pulse_start: Some(1.0),
+            pulse_cycles: Some(1),
             ..Parameters::default()
         };
         let mut jobs = HashSet::from([identity().id(&ramped, &Symbol::ALL)]);

@@ -63,7 +63,7 @@ impl Pulse {
         let period = parameters.modulation_period?;
         Some(Self {
             start,
-            end: start + parameters.pulse_cycles as f64 * period,
+            end: start + parameters.pulse_cycles.unwrap_or(1) as f64 * period,
             period,
             amplitude: parameters.modulation_amplitude,
             eta: parameters.eta(),
@@ -401,7 +401,7 @@ mod tests {
                 modulation_amplitude: amplitude,
                 modulation_period: Some(period),
                 pulse_start: Some(start),
-                pulse_cycles: cycles,
+                pulse_cycles: Some(cycles),
                 ..Parameters::default()
             });
             let end = start + cycles as f64 * period;

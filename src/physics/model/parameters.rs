@@ -58,8 +58,8 @@ fields! {
             "duration of the ramp to T_to and Delta_to, and of that back; 0 is off";
         PulseStart("pulse_start", "t_p", "Start of the pulse") pulse_start: Option<f64> = None, "s", NOT_NEGATIVE and "not with a ramp",
             "start of the modulation as a pulse; null: it lasts";
-        PulseCycles("pulse_cycles", "", "Periods of the pulse") pulse_cycles: u64 = 1, "", COUNT and "above 1 only with pulse_start",
-            "periods of the pulse";
+        PulseCycles("pulse_cycles", "", "Periods of the pulse") pulse_cycles: Option<u64> = None, "", COUNT and "given only with pulse_start",
+            "periods of the pulse, by default 1; null: no pulse";
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
         L("L", "L") slider_length: f64 = 0.15, "m", POSITIVE,
             "slider length, enters positions and front speeds only";
@@ -120,7 +120,10 @@ impl Parameters {
         if self.modulation_amplitude == 0.0 {
             self.modulation_period = None;
             self.pulse_start = None;
-            self.pulse_cycles = 1;
+            self.pulse_cycles = None;
+        }
+        if self.pulse_start.is_some() {
+            self.pulse_cycles.get_or_insert(1);
         }
         Ok(self)
     }
@@ -147,7 +150,7 @@ impl Parameters {
             ),
             (
                 Symbol::PulseCycles,
-                self.pulse_start.is_some() || self.pulse_cycles == 1,
+                self.pulse_start.is_some() || self.pulse_cycles.is_none(),
             ),
         ];
         match rules.into_iter().find(|(_, holds)| !holds) {
@@ -235,7 +238,7 @@ impl Parameters {
             turning_amplitude: None,
             ramp_time: 0.0,
             pulse_start: None,
-            pulse_cycles: 1,
+            pulse_cycles: None,
             ..self.clone()
         }
     }

@@ -19,7 +19,7 @@ fn pulsed(start: f64) -> Parameters {
         modulation_amplitude: 1e-6,
         modulation_period: Some(0.008),
         pulse_start: Some(start),
-        pulse_cycles: 2,
+        pulse_cycles: Some(2),
         ..Parameters::default()
     };
     parameters.validated().expect("a pulse")
