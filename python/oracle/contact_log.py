@@ -102,7 +102,7 @@ class Parameters:
     def cycles(self) -> Iterator[tuple[Self, float]]:
         """The cycles of the modulation: the parameters of each, and its end in s. The last one is endless."""
         if self.pulse_start is not None:
-            still, end = dataclasses.replace(self, Delta=0.0), self.pulse_start + self.pulse_cycles * self.T
+            still, end = dataclasses.replace(self, Delta=0.0), self.pulse_start + (self.pulse_cycles or 1) * self.T
             yield still, self.pulse_start
             # It rises from a minimum.
             yield dataclasses.replace(self, cycle_start=self.pulse_start - 0.5 * self.T, lift=2 * self.Delta), end

@@ -67,7 +67,7 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let amplitudes = values(Symbol::Delta);
     // High frequencies first.
     let periods = values(Symbol::T);
-    let is_one = values(Symbol::V0).len() == 1 && values(Symbol::PulseCycles).len() == 1;
+    let is_one = values(Symbol::V0).len() == 1 && values(Symbol::PulseCycles).len() <= 1;
     if !is_one || periods.len() > INKS.len() || amplitudes.len() > MAX_AMPLITUDES {
         return None;
     }

@@ -93,6 +93,14 @@ fn a_sweep_without_controls_or_pulses_says_so() {
     );
     folder.ends(0, "run plain.toml --out plain");
     assert!(!folder.path("plain/reduced/triggers.parquet").exists());
+    // Without modulation there is none.
+    folder.write("still.toml", &SWEEP.replace("[1e-15, 1e-6]", "[0, 1e-6]"));
+    let still = folder.ends(2, "plan still.toml");
+    assert!(
+        still.stderr.contains("pulse_start = 0.5: must be"),
+        "{}",
+        still.stderr
+    );
     let refused = folder.ends(2, "simulate --set Delta=1e-6 --set T=0.03 --set pulse_start=1 --set ramp_time=1 --set T_to=0.1");
     assert!(refused.stderr.contains("pulse_start"), "{}", refused.stderr);
 }

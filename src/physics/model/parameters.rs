@@ -56,10 +56,10 @@ fields! {
         RampTime("ramp_time", "", "Duration of the ramp") ramp_time: f64 = 0.0, "s",
             NOT_NEGATIVE and "at most 1e9 T and 1e9 T_to, above 0 only with T_to or Delta_to",
             "duration of the ramp to T_to and Delta_to, and of that back; 0 is off";
-        PulseStart("pulse_start", "t_p", "Start of the pulse") pulse_start: Option<f64> = None, "s", NOT_NEGATIVE and "not with a ramp",
+        PulseStart("pulse_start", "t_p", "Start of the pulse") pulse_start: Option<f64> = None, "s", NOT_NEGATIVE and "given only with Delta > 0 and without a ramp",
             "start of the modulation as a pulse; null: it lasts";
         PulseCycles("pulse_cycles", "", "Periods of the pulse") pulse_cycles: Option<u64> = None, "", COUNT and "given only with pulse_start",
-            "periods of the pulse, by default 1; null: no pulse";
+            "periods of the pulse; null: 1";
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
         L("L", "L") slider_length: f64 = 0.15, "m", POSITIVE,
             "slider length, enters positions and front speeds only";
@@ -119,11 +119,6 @@ impl Parameters {
         self.check_rules()?;
         if self.modulation_amplitude == 0.0 {
             self.modulation_period = None;
-            self.pulse_start = None;
-            self.pulse_cycles = None;
-        }
-        if self.pulse_start.is_some() {
-            self.pulse_cycles.get_or_insert(1);
         }
         Ok(self)
     }
@@ -146,7 +141,7 @@ impl Parameters {
             (Symbol::RampTime, self.ramp_time <= self.max_ramp_time()),
             (
                 Symbol::PulseStart,
-                self.pulse_start.is_none() || self.ramp_time == 0.0,
+                self.pulse_start.is_none() || (is_modulated && self.ramp_time == 0.0),
             ),
             (
                 Symbol::PulseCycles,
