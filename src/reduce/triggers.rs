@@ -217,7 +217,7 @@ impl<'a> Pulses<'a> {
     }
 
     /// Means of a quantity: as seen, by the drive alone, and of the difference; `None` without values. Pulses of a seed
-    /// meet the same slip, so intervals need [`MIN_SEEDS`].
+    /// meet the same slip, so intervals need `MIN_SEEDS` of them.
     pub fn means(&self, quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>) -> Option<[Mean; 3]> {
         let mut seeds: BTreeMap<u64, Vec<[f64; 2]>> = BTreeMap::new();
         for row in &self.rows {
