@@ -18,7 +18,10 @@ INSTEAD = {
     },
     "Plot": {
         **{"phi_eta": "write phase_eta", "tau_T": "write intervals", "tau_histograms": "write histograms"},
-        **dict.fromkeys(("overview", "drag", "edges", "locking_map", "regime_map"), "`stickslip plot {_results.directory}` draws it"),
+        **dict.fromkeys(
+            ("overview", "drag", "edges", "locking_map", "regime_map", "triggering"),
+            "`stickslip plot {_results.directory}` draws it",
+        ),
     },
 }
 

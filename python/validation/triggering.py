@@ -101,12 +101,12 @@ def tides(results: Path) -> Section:
         ", ".join(f"{signed(mine['phase_mean'].iloc[0])} rad at {speed(mine)}" for mine in (slow, fast)),
         *(bool(mine["phase_mean_low"].iloc[0] > 0.5 - numpy.pi / 2) for mine in (slow, fast)),
     )
-    longer = [mine[mine["periods"].between(0.2, 5) & mine["has_phase"]] for mine in (slow, fast)]
+    longer = [mine[mine["periods"].between(0.2, 5)] for mine in (slow, fast)]
     medians = [mine["phase_mean"].median() for mine in longer]
     section.check(
         "to the peak of its rate",
         "median of the mean phases at T from ⟨τ⟩/5 to 5⟨τ⟩ within 0.2 rad of −π/2",
-        ", ".join(f"{signed(median)} rad at {speed(mine)}" for median, mine in zip(medians, longer, strict=True)),
+        ", ".join(f"{signed(median)} rad at {speed(mine)}" for median, mine in zip(medians, (slow, fast), strict=True)),
         *(bool(abs(median + numpy.pi / 2) < 0.2) for median in medians),
     )
     locked = [mine[mine["resultant_excess_low"] > LOCKED] for mine in (slow, fast)]
@@ -114,8 +114,8 @@ def tides(results: Path) -> Section:
     section.check(
         "locking in a window of periods only",
         f"excess of R above {LOCKED} with its interval at some T, and at none above ⟨τ⟩",
-        f"{len(locked[0])} sets at {speed(slow)}; {len(window)} at {speed(fast)}, T/⟨τ⟩ from {window.min():.2f} to"
-        f" {window.max():.2f}",
+        f"{len(locked[0])} sets at {speed(slow)}; {len(window)} at {speed(fast)}, with T/⟨τ⟩ of"
+        f" {', '.join(f'{periods:.2f}' for periods in window) or 'none'}",
         *(bool(len(mine)) and bool(mine["periods"].max() < 1) for mine in locked),
     )
     section.remark(

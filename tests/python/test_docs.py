@@ -137,10 +137,10 @@ RECIPES = re.findall(r"`stickslip (run [^`]*-o [^`]*)`", (ROOT / "docs" / "guide
 def test_recipes_end_with_a_figure(program, tmp_path, recipe):
     assert len(RECIPES) == 7
     # As it stands, but with few contacts and slips.
-    small = ["--set", "Ns=3"]
-    # Pulses come later.
-    small += [] if "triggering" in recipe else ["--set", "slips=4"]
+    small = ["--set", "Ns=3", "--set", "slips=4"]
     small += [] if "N=" in recipe.replace("Kd=", "") else ["--set", "N=5"]
+    # Pulses come after more slips.
+    small = ["--set", "Ns=5", "--set", "N=10"] if "triggering" in recipe else small
     small += [] if "-edge" in recipe or "-precise" in recipe else ["--axis", "seed=count:2"]
     done = subprocess.run([program, *shlex.split(recipe), *small], cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
