@@ -134,7 +134,12 @@ pub fn run(
                     if reduce && report.jobs_left == 0 && !report.stopped {
                         joined.reduce(|| -> Result<(), Error> {
                             stickslip::reduce::reduce(&Results::read(&layout)?)?;
-                            draw_all(&layout, &Look::of_sweep(sweep.name()), &Format::DEFAULT)?;
+                            draw_all(
+                                &layout,
+                                &[],
+                                &Look::of_sweep(sweep.name()),
+                                &Format::DEFAULT,
+                            )?;
                             Ok(())
                         })?;
                     }

@@ -6,6 +6,7 @@ mod batch;
 mod export;
 mod generate;
 mod init;
+mod measured;
 mod output;
 mod plan;
 mod plot;
@@ -75,6 +76,7 @@ enum Command {
     Export(export::Arguments),
     Simulate(Box<simulate::Arguments>),
     Accuracy(accuracy::Arguments),
+    Measured(measured::Arguments),
     #[command(hide = true)]
     Generate(generate::Arguments),
 }
@@ -102,6 +104,7 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Command::Export(arguments) => export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
+        Command::Measured(arguments) => measured::measured(&arguments),
         Command::Generate(arguments) => generate::generate(&arguments),
     });
     let exit = ended.unwrap_or_else(|error| {

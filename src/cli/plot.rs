@@ -3,7 +3,8 @@
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
-    CustomFigure, Dots, Format, Limits, Look, Size, Style, draw_all, draw_custom, write_custom,
+    CustomFigure, Dots, Format, Limits, Look, Other, Size, Style, draw_all, draw_custom,
+    write_custom,
 };
 use crate::reduce::{SetRow, SlipOfSet, renew};
 use crate::results::Results;
@@ -42,6 +43,9 @@ pub struct Arguments {
         value_parser = choice(&Style::ALL, Style::word, Style::description)
     )]
     style: Style,
+    /// Another results directory, computed or measured, drawn over the first as hollow marks. Repeatable
+    #[arg(long = "with", value_name = "DIR")]
+    others: Vec<PathBuf>,
     #[command(flatten)]
     custom: CustomFlags,
     /// File of the custom figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
@@ -63,6 +67,7 @@ Examples:
   stickslip plot --list                                                the columns that can be drawn
   stickslip plot results/sliding-velocity --x V0 --y tau_mean --log xy
   stickslip plot results/fig3 --x eta --y phase_mean --colour V0 --panels Delta --log x -o phase.pdf
+  stickslip plot results/mine --with results/fig3                      measured slips beside the model
   stickslip plot results/friction --x Delta --y mean_friction --colour T --xlim 0:4e-6 \\
     --size 86mmx60mm --style print --format pdf";
 
@@ -87,8 +92,15 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let results = renew(&Results::read(&layout(directory))?)?;
     let layout = results.layout();
     let look = arguments.look(&results);
+    let other =
+        |directory: &PathBuf| Other::read(&renew(&Results::read(&self::layout(directory))?)?);
+    let others = arguments
+        .others
+        .iter()
+        .map(other)
+        .collect::<Result<Vec<Other>>>()?;
     let files = if let Some(figure) = arguments.custom.figure() {
-        let picture = draw_custom(&results, &figure, &look)?;
+        let picture = draw_custom(&results, &others, &figure, &look)?;
         if look.style == Style::Print {
             output::report(&format!("for the caption: {}", picture.note()));
         }
@@ -100,7 +112,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
             }
         }
     } else {
-        draw_all(layout, &look, &arguments.format)?
+        draw_all(layout, &others, &look, &arguments.format)?
     };
     if files.is_empty() {
         output::report("there is nothing to draw: no set has a result");

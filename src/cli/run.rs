@@ -174,9 +174,7 @@ fn work(
         output::pairs(&lines)?;
     }
     if let Some(reduced) = reduced?.filter(|_| !arguments.json) {
-        output::print(&format!("\n{}\n", reduced.result))?;
-        let figures = reduced.figures.iter();
-        output::lines(figures.map(|path| format!("figure  {}", shown(path))))?;
+        reduced.print()?;
     }
     if is_complete && arguments.shard.is_some() {
         reduce::report_missing(&Results::read(layout)?)?;
@@ -260,15 +258,24 @@ fn stop_in_words(report: &RunReport, arguments: &Arguments) -> String {
 }
 
 /// What is printed of a reduction.
-struct Reduced {
-    lines: Vec<(&'static str, String)>,
+pub struct Reduced {
+    pub lines: Vec<(&'static str, String)>,
     /// The sets and their statistics.
     result: String,
     figures: Vec<PathBuf>,
 }
 
+impl Reduced {
+    /// Prints what comes below its lines.
+    pub fn print(&self) -> Result<()> {
+        output::print(&format!("\n{}\n", self.result))?;
+        let figures = self.figures.iter();
+        output::lines(figures.map(|path| format!("figure  {}", shown(path))))
+    }
+}
+
 /// Reduces and draws what is there, as other shards may still run. `None` if nothing is there.
-fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
+pub fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
     let results = Results::read(layout)?;
     let summary = match crate::reduce::reduce(&results) {
         Err(error) if error.is::<NoJobs>() => {
@@ -278,7 +285,7 @@ fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
         summary => summary?,
     };
     let look = Look::of_sweep(results.sweep().name());
-    let figures = draw_all(layout, &look, &Format::DEFAULT)?;
+    let figures = draw_all(layout, &[], &look, &Format::DEFAULT)?;
     Ok(Some(Reduced {
         lines: reduce::summary_lines(&summary, layout),
         result: show::summary(&results, summary.sets)?,

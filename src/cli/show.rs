@@ -478,7 +478,8 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         note_on_sliding(sweep, rows),
         note_on_cut_jobs(rows),
         note_on_few_cycles(rows),
-        note_on_drive(rows),
+        note_on_drive(sweep, rows),
+        note_on_single_series(sweep, rows),
         note_on_model(sweep, rows),
         failed,
         note_on_removed_sets(sweep, rows),
@@ -535,11 +536,24 @@ fn note_on_few_cycles(rows: &[SetRow]) -> Option<String> {
 }
 
 /// How much of R the drive alone makes, where that is not seen at a glance.
-fn note_on_drive(rows: &[SetRow]) -> Option<String> {
+fn note_on_drive(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let phased = rows.iter().filter(|row| row.resultant_length.is_some());
-    if phased.clone().any(|row| row.resultant_drive.is_none()) {
-        let note = "R without control = true: the load alone makes some of it (docs/statistics.md)";
-        return Some(note.to_owned());
+    let without = phased.clone().filter(|row| row.resultant_drive.is_none());
+    if let Some(row) = without.clone().next() {
+        let control = if sweep.measured().is_some() {
+            let setting = |symbol: Symbol| {
+                let value = row.parameters.get(symbol).number()?;
+                Some(label(symbol.key()).setting(value, Digits::THREE))
+            };
+            let settings = [Symbol::V0, Symbol::Kd].into_iter().filter_map(setting);
+            let settings: Vec<String> = settings.collect();
+            format!("slips measured at Δ = 0 and {}", settings.join(", "))
+        } else {
+            "control = true".to_owned()
+        };
+        return Some(format!(
+            "R without {control}: the load alone makes some of it (docs/statistics.md)"
+        ));
     }
     let is_explained = |row: &&SetRow| {
         let excess = row.resultant_excess_interval;
@@ -549,6 +563,14 @@ fn note_on_drive(rows: &[SetRow]) -> Option<String> {
     let sets = output::count(explained, "set");
     let note = "is what the drive alone makes, within its interval (docs/statistics.md)";
     (explained > 0).then(|| format!("R of {sets} {note}"))
+}
+
+/// That an error comes from a single series.
+fn note_on_single_series(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
+    let single = rows.iter().filter(|row| row.finished_jobs == 1).count() as u64;
+    let sets = output::count(single, "set");
+    let note = "have a single series: their error is from the correlation within it";
+    (single > 0 && sweep.measured().is_some()).then(|| format!("{sets} {note}"))
 }
 
 /// What swept parameters change beside what their names say.

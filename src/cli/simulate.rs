@@ -17,7 +17,7 @@ use crate::single_job::{self, Records, Request};
 use crate::solver::{Method, SolverKey};
 use crate::sweep::{Change, Sweep};
 use crate::table::Table;
-use crate::table::arrow;
+use crate::table::arrow::{self, Gaps};
 use crate::table::file::{Footer, TableWriter};
 use crate::table::shown::shown;
 use anyhow::Result;
@@ -223,7 +223,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
         .with("parameters", &all.to_string());
     let tables = Tables {
         footer: &footer,
-        left_out: &sweep.recording().left_out(),
+        gaps: &tables::gaps(&sweep),
     };
     let files = &arguments.tables;
     tables.write(files.trace.as_deref(), records.trace.iter().copied())?;
@@ -246,14 +246,14 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
 /// What the tables of a job have in common.
 struct Tables<'a> {
     footer: &'a Footer,
-    left_out: &'a [Cow<'static, str>],
+    gaps: &'a Gaps,
 }
 
 impl Tables<'_> {
     fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
         Destination::new(path, Kind::PARQUET)?.write(catch_signals, |file| {
-            let mut writer = TableWriter::new(self.left_out, file, self.footer)?;
+            let mut writer = TableWriter::new(self.gaps, file, self.footer)?;
             for row in rows {
                 writer.push(&row)?;
             }

@@ -160,15 +160,22 @@ pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
         (None, None) => return of_flags(&single_job::sweep_text(changes)),
-    };
-    vary(sweep?, changes)
+    }?;
+    if let Some(measured) = sweep.measured() {
+        let name = sweep.name();
+        let command = &measured.command;
+        let problem = format!(
+            "{name}: its slips were measured, and nothing can be run; {command} -o DIR reads them again"
+        );
+        return Err(UsageError(problem).into());
+    }
+    vary(sweep, changes)
 }
 
 /// Warns of a folder in the path of a results directory whose name DuckDB takes for the value of a column in all rows.
 pub fn warn_of_partitions(root: &Path, sweep: &Sweep) {
     let is_column = |name: &str| {
-        let mut schemas =
-            tables_of(sweep.recording()).map(|table| recorded_schema(table, sweep.recording()));
+        let mut schemas = tables_of(sweep.recording()).map(|table| recorded_schema(table, sweep));
         let is_it = |field: &FieldRef| field.name().eq_ignore_ascii_case(name);
         schemas.any(|schema| schema.fields().iter().any(is_it))
     };

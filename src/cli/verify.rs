@@ -1,6 +1,7 @@
 //! `stickslip verify`: whether a results directory is whole, and what to do if not.
 
 use super::{Exit, layout, output};
+use crate::measured::compare_files;
 use crate::results::Results;
 use crate::results::verification::{Problem, Verification};
 use crate::table::shown::{shown, shown_text};
@@ -42,6 +43,8 @@ struct Report<'a> {
     repaired: bool,
     /// Commands that are to be run, in this order.
     commands: Vec<String>,
+    /// Files that measured slips were read from, compared with what was read.
+    sources: Vec<String>,
 }
 
 pub fn verify(arguments: &Arguments) -> Result<Exit> {
@@ -64,6 +67,10 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
         verification: &verification,
         repaired: arguments.repair && !verification.whole,
         commands,
+        sources: Results::read(layout)?
+            .sweep()
+            .measured()
+            .map_or_else(Vec::new, compare_files),
     };
     if arguments.json {
         output::json(JSON_FORMAT, &report)?;
@@ -93,6 +100,7 @@ impl Report<'_> {
             ("missing", self.missing()),
             ("damaged", self.damaged()),
         ])?;
+        output::lines(self.sources.iter().cloned())?;
         let passed_over = verification.passed_over.iter();
         output::lines(passed_over.map(|path| format!("passed over: {path}")))?;
         if !self.commands.is_empty() {

@@ -17,6 +17,7 @@ use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetRow, Values, is_same};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
 const REDUCTION: Ends = (0.2, 0.3);
@@ -45,6 +46,8 @@ pub(super) struct Chart<'a> {
     pub(super) of: &'static str,
     /// The sets, if each has a dot.
     pub(super) sets: &'a [SetRow],
+    /// Names of other directories, and which of the sets are theirs.
+    pub(super) others: Vec<(String, Range<usize>)>,
     /// The swept parameters, by which sets are joined and told apart.
     pub(super) swept: &'a [Values],
     pub(super) x: Quantity<'a>,
@@ -162,7 +165,8 @@ impl<'a> Chart<'a> {
                 && !self.x.has(set)
                 && self.ys.iter().any(|y| y.has(set))
         };
-        let free: Vec<usize> = (0..self.sets.len()).filter(is_free).collect();
+        let free = (0..self.sets.len()).filter(|set| self.other(*set).is_none());
+        let free: Vec<usize> = free.filter(is_free).collect();
         if free.len() > INKS.len() {
             Vec::new()
         } else {
@@ -186,7 +190,7 @@ impl<'a> Chart<'a> {
         let others = self.swept.iter().filter(is_other);
         let others: Vec<_> = others.map(Values::places).collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
-        for &set in sets {
+        for &set in sets.iter().filter(|set| self.other(**set).is_none()) {
             let key = others.iter().map(|places| places[set]).collect();
             lines.entry(key).or_default().push(set);
         }
@@ -239,6 +243,10 @@ impl<'a> Chart<'a> {
         let mut all = vec![Layer::Inside(layers)];
         for &set in members {
             let place: Vec<Place> = self.place(y, set).into_iter().collect();
+            if let Some(other) = self.other(set) {
+                all.push(Layer::Hollow(place, other, self.ink(dots, set)));
+                continue;
+            }
             let dot = Dot {
                 opacity: 0.9,
                 ..Dot::solid(self.ink(dots, set), dots.radius)
@@ -249,6 +257,12 @@ impl<'a> Chart<'a> {
             }
         }
         all
+    }
+
+    /// The number of the other directory that a set is of.
+    fn other(&self, set: usize) -> Option<usize> {
+        let mut others = self.others.iter();
+        others.position(|(_, sets)| sets.contains(&set))
     }
 
     fn place(&self, y: &Quantity<'_>, set: usize) -> Option<Place> {
@@ -330,6 +344,8 @@ impl Chart<'_> {
                 entries.push(entry(Mark::Dot(Dot::solid(GREY, RADIUS)), text));
             }
         }
+        let others = self.others.iter().enumerate();
+        entries.extend(others.map(|(other, (name, _))| entry(Mark::Hollow(other), name)));
         if !dots.free.is_empty() {
             entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
         }
@@ -479,6 +495,7 @@ mod tests {
             Chart {
                 of: "sets",
                 sets: rows,
+                others: Vec::new(),
                 swept: &swept,
                 x,
                 ys: Vec::new(),

@@ -8,6 +8,7 @@ use crate::reduce::{Condition, SetRow, Values};
 use crate::table::columns::Row;
 use crate::table::value::words;
 use anyhow::Result;
+use std::ops::Range;
 
 words! {
     /// What has a dot each in a custom figure.
@@ -73,6 +74,7 @@ impl CustomFigure {
 pub(super) fn custom<'a>(
     quantity: &dyn Fn(&'static str, &str) -> Result<Quantity<'a>>,
     sets: &[SetRow],
+    others: Vec<(String, Range<usize>)>,
     swept: &[Values],
     figure: &'a CustomFigure,
     look: &Look,
@@ -102,6 +104,7 @@ pub(super) fn custom<'a>(
     let chart = Chart {
         of: figure.of.word(),
         sets,
+        others,
         swept: if sets.is_empty() { &[] } else { swept },
         colour: named("colour", &figure.colour.clone().or_else(next))?,
         panels: panels.map(|panels| panels.column),
@@ -155,7 +158,7 @@ pub(super) mod tests {
 
     fn drawn_of(rows: &[SetRow], figure: &CustomFigure, look: &Look) -> Result<Picture> {
         let quantity = |option, name: &str| Ok(Quantity::of(rows, option, name)?);
-        custom(&quantity, rows, &swept(rows), figure, look)
+        custom(&quantity, rows, Vec::new(), &swept(rows), figure, look)
     }
 
     fn drawn(count: u32, figure: &CustomFigure, look: &Look) -> Result<Picture> {

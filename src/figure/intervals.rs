@@ -1,5 +1,6 @@
 //! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which they fall.
 
+use super::Other;
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Layout, Place};
 use super::hues::Hues;
@@ -7,7 +8,7 @@ use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
-use super::style::{Dot, GREY, GRID, LIGHT_GREY, Look};
+use super::style::{BLACK, Dot, GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::{Point, ascending, is_same};
 use crate::sets::{Digits, label};
 
@@ -25,7 +26,8 @@ const LINES: u32 = 12;
 /// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
 /// τ = nT; `None` without intervals at two periods or more. Slips of sets with a phase have the colour of their V0, or
 /// of their Δ at a common V0.
-pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
+/// Slips of other directories are hollow marks.
+pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
         let period = point.period?;
         let interval = point.interval?;
@@ -42,15 +44,20 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     for slip in &mut slips {
         slip.1.0 *= factor;
     }
-    let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.0))?;
+    let scaled = |(period, interval): Place| (factor * period, interval);
+    let of_other = |other: &Other| other.points.iter().filter_map(place).map(scaled).collect();
+    let of_others: Vec<Vec<Place>> = others.iter().map(of_other).collect();
+    let all = slips.iter().map(|slip| &slip.1);
+    let all: Vec<&Place> = all.chain(of_others.iter().flatten()).collect();
+    let (low, high) = logarithmic_bounds(all.iter().map(|place| place.0))?;
     let x = Axis::logarithmic(&x_label, low, high);
-    let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;
+    let (low, high) = logarithmic_bounds(all.iter().map(|place| place.1))?;
     let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
     let mut few = Axis::linear("τ / T: up to 12 periods", 0.0, f64::from(LINES) + 0.5);
     few.ticks = (0..=LINES).map(|n| (f64::from(n), n.to_string())).collect();
     few.minor.clear();
 
-    let (phased, others): (Vec<&(&Point, Place)>, Vec<_>) =
+    let (phased, unphased): (Vec<&(&Point, Place)>, Vec<_>) =
         slips.iter().partition(|slip| slip.0.has_phase);
     let velocities = ascending(slips.iter().map(|slip| slip.0.drive_velocity));
     let amplitudes = ascending(slips.iter().map(|slip| slip.0.amplitude));
@@ -75,16 +82,18 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         let dot = Dot::solid(hues.ink(f64::INFINITY), RADIUS);
         entries.push(entry(Mark::Dot(dot), "slips of sets with a phase"));
     }
-    if !others.is_empty() {
+    if !unphased.is_empty() {
         let dot = Dot { ink: GREY, ..OTHER };
         entries.push(entry(Mark::Dot(dot), "slips of sets without a phase"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
+    let others = others.iter().enumerate();
+    entries.extend(others.map(|(number, other)| entry(Mark::Hollow(number), &other.name)));
     let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
         let mut layers: Vec<Layer<'_>> = (1..=lines)
             .map(|n| Layer::Level(f64::from(n), GRID))
             .collect();
-        let places = others.iter().map(|slip| slip.1);
+        let places = unphased.iter().map(|slip| slip.1);
         layers.push(Layer::Dots(places.collect(), OTHER));
         layers.extend(phased.iter().map(|&&(point, place)| {
             let dot = Dot {
@@ -94,6 +103,8 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
             };
             Layer::Dots(vec![place], dot)
         }));
+        let hollow = of_others.iter().enumerate();
+        layers.extend(hollow.map(|(number, places)| Layer::Hollow(places.clone(), number, BLACK)));
         Panel {
             bar: hues.bar(),
             ..Panel::inside(height, x.clone(), y, layers)
@@ -129,7 +140,7 @@ mod tests {
         let mut points = vec![point(1, true), point(4, true), point(7, false)];
         points[1].period = Some(0.02);
         let texts = |points: &[Point], texts: &[&str]| {
-            let svg = intervals(points, &Look::default()).unwrap().svg();
+            let svg = intervals(points, &[], &Look::default()).unwrap().svg();
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
         };
         assert!(texts(
@@ -167,6 +178,6 @@ mod tests {
             periods: None,
             ..point(1, false)
         };
-        assert!(intervals(&[still, point(1, true)], &Look::default()).is_none());
+        assert!(intervals(&[still, point(1, true)], &[], &Look::default()).is_none());
     }
 }

@@ -1,7 +1,7 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
 use super::picture::{Anchor, Picture};
-use super::style::{Dot, Fill, Ink, LEGEND_TEXT, Stroke, text_width};
+use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, LEGEND_TEXT, Stroke, hollow, text_width};
 
 /// Width of a line or a patch, and of a dot.
 const MARK: f64 = 26.0;
@@ -22,6 +22,8 @@ pub(super) enum Mark {
     Ring(Ink, Ink, f64, f64),
     /// A dot with an error bar.
     Bar(Dot),
+    /// The hollow mark of another directory, by its number.
+    Hollow(usize),
     Line(Stroke),
     Patch(Fill),
 }
@@ -39,7 +41,7 @@ fn width((mark, text): &Entry) -> f64 {
 
 const fn mark_width(mark: Mark) -> f64 {
     match mark {
-        Mark::Dot(_) | Mark::Ring(..) | Mark::Bar(_) => DOT,
+        Mark::Dot(_) | Mark::Ring(..) | Mark::Bar(_) | Mark::Hollow(_) => DOT,
         Mark::Line(_) | Mark::Patch(_) => MARK,
     }
 }
@@ -100,6 +102,7 @@ fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
             sheet.line(ends, Stroke::solid(dot.ink, 1.6));
             sheet.discs([centre], dot);
         }
+        Mark::Hollow(other) => sheet.line(hollow(other, centre), Stroke::solid(BLACK, BAR_WIDTH)),
         Mark::Line(stroke) => sheet.line(vec![(start, middle), (end, middle)], stroke),
         Mark::Patch(fill) => sheet.rectangle([start, middle - 6.0, MARK, 12.0], fill),
     }

@@ -42,8 +42,8 @@ pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 use self::quantity::Quantity;
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
-    EdgeRow, SetRow, SlipOfSet, TriggerRow, WRITER, advise, means_of_slips, read_optional,
-    read_reduced, read_sets, sample_of_slips, swept,
+    BackboneBin, EdgeRow, Point, SetRow, SlipOfSet, TriggerRow, WRITER, advise, means_of_slips,
+    read_optional, read_reduced, read_sets, sample_of_slips, swept,
 };
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
@@ -51,6 +51,7 @@ use crate::results::{Results, ResultsError};
 use crate::sets::{Digits, label, symbol_of};
 use crate::table::Table;
 use anyhow::Result;
+use std::ops::Range;
 use std::path::PathBuf;
 
 /// What was asked of a figure that cannot be drawn so: the flag, and what to do.
@@ -81,10 +82,51 @@ pub const STANDING: &[&str] = &[
 const MAX_SETS: usize = 100_000;
 const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 
+/// Another directory, of which figures show results as hollow marks.
+#[derive(Clone, Debug)]
+pub struct Other {
+    name: String,
+    sets: Vec<SetRow>,
+    points: Vec<Point>,
+    bins: Vec<BackboneBin>,
+}
+
+impl Other {
+    /// Reads a directory whose reduced data are up to date.
+    pub fn read(results: &Results<'_>) -> Result<Self> {
+        let layout = results.layout();
+        Ok(Self {
+            name: results.sweep().name().to_owned(),
+            sets: sets_with_results(layout).map_err(advise(ADVICE))?,
+            points: read(layout)?,
+            bins: read(layout)?,
+        })
+    }
+}
+
+/// Sets followed by those of other directories, and which these are, by the names of their directories.
+fn with_others(
+    mut sets: Vec<SetRow>,
+    others: &[Other],
+) -> (Vec<SetRow>, Vec<(String, Range<usize>)>) {
+    let mut ranges = Vec::new();
+    for other in others {
+        let begin = sets.len();
+        sets.extend(other.sets.iter().cloned());
+        ranges.push((other.name.clone(), begin..sets.len()));
+    }
+    (sets, ranges)
+}
+
 /// Draws the figures of a results directory into `figures/`, each in these formats: those whose data are there.
 ///
 /// Returns the files, in the order in which they were written.
-pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
+pub fn draw_all(
+    layout: &Layout<'_>,
+    others: &[Other],
+    look: &Look,
+    formats: &[Format],
+) -> Result<Vec<PathBuf>> {
     let _alone = exclusive_lock(layout, WRITER)?;
     let points = read(layout)?;
     let mut sets = sets_with_results(layout).map_err(advise(ADVICE))?;
@@ -92,8 +134,8 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     sets.retain(|set| set.parameters.pulse_start.is_none());
     let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, look));
-    pictures.extend(intervals::intervals(&points, look));
+    pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, others, look));
+    pictures.extend(intervals::intervals(&points, others, look));
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
@@ -105,7 +147,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
                 .is_some_and(|second| second.distinct.len() > INKS.len())
         };
         if sets.len() > 1 && !(map.is_some() && is_net()) {
-            pictures.extend(overview::overview(&sets, look));
+            pictures.extend(overview::overview(&sets, others, look));
         }
         pictures.extend(map);
     }
@@ -117,17 +159,22 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
     }
     if pictures.is_empty() {
-        pictures.extend(overview::overview(&sets, look));
+        pictures.extend(overview::overview(&sets, others, look));
     }
     write(layout, &pictures, look, formats)
 }
 
 /// Draws a custom figure of the sets or slips of a results directory; writes nothing.
-pub fn draw_custom(results: &Results<'_>, figure: &CustomFigure, look: &Look) -> Result<Picture> {
+pub fn draw_custom(
+    results: &Results<'_>,
+    others: &[Other],
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture> {
     let sets = read_sets(results.layout()).collect::<Result<Vec<_>, _>>();
     let sets = sets.map_err(advise(ADVICE))?;
     let picture = match figure.of {
-        Dots::Sets => draw_sets(results, sets, figure, look),
+        Dots::Sets => draw_sets(results, sets, others, figure, look),
         Dots::Slips => draw_slips(results, &sets, figure, look),
     }?;
     check_size(&picture, look)?;
@@ -136,25 +183,31 @@ pub fn draw_custom(results: &Results<'_>, figure: &CustomFigure, look: &Look) ->
 
 fn draw_sets(
     results: &Results<'_>,
-    mut sets: Vec<SetRow>,
+    mut own: Vec<SetRow>,
+    others: &[Other],
     figure: &CustomFigure,
     look: &Look,
 ) -> Result<Picture> {
+    let mut others = others.to_vec();
     if let Some(condition) = figure.condition::<SetRow>()? {
-        if !sets.iter().any(|set| condition.holds(set)) {
-            return Err(figure.unmatched(&condition, &sets).into());
+        if !own.iter().any(|set| condition.holds(set)) {
+            return Err(figure.unmatched(&condition, &own).into());
         }
-        sets.retain(|set| condition.holds(set));
+        let all = others.iter_mut().map(|other| &mut other.sets);
+        all.chain([&mut own])
+            .for_each(|sets| sets.retain(|set| condition.holds(set)));
     }
+    let common = common(own.iter().map(|set| &*set.parameters));
+    let swept = swept(&own);
+    let (sets, others) = with_others(own, &others);
     let quantity = |option, name: &str| {
         Quantity::of(&sets, option, name).or_else(|unknown| {
             let mean = means_of_slips(results, &sets, name)?.ok_or(unknown)?;
             Ok(Quantity::of_values(option, mean))
         })
     };
-    let common = common(sets.iter().map(|set| &*set.parameters));
     let look = look.with_note(&(common + &figure.shown_condition()));
-    custom::custom(&quantity, &sets, &swept(&sets), figure, &look)
+    custom::custom(&quantity, &sets, others, &swept, figure, &look)
 }
 
 fn draw_slips(
@@ -178,7 +231,7 @@ fn draw_slips(
     let condition = figure.shown_condition();
     let look = look.with_note(&format!("{common}{condition}; {part}{matching} slips"));
     let quantity = |option, name: &str| Ok(Quantity::of(&slips, option, name)?);
-    custom::custom(&quantity, &[], &swept(sets), figure, &look)
+    custom::custom(&quantity, &[], Vec::new(), &swept(sets), figure, &look)
 }
 
 /// Puts a figure into `figures/`, in these formats.
@@ -294,15 +347,16 @@ pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
 mod tests {
     use super::quantity::tests::set;
     use super::*;
-    use crate::reduce::{BackboneBin, HistogramBin, Point, SetRow};
+    use crate::reduce::HistogramBin;
     use crate::table::Table;
+    use crate::table::arrow::Gaps;
     use crate::table::file::{Footer, TableWriter};
     use crate::table::storage::{Disk, Storage};
     use std::fs;
 
     fn write_rows<R: Table>(layout: &Layout<'_>, rows: &[R]) {
         let file = Disk.create(&layout.reduced_file(R::NAME)).unwrap();
-        let mut writer = TableWriter::new(&[], file, &Footer::default()).unwrap();
+        let mut writer = TableWriter::new(&Gaps::default(), file, &Footer::default()).unwrap();
         for row in rows {
             writer.push(row).unwrap();
         }
@@ -339,7 +393,7 @@ mod tests {
     #[test]
     fn figures_are_byte_identical_when_drawn_again() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
-        let files = draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap();
+        let files = draw_all(&layout, &[], &Look::default(), &Format::DEFAULT).unwrap();
         let names: Vec<_> = files
             .iter()
             .map(|file| file.file_name().unwrap().to_string_lossy().into_owned())
@@ -361,7 +415,7 @@ mod tests {
         };
         let before = bytes();
         assert_eq!(
-            draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap(),
+            draw_all(&layout, &[], &Look::default(), &Format::DEFAULT).unwrap(),
             files
         );
         assert!(bytes() == before);
@@ -379,14 +433,14 @@ mod tests {
             ..Look::default()
         };
         let drawn = || {
-            let files = draw_all(&layout, &look, &[Format::Pdf]).unwrap();
+            let files = draw_all(&layout, &[], &look, &[Format::Pdf]).unwrap();
             fs::read(&files[0]).unwrap()
         };
         let pdf = drawn();
         assert!(pdf.starts_with(b"%PDF-") && pdf.trim_ascii_end().ends_with(b"%%EOF"));
         assert!(drawn() == pdf);
         let svg =
-            fs::read_to_string(&draw_all(&layout, &look, &[Format::Svg]).unwrap()[0]).unwrap();
+            fs::read_to_string(&draw_all(&layout, &[], &look, &[Format::Svg]).unwrap()[0]).unwrap();
         assert!(svg.contains(r#"width="86.00mm""#), "{}", &svg[..200]);
     }
 
@@ -396,6 +450,7 @@ mod tests {
         let drawn = |width, height| {
             draw_all(
                 &layout,
+                &[],
                 &Look {
                     size: Some(Size { width, height }),
                     ..Look::default()
@@ -421,7 +476,7 @@ mod tests {
         };
         let (_root, layout) = reduced(&[still]);
         assert!(
-            draw_all(&layout, &Look::default(), &Format::DEFAULT)
+            draw_all(&layout, &[], &Look::default(), &Format::DEFAULT)
                 .unwrap()
                 .is_empty()
         );

@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, MAX_COLUMNS};
 use super::quantity::Quantity;
-use super::{Look, Picture};
+use super::{Look, Other, Picture, with_others};
 use crate::observe::Regime;
 use crate::reduce::{SetRow, swept};
 
@@ -19,16 +19,19 @@ const QUANTITIES: [&str; 5] = [
 
 /// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third
 /// panels. A single set is a dot over its velocity. `None` if nothing was found.
-pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
-    let swept = swept(rows);
+/// Sets of other directories are hollow marks.
+pub(super) fn overview(own: &[SetRow], others: &[Other], look: &Look) -> Option<Picture> {
+    let swept = swept(own);
+    let (rows, others) = with_others(own.to_vec(), others);
+    let rows = &rows[..];
     let quantity = |place: usize, option| Quantity::of(rows, option, swept.get(place)?.name()).ok();
     let x = quantity(0, "x").or_else(|| Quantity::of(rows, "x", "V0").ok())?;
     let shown = |y: &Quantity<'_>| -> Vec<usize> {
-        (0..rows.len())
+        (0..own.len())
             .filter(|&set| x.has(set) && y.has(set))
             .collect()
     };
-    let is_plain = rows.iter().all(|row| row.regime == Some(Regime::StickSlip));
+    let is_plain = own.iter().all(|row| row.regime == Some(Regime::StickSlip));
     let ys: Vec<Quantity<'_>> = QUANTITIES
         .into_iter()
         .filter(|name| !is_plain || *name != "slip_share")
@@ -55,6 +58,7 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     Chart {
         of: "sets",
         sets: rows,
+        others,
         swept: &swept,
         x,
         ys,
@@ -79,7 +83,7 @@ mod tests {
     }
 
     fn overview_of(sets: &[SetRow]) -> String {
-        overview(sets, &Look::default()).unwrap().svg()
+        overview(sets, &[], &Look::default()).unwrap().svg()
     }
 
     #[test]
@@ -115,7 +119,7 @@ mod tests {
             overview_of(&sets[..1]).contains("Drive velocity V₀"),
             "a single set"
         );
-        assert!(overview(&[], &Look::default()).is_none());
+        assert!(overview(&[], &[], &Look::default()).is_none());
     }
 
     #[test]

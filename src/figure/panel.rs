@@ -5,7 +5,7 @@ use super::frame::{Cell, Ends, Frame, HEADING, Layout, Place};
 use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::Entry;
 use super::picture::Picture;
-use super::style::{Dot, Fill, Ink, Look, Stroke};
+use super::style::{BAR_WIDTH, Dot, Fill, Ink, Look, Stroke, hollow};
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 
@@ -22,6 +22,8 @@ pub(super) enum Layer<'a> {
     Stripe(Ends, Fill),
     /// The points that lie inside the frame.
     Dots(Vec<Place>, Dot),
+    /// The hollow marks of another directory, by its number, where they lie inside the frame.
+    Hollow(Vec<Place>, usize, Ink),
     /// An upright bar between two values at each x; what lies under a logarithmic axis runs out of the frame.
     Bars(Vec<(f64, Ends)>, Stroke),
     /// Cells, each in its own colour, and by how much they reach under their neighbours.
@@ -65,6 +67,14 @@ impl Layer<'_> {
                 let centres: Vec<Place> = inside.map(|point| frame.place(point)).collect();
                 if !centres.is_empty() {
                     sheet.discs(centres, dot);
+                }
+            }
+            Self::Hollow(points, other, ink) => {
+                for point in points {
+                    if frame.x.contains(point.0) && frame.y.contains(point.1) {
+                        let outline = hollow(other, frame.place(point));
+                        sheet.line(outline, Stroke::solid(ink, BAR_WIDTH));
+                    }
                 }
             }
             Self::Bars(bars, stroke) => {

@@ -1,5 +1,6 @@
 //! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and the mean of each column.
 
+use super::Other;
 use super::axis::{Axis, angle_bounds, bounds};
 use super::frame::{Cell, Ends, Layout, OVERLAP, Place};
 use super::hues::ColourBar;
@@ -7,7 +8,7 @@ use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::style::{
-    BAR_WIDTH, BLUE, Dot, Ink, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
+    BAR_WIDTH, BLACK, BLUE, Dot, Ink, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
 };
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point};
@@ -45,18 +46,24 @@ struct Column {
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
-pub(super) fn phase_eta(points: &[Point], bins: &[BackboneBin], look: &Look) -> Option<Picture> {
-    let slips: Vec<Place> = points
-        .iter()
-        .filter_map(|point| Some((point.eta, point.phase?)).filter(|_| point.eta > 0.0))
-        .collect();
+/// Means of other directories are hollow marks.
+pub(super) fn phase_eta(
+    points: &[Point],
+    bins: &[BackboneBin],
+    others: &[Other],
+    look: &Look,
+) -> Option<Picture> {
+    let slips = phases(points);
+    let means_of = |other: &Other| averages(&other.bins, &columns(&phases(&other.points), 4.0));
+    let of_others: Vec<_> = others.iter().map(means_of).collect();
     let columns = columns(&slips, PER_DECADE[usize::from(bins.is_empty())]);
     let cells: Vec<(Cell, f64)> = columns.iter().flat_map(cells).collect();
     let (least, most) = bounds(cells.iter().map(|cell| cell.1))?;
     let shades = Axis::logarithmic("density (1/rad)", least, most.max(10.0 * least));
     let averages = averages(bins, &columns);
-    let low = columns.first()?.edges.0;
-    let high = columns.last()?.edges.1;
+    let etas = of_others.iter().flatten().map(|mean| mean.0);
+    let ends = [columns.first()?.edges.0, columns.last()?.edges.1];
+    let (low, high) = bounds(etas.chain(ends))?;
     let x = Axis::logarithmic(&label("eta").axis(""), low, high);
     let has_curves = x.high > 1.0;
     let entries = [
@@ -70,8 +77,9 @@ pub(super) fn phase_eta(points: &[Point], bins: &[BackboneBin], look: &Look) -> 
         (x.contains(1.0), Mark::Line(REFERENCE), "η = 1"),
     ];
     let shown = entries.into_iter().filter(|(is_shown, ..)| *is_shown);
-    let entries: Vec<Entry> = shown.map(|(_, mark, text)| entry(mark, text)).collect();
-    let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
+    let mut entries: Vec<Entry> = shown.map(|(_, mark, text)| entry(mark, text)).collect();
+    let angles = of_others.iter().flatten().map(|mean| mean.1);
+    let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1).chain(angles));
     let curve = |phase: fn(f64) -> Option<f64>| {
         let etas = x.evenly_placed(CURVE_POINTS).into_iter();
         let modulated = etas.filter(|&eta| eta >= 1.0);
@@ -96,6 +104,13 @@ pub(super) fn phase_eta(points: &[Point], bins: &[BackboneBin], look: &Look) -> 
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
+    for (number, (other, means)) in others.iter().zip(&of_others).enumerate() {
+        entries.push(entry(Mark::Hollow(number), &other.name));
+        let bars = means.iter().map(|&(eta, _, ends)| (eta, ends)).collect();
+        let places = means.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
+        layers.push(Layer::Bars(bars, Stroke::solid(BLACK, BAR_WIDTH)));
+        layers.push(Layer::Hollow(places, number, BLACK));
+    }
     let bar = Some(ColourBar::of_axis(&shades, cell_shade));
     let panel = Panel {
         bar,
@@ -103,6 +118,12 @@ pub(super) fn phase_eta(points: &[Point], bins: &[BackboneBin], look: &Look) -> 
     };
     let layout = Layout::column(WIDTH);
     Some(panel::draw(NAME, look, layout, &entries, vec![panel]))
+}
+
+/// η and phase of slips under modulation.
+fn phases(points: &[Point]) -> Vec<Place> {
+    let place = |point: &Point| Some((point.eta, point.phase?)).filter(|_| point.eta > 0.0);
+    points.iter().filter_map(place).collect()
 }
 
 /// The middle of the η of each column's slips, their mean phase in rad, and its interval, unless that is the whole turn.

@@ -1,6 +1,7 @@
 //! The look of all figures: paper, font, sizes of text, strokes, dots, colours. Lengths on a sheet are units; a style
 //! says how long a unit is. Text has the same size in every figure, whatever the size of the sheet.
 
+use super::frame::Place;
 use crate::table::value::{floored, words};
 use std::fmt;
 use std::sync::LazyLock;
@@ -252,6 +253,32 @@ pub(super) const STRIPE: Fill = Fill {
 };
 /// Radius of the dots of statistics.
 pub(super) const RADIUS: f64 = 4.2;
+
+/// Corners of the hollow marks of other directories, in radii: a square, a diamond, a triangle.
+const CORNERS: [&[Place]; 3] = [
+    &[
+        (-0.9, -0.9),
+        (0.9, -0.9),
+        (0.9, 0.9),
+        (-0.9, 0.9),
+        (-0.9, -0.9),
+    ],
+    &[
+        (0.0, -1.3),
+        (1.3, 0.0),
+        (0.0, 1.3),
+        (-1.3, 0.0),
+        (0.0, -1.3),
+    ],
+    &[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8), (0.0, -1.2)],
+];
+
+/// The outline, at a place of a sheet, of the mark of another directory by its number.
+pub(super) fn hollow(other: usize, (x, y): Place) -> Vec<Place> {
+    let corners = CORNERS[other % CORNERS.len()].iter();
+    let corner = |(right, down)| (x + RADIUS * right, y + RADIUS * down);
+    corners.copied().map(corner).collect()
+}
 
 /// The part of the drive alone of data in this ink.
 pub(super) const fn drive_alone(ink: Ink) -> Stroke {

@@ -77,7 +77,10 @@ impl<T: Field> Row for T {
 
     fn from_cells<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         let cell = next();
-        T::from_value(cell).ok_or_else(|| format!("column {name} cannot hold {cell:?}"))
+        let unknown = || T::UNKNOWN.filter(|_| cell == Value::Null);
+        T::from_value(cell)
+            .or_else(unknown)
+            .ok_or_else(|| format!("column {name} cannot hold {cell:?}"))
     }
 }
 

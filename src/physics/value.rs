@@ -132,6 +132,8 @@ pub trait Field: Sized {
     const NULLABLE: bool = false;
     /// The words that it can be, if it is one.
     const WORDS: &'static [&'static str] = &[];
+    /// What stands for a value that is not known, if anything does.
+    const UNKNOWN: Option<Self> = None;
 
     fn value(&self) -> Value<'static>;
 
@@ -141,9 +143,10 @@ pub trait Field: Sized {
 
 /// Types of fields: their kind, and how they are read from values.
 macro_rules! field_types {
-    ($($type:ty as $kind:ident($own:ident => $held:expr) from $value:ident => $read:expr;)*) => {$(
+    ($($type:ty as $kind:ident, $unknown:expr, ($own:ident => $held:expr) from $value:ident => $read:expr;)*) => {$(
         impl Field for $type {
             const KIND: Kind = Kind::$kind;
+            const UNKNOWN: Option<Self> = Some($unknown);
 
             fn value(&self) -> Value<'static> {
                 let $own = *self;
@@ -158,15 +161,15 @@ macro_rules! field_types {
 }
 
 field_types! {
-    f64 as Real(own => own) from value => value.number();
-    u64 as Count(own => own) from value => match value {
+    f64 as Real, Self::NAN, (own => own) from value => value.number();
+    u64 as Count, 0, (own => own) from value => match value {
         Value::Count(count) => Some(count),
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked by the guard")]
         Value::Real(real) if (0.0..=MAX_EXACT).contains(&real) && real.fract() == 0.0 => Some(real as Self),
         _ => None,
     };
-    usize as Count(own => own as u64) from value => u64::from_value(value)?.try_into().ok();
-    bool as Flag(own => own) from value => if let Value::Flag(flag) = value { Some(flag) } else { None };
+    usize as Count, 0, (own => own as u64) from value => u64::from_value(value)?.try_into().ok();
+    bool as Flag, false, (own => own) from value => if let Value::Flag(flag) = value { Some(flag) } else { None };
 }
 
 impl<T: Field> Field for Option<T> {

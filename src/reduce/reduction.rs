@@ -11,10 +11,11 @@ use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
 use super::triggers::{note_delays, trigger_rows};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
-use crate::results::tables::JOBS;
+use crate::results::tables::{JOBS, gaps};
 use crate::results::{ErrorKind, Results, ResultsError};
 use crate::sets::SetRow;
 use crate::sweep::{Goal, Precision, Sweep, Target};
+use crate::table::arrow::Gaps;
 use crate::table::checksum::hexadecimal;
 use crate::table::columns::{Row, columns};
 use crate::table::file::{DataFile, Dataset, Footer, TableWriter};
@@ -105,8 +106,11 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
         footer,
     };
     let rounds = RoundsOfSets::of(results);
-    let mut set_writer = staged.begin::<SetInRounds>(&rounds.left_out())?;
-    let mut histogram_writer = staged.begin::<HistogramBin>(&[])?;
+    let mut set_writer = staged.begin::<SetInRounds>(&Gaps {
+        left_out: rounds.left_out(),
+        ..gaps(results.sweep())
+    })?;
+    let mut histogram_writer = staged.begin::<HistogramBin>(&Gaps::default())?;
     let mut triggers = Vec::new();
     let mut pooled = Backbone::default();
     let mut kept = Vec::new();
@@ -159,18 +163,14 @@ struct Staged<'r, 'a> {
 }
 
 impl Staged<'_, '_> {
-    /// Begins a table without the columns of these names.
-    fn begin<R: Table>(
-        &mut self,
-        left_out: &[Cow<'static, str>],
-    ) -> Result<TableWriter<R>, ResultsError> {
+    fn begin<R: Table>(&mut self, gaps: &Gaps) -> Result<TableWriter<R>, ResultsError> {
         let file = self.layout.reduced_file(R::NAME);
         let footer = self.footer.clone().at(&file);
-        TableWriter::new(left_out, self.commit.stage(&file)?, &footer)
+        TableWriter::new(gaps, self.commit.stage(&file)?, &footer)
     }
 
     fn write<R: Table>(&mut self, rows: impl IntoIterator<Item = R>) -> Result<(), ResultsError> {
-        let mut writer = self.begin(&[])?;
+        let mut writer = self.begin(&Gaps::default())?;
         for row in rows {
             writer.push(&row)?;
         }
@@ -499,7 +499,8 @@ mod tests {
             let path = layout.table("slips").join(&name);
             let file = Disk.create(&path).unwrap();
             let mut slip_writer =
-                TableWriter::<SlipRow<'_>>::new(&[], file, &Footer::default()).unwrap();
+                TableWriter::<SlipRow<'_>>::new(&Gaps::default(), file, &Footer::default())
+                    .unwrap();
             let labels: Vec<JobLabel<DriveAndSeed>> = (0..3)
                 .map(|set| label(set, seed, [0.0, 1e-6, 2e-6][set as usize]))
                 .collect();
@@ -518,7 +519,7 @@ mod tests {
                 let path = layout.table("jobs").join(&name);
                 let file = Disk.create(&path).unwrap();
                 let mut job_writer =
-                    TableWriter::<JobRow>::new(&[], file, &Footer::default()).unwrap();
+                    TableWriter::<JobRow>::new(&Gaps::default(), file, &Footer::default()).unwrap();
                 for (job, result) in labels.iter().zip(&measured) {
                     job_writer
                         .push(&(relabel(job), JobRecord::new(Ok(result))))

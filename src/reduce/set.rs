@@ -113,16 +113,16 @@ impl SetSlips {
 }
 
 fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) {
-    let drops = sequences(jobs, |slip| Some([slip.drop])).estimate();
+    let drops = sequences(jobs, |slip| Some([non_nan(slip.drop)?])).estimate();
     // A longer interval ends at a force that is higher by the additional drop.
     let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_mean(&drops));
     row.drop_mean = drops.value();
     row.drop_interval = drops.interval_with(unseen);
-    let peak_forces = sequences(jobs, |slip| Some([slip.peak_force])).estimate();
+    let peak_forces = sequences(jobs, |slip| Some([non_nan(slip.peak_force)?])).estimate();
     row.peak_force_mean = peak_forces.value();
     row.peak_force_interval = peak_forces.interval_with(unseen);
     let square = drops.square_of_deviation();
-    let squares = sequences(jobs, |slip| Some([square(slip.drop)])).estimate();
+    let squares = sequences(jobs, |slip| Some([square(non_nan(slip.drop)?)])).estimate();
     let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&drops));
     (row.drop_deviation, row.drop_deviation_interval) = squares.deviation(unseen);
 }

@@ -139,7 +139,7 @@ impl Results<'_> {
 
     /// The columns of a table, all that were swept, and whether a row belongs to a control.
     fn exported_columns(&self, table: &str) -> Vec<FieldRef> {
-        let own = recorded_schema(table, self.sweep().recording());
+        let own = recorded_schema(table, self.sweep());
         let extensions = self.extensions().iter();
         let swept = extensions.flat_map(|extension| extension.sweep.swept());
         let swept: HashSet<&str> = swept.collect();
@@ -179,15 +179,15 @@ pub struct JoinedTable<'a> {
 impl<'a> JoinedTable<'a> {
     /// All columns that a table can have: its own, those of the jobs, and `control`.
     pub fn columns(results: &Results<'_>, table: &str) -> Vec<FieldRef> {
-        let own = recorded_schema(table, results.sweep().recording());
-        let others = [schema::<JobRow>(), schema::<OfSet>()];
+        let own = recorded_schema(table, results.sweep());
+        let others = [recorded_schema(JOBS, results.sweep()), schema::<OfSet>()];
         let others = others.iter().flat_map(|schema| schema.fields());
         let others = others.filter(|field| own.field_with_name(field.name()).is_err());
         own.fields().iter().chain(others).cloned().collect()
     }
 
     pub fn new(results: &'a Results<'a>, table: &'static str, columns: &[FieldRef]) -> Self {
-        let recorded = recorded_schema(table, results.sweep().recording());
+        let recorded = recorded_schema(table, results.sweep());
         let names = columns.iter().map(|field| field.name().clone());
         let (mut own, mut of_jobs): (Vec<_>, Vec<_>) =
             names.partition(|name| recorded.field_with_name(name).is_ok());

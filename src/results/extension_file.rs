@@ -61,7 +61,7 @@ struct Format {
 
 fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
     let columns = |table: &str| {
-        let schema = recorded_schema(table, sweep.recording());
+        let schema = recorded_schema(table, sweep);
         let names = schema.fields().iter().map(|field| field.name().clone());
         (table.to_owned(), names.collect())
     };

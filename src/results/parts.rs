@@ -12,6 +12,7 @@ use crate::results::tables::{
 use crate::results::workers::Member;
 use crate::sweep::{Job, Outline, Part, PartName};
 use crate::table::Table;
+use crate::table::arrow::Gaps;
 use crate::table::columns::columns;
 use crate::table::error::ResultsError;
 use crate::table::file::{Batch, DataFile, Dataset, Footer, TableWriter};
@@ -77,20 +78,20 @@ impl<'a> Results<'a> {
         let labels: Vec<JobLabel<DriveAndSeed>> = part.jobs.iter().map(label).collect();
         let outcomes = (0..).map(|position| outcomes.get(&position));
         let jobs: Jobs<'_> = labels.iter().zip(outcomes).collect();
-        let left_out = sweep.recording().left_out();
+        let gaps = tables::gaps(sweep);
         let encoded = |table| {
             let file = self.file_in(place, table, part.name);
             let kept = &kept[table];
             match table {
-                tables::SLIPS => encoded(file, &left_out, &jobs, kept, |job, outcome| {
+                tables::SLIPS => encoded(file, &gaps, &jobs, kept, |job, outcome| {
                     let slips = outcome.iter().flat_map(|measured| &measured.slips);
                     slips.map(move |slip| (Cow::Borrowed(job), Cow::Borrowed(slip)))
                 }),
-                tables::PRECURSORS => encoded(file, &left_out, &jobs, kept, |job, outcome| {
+                tables::PRECURSORS => encoded(file, &gaps, &jobs, kept, |job, outcome| {
                     let precursors = outcome.iter().flat_map(|measured| &measured.precursors);
                     precursors.map(move |precursor| (Cow::Borrowed(job), Cow::Borrowed(precursor)))
                 }),
-                _ => encoded(file, &left_out, &jobs, kept, |job, outcome| {
+                _ => encoded(file, &gaps, &jobs, kept, |job, outcome| {
                     let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
                     let row: JobRow = (relabel(job), record);
                     [row]
@@ -157,13 +158,13 @@ type Jobs<'a> = Vec<(&'a JobLabel<DriveAndSeed>, Option<&'a Outcome>)>;
 /// The bytes of a file of one table.
 fn encoded<'j, R: Table, Rows: IntoIterator<Item = R>>(
     file: DataFile,
-    left_out: &[Cow<'static, str>],
+    gaps: &Gaps,
     jobs: &Jobs<'j>,
     kept: &KeptRows,
     rows: impl Fn(&'j JobLabel<DriveAndSeed>, &'j Outcome) -> Rows,
 ) -> Result<(PathBuf, Vec<u8>), ResultsError> {
     let footer = Footer::default().and(&file.footer).at(&file.path);
-    let mut writer = TableWriter::in_memory(left_out, &file.path, &footer)?;
+    let mut writer = TableWriter::in_memory(gaps, &file.path, &footer)?;
     for (job, outcome) in jobs {
         match outcome {
             Some(outcome) => {

@@ -6,8 +6,8 @@
 use crate::model::{Parameters, Selected, Selection, Symbol};
 use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
 use crate::sweep::Sweep;
-use crate::table::arrow::RowBuffer;
-use crate::table::columns::columns;
+use crate::table::arrow::{Gaps, RowBuffer};
+use crate::table::columns::{Row as _, columns};
 use crate::table::value::words;
 use crate::table::{Table, tables};
 use arrow_schema::SchemaRef;
@@ -95,14 +95,29 @@ pub fn tables_of(recording: &Recording) -> impl DoubleEndedIterator<Item = &'sta
         .filter(move |table| has_precursors || *table != PRECURSORS)
 }
 
-/// The columns of the table of this name, with units and meanings, as a recording has it.
-pub fn recorded_schema(table: &str, recording: &Recording) -> SchemaRef {
+/// In what the tables of a sweep have not all that their row types describe.
+pub fn gaps(sweep: &Sweep) -> Gaps {
+    let parameters = sweep.unknown().iter();
+    let mut unknown: Vec<_> = parameters.map(|symbol| symbol.key().into()).collect();
+    if let Some(measured) = sweep.measured() {
+        let mut others = [Slip::names(), JobRecord::names()].concat();
+        others.retain(|name| !measured.has(name));
+        unknown.extend(others);
+    }
+    Gaps {
+        left_out: sweep.recording().left_out(),
+        unknown,
+    }
+}
+
+/// The columns of the table of this name, with units and meanings, as a sweep has it.
+pub fn recorded_schema(table: &str, sweep: &Sweep) -> SchemaRef {
     let buffer = match table {
         SLIPS => RowBuffer::new::<SlipRow<'_>>(),
         PRECURSORS => RowBuffer::new::<PrecursorRow<'_>>(),
         _ => RowBuffer::new::<JobRow>(),
     };
-    SchemaRef::clone(buffer.without(&recording.left_out()).schema())
+    SchemaRef::clone(buffer.with(&gaps(sweep)).schema())
 }
 
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> JobLabel<S> {

@@ -144,6 +144,9 @@ impl Axis {
         let begin = table.sorted.partition_point(|row| order(row).is_lt());
         let found = table.sorted[begin..].iter();
         let found = found.take_while(|row| order(row).is_eq());
+        let mut columns = table.columns.iter();
+        let period = columns.find(|column| column.quantity.is_period());
+        let found = found.filter(|row| period.is_none_or(|of| of.compare(**row, wanted).is_eq()));
         let seed = |row: &u32| u64::from_value(seeds.values[*row as usize]);
         Some(found.filter_map(seed).take(most).collect())
     }

@@ -98,7 +98,7 @@ pub(super) fn whole(
     if let Some((quantity, problem)) = sweep.twins().filter(|_| is_new) {
         return Err(places.refuse(quantity, problem));
     }
-    points(sweep, places, is_new)?;
+    points(sweep, places, is_new && sweep.measured.is_none())?;
     let Some((_, first)) = sweep.admitted(0..sweep.point_count()).next() else {
         return Err(file.source.refuse(
             file.place_of("where"),

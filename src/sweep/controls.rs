@@ -103,9 +103,11 @@ impl Plan<'_> {
                 .all(|sweep| sweep.find_set_in_grid(set).is_none())
     }
 
-    /// Id of the set that is the control of a modulated one; `None` if no sweep has asked for controls.
+    /// Id of the set that is the control of a modulated one, if it was measured: `None` if no sweep has asked for
+    /// controls.
     pub fn control_of(self, set: &Parameters) -> Option<String> {
-        let sweep = self.sweeps().find(|sweep| sweep.controls.is_some())?;
+        let has_controls = |sweep: &&Sweep| sweep.controls.is_some() || sweep.measured.is_some();
+        let sweep = self.sweeps().find(has_controls)?;
         (set.modulation_amplitude > 0.0).then(|| sweep.set_id(&set.without_modulation()))
     }
 }

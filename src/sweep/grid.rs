@@ -9,6 +9,7 @@ use super::axes::Axis;
 use super::cost::predicted_cost;
 use super::expression::Expression;
 use super::job::{Identity, Job, settings, solver_settings};
+use super::measured::Measured;
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
 use crate::model::theory::to_twelve_digits;
@@ -34,6 +35,7 @@ pub struct Sweep {
     pub(super) identity: Identity,
     pub(super) rounds: Option<Rounds>,
     pub(super) controls: Option<Box<Self>>,
+    pub(super) measured: Option<Measured>,
     /// In a sweep of controls, the sets that are run, in order; `None`: all.
     pub(super) needed: Option<Vec<u64>>,
     pub(super) plan_version: u32,
@@ -55,6 +57,16 @@ impl Sweep {
 
     pub const fn solver(&self) -> Solver {
         self.solver
+    }
+
+    /// Where its slips come from, if they were not computed.
+    pub const fn measured(&self) -> Option<&Measured> {
+        self.measured.as_ref()
+    }
+
+    /// Parameters that nobody knows, as slips were measured.
+    pub fn unknown(&self) -> &[Symbol] {
+        &self.base.unknown
     }
 
     /// Each axis in grid order: the keys that it moves, joined by commas, and its number of rows.
@@ -166,8 +178,9 @@ impl Sweep {
 
     /// This sweep with the ids that a program of other versions gave.
     pub fn with_ids_of(mut self, model_version: u32, rng_scheme: &str) -> Self {
-        self.identity =
+        let identity =
             Identity::of_versions(model_version, rng_scheme, self.solver, &self.recording);
+        self.identity = identity.of(self.measured.as_ref());
         self
     }
 
@@ -256,11 +269,16 @@ impl Sweep {
         let mut values = vec![name];
         values.extend(Symbol::ALL.into_iter().filter(is_fixed).map(parameter));
         values.extend(settings(self.solver, &self.recording));
+        if let Some(measured) = &self.measured {
+            let files = measured.files.join(", ");
+            values.push(("measured.command".to_owned(), measured.command.clone()));
+            values.push(("measured.files".to_owned(), files));
+        }
         values
     }
 
     /// Whether an axis sets a parameter; T also through η or the frequency.
-    fn moves(&self, symbol: Symbol) -> bool {
+    pub(super) fn moves(&self, symbol: Symbol) -> bool {
         self.axes.iter().flat_map(Axis::quantities).any(|quantity| {
             quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period())
         })

@@ -4,6 +4,7 @@
 //! recording and parameters that is not at its default, parameters with their exact bits: never over the place in a
 //! grid. So keys that are added later change no id. Contract: pinned by known-answer tests, and so are the defaults.
 
+use super::measured::Measured;
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Solver, SolverKey};
@@ -81,6 +82,14 @@ impl Identity {
             shared.update(format!("{key}={value}\n"));
         }
         Self { shared }
+    }
+
+    /// The same of what these files hold, if jobs were measured.
+    pub fn of(mut self, measured: Option<&Measured>) -> Self {
+        for file in measured.iter().flat_map(|measured| &measured.files) {
+            self.shared.update(format!("measured={file}\n"));
+        }
+        self
     }
 
     /// The id of a job, or of a set, by these of its canonical parameters.

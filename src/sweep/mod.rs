@@ -7,6 +7,7 @@
 //! checks.rs      expression.rs
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: an adaptive sweep, which runs in rounds
+//! measured.rs: where slips come from that were measured
 //! variation.rs: a file with other values, as text
 //! ```
 //!
@@ -22,6 +23,7 @@ mod cost;
 mod expression;
 mod grid;
 mod job;
+mod measured;
 mod plan;
 mod quantity;
 mod read;
@@ -37,6 +39,7 @@ pub use cost::{LARGE, certain_memory, predicted_cost, predicted_memory};
 pub use expression::{Expression, ExpressionError};
 pub use grid::Sweep;
 pub use job::{Identity, Job};
+pub use measured::Measured;
 pub use plan::{
     Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, PartName, Plan, Totals,
 };

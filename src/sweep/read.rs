@@ -9,6 +9,7 @@ use super::checks::{self, Places};
 use super::expression::Expression;
 use super::grid::Sweep;
 use super::job::Identity;
+use super::measured::Measured;
 use super::plan::PLAN_VERSION;
 use super::quantity::{Point, Quantity};
 use super::read_axes;
@@ -16,7 +17,7 @@ use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{Goal, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
 use super::variation::SECTIONS;
-use crate::model::{Parameters, Value};
+use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Solver, SolverKey};
 use crate::table::storage::{Disk, Storage};
@@ -67,7 +68,7 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         at: 0,
         table: &table,
     };
-    file.only(&[&["name", "where"], &SECTIONS[..]].concat())
+    file.only(&[&["name", "where"], &SECTIONS[..], &["measured"]].concat())
         .ok();
     let mut places = Places::new(source);
     let name = read_name(&file);
@@ -75,6 +76,7 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
     let axes = read_section(&file, "[axes]", |axes| read_axes::read(axes, &mut places));
     let recording = read_section(&file, "[record]", read_recording);
     let solver = read_section(&file, "[solver]", read_solver);
+    let measured = read_section(&file, "[measured]", Measured::read);
     let (base, period) = model.ok().flatten().unwrap_or_default();
     let axes = axes.map(|axes| axes.into_iter().flatten());
     let mut axes = axes.map(|axes| period.into_iter().chain(axes).collect::<Vec<Axis>>());
@@ -86,6 +88,7 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
     source.passed()?;
     let recording = recording?.unwrap_or_default();
     let solver = solver?.unwrap_or_default();
+    let measured = measured?;
     let mut sweep = Sweep {
         name: name?,
         text: source.text.to_owned(),
@@ -94,12 +97,19 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         conditions: conditions?,
         recording,
         solver,
-        identity: Identity::new(solver, &recording),
+        identity: Identity::new(solver, &recording).of(measured.as_ref()),
+        measured,
         rounds: rounds?,
         controls: None,
         needed: None,
         plan_version,
     };
+    if sweep.measured.is_some() {
+        // An experiment knows what moves it, and what its file says.
+        let is_known = |symbol: &Symbol| symbol.is_of_modulation() || sweep.moves(*symbol);
+        let unknown = Symbol::ALL.into_iter().filter(|symbol| !is_known(symbol));
+        sweep.base.unknown = unknown.collect();
+    }
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places, is_new)?;
     checks::rounds(&sweep, &file)?;

@@ -90,12 +90,23 @@ pub fn json<R: Row>(row: &R) -> Json {
     object.into()
 }
 
+/// In what a table has not all that its row type describes, by the names of columns.
+#[derive(Clone, Debug, Default)]
+pub struct Gaps {
+    /// Columns that are not there.
+    pub left_out: Vec<Cow<'static, str>>,
+    /// Columns that are null in all rows.
+    pub unknown: Vec<Cow<'static, str>>,
+}
+
 /// Rows of one table, column by column, before they become a record batch. How rows came in leaves no trace in the
 /// batch.
 pub struct RowBuffer {
     schema: SchemaRef,
     /// One for each column of the row type; `None` for a column that is left out.
     cells: Vec<Option<Cells>>,
+    /// For each of these, whether all its cells are null.
+    is_unknown: Vec<bool>,
     pub(super) rows: usize,
 }
 
@@ -116,18 +127,23 @@ impl RowBuffer {
                 Kind::Text => Cells::Text(StringBuilder::new()),
             })
         });
+        let cells: Vec<Option<Cells>> = cells.collect();
         Self {
             schema: schema::<R>(),
-            cells: cells.collect(),
+            is_unknown: vec![false; cells.len()],
+            cells,
             rows: 0,
         }
     }
 
-    pub fn without(mut self, left_out: &[Cow<'static, str>]) -> Self {
+    pub fn with(mut self, gaps: &Gaps) -> Self {
         let mut fields = Vec::new();
-        for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
-            if left_out.iter().any(|name| name == field.name()) {
-                *cells = None;
+        for (place, field) in self.schema.fields().iter().enumerate() {
+            if gaps.left_out.iter().any(|name| name == field.name()) {
+                self.cells[place] = None;
+            } else if gaps.unknown.iter().any(|name| name == field.name()) {
+                self.is_unknown[place] = true;
+                fields.push(Arc::new(field.as_ref().clone().with_nullable(true)));
             } else {
                 fields.push(FieldRef::clone(field));
             }
@@ -141,10 +157,10 @@ impl RowBuffer {
     }
 
     pub fn push<R: Row>(&mut self, row: &R) {
-        let mut columns = self.cells.iter_mut();
+        let mut columns = self.cells.iter_mut().zip(&self.is_unknown);
         row.cells(&mut |cell| {
-            if let Some(Some(column)) = columns.next() {
-                column.push(cell);
+            if let Some((Some(column), is_unknown)) = columns.next() {
+                column.push(if *is_unknown { Value::Null } else { cell });
             }
         });
         self.rows += 1;
@@ -286,7 +302,10 @@ mod tests {
     #[test]
     fn columns_that_are_left_out_read_back_as_nulls_if_they_may_be_null() {
         let without = |name: &'static str| {
-            let mut buffer = RowBuffer::new::<Readings>().without(&[name.into()]);
+            let mut buffer = RowBuffer::new::<Readings>().with(&Gaps {
+                left_out: vec![name.into()],
+                ..Gaps::default()
+            });
             for row in &readings() {
                 buffer.push(row);
             }

@@ -111,9 +111,12 @@ mod tests {
     fn every_changed_bit_and_every_cut_is_found() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.parquet");
-        let mut writer =
-            TableWriter::<Reading>::new(&[], Disk.create(&path).unwrap(), &Footer::default())
-                .unwrap();
+        let mut writer = TableWriter::<Reading>::new(
+            &crate::table::arrow::Gaps::default(),
+            Disk.create(&path).unwrap(),
+            &Footer::default(),
+        )
+        .unwrap();
         for (reading, _) in &readings() {
             writer.push(reading).unwrap();
         }

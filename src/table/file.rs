@@ -5,7 +5,7 @@
 //! host or thread count. Row groups are cut by row count alone, so bytes do not depend on how the rows came in.
 
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
-use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
+use crate::table::arrow::{self, DESCRIPTION, Gaps, RowBuffer, UNIT};
 use crate::table::checksum;
 use crate::table::columns::Row;
 use crate::table::error::ResultsError;
@@ -120,36 +120,28 @@ pub struct TableWriter<R, S = StoredFile> {
 }
 
 impl<R: Row> TableWriter<R> {
-    /// Writes into this file, which is empty, without the columns of these names.
-    pub fn new(
-        left_out: &[Cow<'static, str>],
-        file: StoredFile,
-        footer: &Footer,
-    ) -> Result<Self, ResultsError> {
+    /// Writes into this file, which is empty.
+    pub fn new(gaps: &Gaps, file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
         let path = file.path().to_owned();
-        Self::into_sink(left_out, path, file, footer)
+        Self::into_sink(gaps, path, file, footer)
     }
 }
 
 impl<R: Row> TableWriter<R, Vec<u8>> {
     /// Makes the bytes of the file of this path.
-    pub fn in_memory(
-        left_out: &[Cow<'static, str>],
-        path: &Path,
-        footer: &Footer,
-    ) -> Result<Self, ResultsError> {
-        Self::into_sink(left_out, path.to_owned(), Vec::new(), footer)
+    pub fn in_memory(gaps: &Gaps, path: &Path, footer: &Footer) -> Result<Self, ResultsError> {
+        Self::into_sink(gaps, path.to_owned(), Vec::new(), footer)
     }
 }
 
 impl<R: Row, S: Sink> TableWriter<R, S> {
     fn into_sink(
-        left_out: &[Cow<'static, str>],
+        gaps: &Gaps,
         path: PathBuf,
         file: S,
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
-        let buffer = RowBuffer::new::<R>().without(left_out);
+        let buffer = RowBuffer::new::<R>().with(gaps);
         let schema = buffer.schema();
         let writer = footer.properties(schema).and_then(|properties| {
             ArrowWriter::try_new(Vec::new(), Arc::clone(schema), Some(properties))
@@ -429,7 +421,8 @@ mod tests {
 
     fn write(path: &Path, numbers: Range<u64>) {
         let footer = Footer::default().with("note", "test");
-        let mut writer = TableWriter::new(&[], Disk.create(path).unwrap(), &footer).unwrap();
+        let mut writer =
+            TableWriter::new(&Gaps::default(), Disk.create(path).unwrap(), &footer).unwrap();
         numbers.for_each(|number| writer.push(&Number::of(number)).unwrap());
         writer.finish().unwrap();
     }
@@ -477,7 +470,8 @@ mod tests {
         write(&whole, 0..rows);
         let footer = Footer::default().with("note", "test");
         let mut writer =
-            TableWriter::<Number>::new(&[], Disk.create(&copied).unwrap(), &footer).unwrap();
+            TableWriter::<Number>::new(&Gaps::default(), Disk.create(&copied).unwrap(), &footer)
+                .unwrap();
         for batch in Dataset::new(&Disk, vec![whole.clone()]).batches() {
             let batch = batch.unwrap();
             let middle = batch.rows.num_rows() / 3;
@@ -601,7 +595,8 @@ mod tests {
         }
         let expected = Footer::empty().with("sweep", "one");
         let written = Footer::default().and(&expected).at(&path);
-        let mut writer = TableWriter::new(&[], Disk.create(&path).unwrap(), &written).unwrap();
+        let mut writer =
+            TableWriter::new(&Gaps::default(), Disk.create(&path).unwrap(), &written).unwrap();
         writer.push(&Number::of(1)).unwrap();
         writer.finish().unwrap();
         let check = |path: &Path, footer: &Footer| {

@@ -27,6 +27,7 @@ use stickslip::results::tables::{JobRow, PrecursorRow, SlipRow};
 use stickslip::rounds::next;
 use stickslip::run::{MAX_FAILURES, Options, Shard, join, status};
 use stickslip::sweep::Sweep;
+use stickslip::table::arrow::Gaps;
 use stickslip::table::checksum::hexadecimal;
 use stickslip::table::columns::Row;
 use stickslip::table::file::{Batch, Dataset, Footer, TableWriter};
@@ -332,13 +333,17 @@ fn write_nonsense<R: Row>(path: &Path, column: Index, row: Index, value: Index) 
             .iter()
             .any(|batch| batch.rows.column_by_name(name).is_none())
     };
-    let left_out: Vec<_> = R::columns()
+    let left_out = R::columns()
         .into_iter()
         .map(|column| column.name)
         .filter(is_left_out)
         .collect();
+    let gaps = Gaps {
+        left_out,
+        ..Gaps::default()
+    };
     Disk.remove(path).unwrap();
-    let mut writer = TableWriter::<R>::new(&left_out, Disk.create(path).unwrap(), &footer).unwrap();
+    let mut writer = TableWriter::<R>::new(&gaps, Disk.create(path).unwrap(), &footer).unwrap();
     for Batch { path, rows } in batches
         .into_iter()
         .filter(|batch| batch.rows.num_rows() > 0)
@@ -409,7 +414,7 @@ fn read_all(root: &Path, file: &Path) {
             let _ = next(&results);
         }
         if file.starts_with(layout.reduced()) {
-            let _ = draw_all(&layout, &Look::default(), &Format::ALL);
+            let _ = draw_all(&layout, &[], &Look::default(), &Format::ALL);
         } else {
             let _ = status(&results, MAX_FAILURES);
             let _ = reduce(&results);

@@ -25,6 +25,8 @@
 //! | `"rule"` | what else must hold, beside other fields; the struct checks it in code; may be left out |
 //! | `"meaning"` | one line, without a full stop; it also heads columns of tables |
 //!
+//! With `by Symbol but unknown`, a list `unknown` names the fields that are not known: their values are null.
+//!
 //! Each row yields the field with its documentation, its default, its [`Description`], access by key, and a row of the
 //! table in `docs/`, which the tests write with `UPDATE_DOCS=1`. All this is tested with
 //! [`Parameters`](super::Parameters), in `parameters.rs`.
@@ -128,7 +130,7 @@ const TOO_LARGE: f64 = 9_007_199_254_740_992.0;
 macro_rules! fields {
     (
         $(#[$about:meta])*
-        pub struct $Struct:ident by $Key:ident {$(
+        pub struct $Struct:ident by $Key:ident $(but $unknown:ident)? {$(
             $variant:ident($key:literal $(, $symbol:literal $(, $words:literal)?)?) $field:ident: $type:ty = $default:expr,
                 $unit:tt, $range:ident $(and $rule:literal)?, $meaning:literal;
         )+}
@@ -137,11 +139,13 @@ macro_rules! fields {
         pub struct $Struct {$(
             #[doc = concat!("`", $key, "`: ", $meaning, "; unit: \"", $unit, "\"." $(, " Rule: ", $rule, ".")?)]
             pub $field: $type,
-        )+}
+        )+
+            $(#[doc = "Fields that are not known, in order: their values are null."] pub $unknown: Vec<$Key>,)?
+        }
 
         impl Default for $Struct {
             fn default() -> Self {
-                Self { $($field: $default,)+ }
+                Self { $($field: $default,)+ $($unknown: Vec::new(),)? }
             }
         }
 
@@ -204,6 +208,9 @@ macro_rules! fields {
         impl $Struct {
             /// The value of a field.
             pub fn get(&self, field: $Key) -> $crate::model::Value {
+                $(if self.$unknown.contains(&field) {
+                    return $crate::value::Value::Null;
+                })?
                 match field {$(
                     $Key::$variant => $crate::value::Field::value(&self.$field),
                 )+}

@@ -28,7 +28,7 @@ fields! {
     /// The defaults are those of Fig. 1, without modulation. Construct by changing fields, then call
     /// [`Parameters::validated`]; everything downstream expects validated, canonical values.
     #[derive(Clone, Debug, PartialEq)]
-    pub struct Parameters by Symbol {
+    pub struct Parameters by Symbol but unknown {
         N("N", "N") blocks: usize = 70, "", SIZE, "number of blocks";
         Ns("Ns", "N_s") contacts_per_block: usize = 20, "", SIZE and "N * Ns <= 1e7", "contacts per block";
         M("M", "M") slider_mass: f64 = 11.5, "kg", POSITIVE, "slider mass";
@@ -109,6 +109,9 @@ impl Parameters {
     /// and no negative zero.
     pub fn validated(mut self) -> Result<Self, ParameterError> {
         for symbol in Symbol::ALL {
+            if self.unknown.contains(&symbol) {
+                continue;
+            }
             let value = self.get(symbol);
             let refuse = || ParameterError {
                 symbol,
@@ -257,7 +260,7 @@ pub trait Selection {
 }
 
 /// Some of the parameters as columns, under their keys and with their units and meanings. Read back, the others have
-/// their defaults.
+/// their defaults; what is null and may not be so is not known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selected<S> {
     pub parameters: Parameters,
@@ -297,9 +300,12 @@ impl<S: Selection> Row for Selected<S> {
     fn from_cells<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         let mut parameters = Parameters::default();
         for &symbol in S::SYMBOLS {
-            parameters
-                .set(symbol, next())
-                .map_err(|error| error.to_string())?;
+            match next() {
+                Value::Null if !symbol.description().nullable => parameters.unknown.push(symbol),
+                value => parameters
+                    .set(symbol, value)
+                    .map_err(|error| error.to_string())?,
+            }
         }
         parameters
             .validated()

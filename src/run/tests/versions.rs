@@ -4,7 +4,7 @@ use super::{fine, options, run, run_all, sweep};
 use crate::reduce::{SetRow, read_reduced, reduce};
 use crate::results::destination::NewFolder;
 use crate::results::layout::Layout;
-use crate::results::tables::{JobRow, Names, PrecursorRow, SlipRow};
+use crate::results::tables::{JobRow, Names, PrecursorRow, SlipRow, gaps};
 use crate::results::{ErrorKind, Results, of_other_versions};
 use crate::table::columns::Row;
 use crate::table::file::{Dataset, Footer, TableWriter};
@@ -43,15 +43,15 @@ fn make_older(root: &Path) {
 
 /// Writes a file without the column, and as an earlier program that said less in the footer.
 fn write_again<R: Row>(file: &Path, results: &Results<'_>) {
-    let mut left_out = results.sweep().recording().left_out();
-    left_out.push(MISSING.into());
+    let mut gaps = gaps(results.sweep());
+    gaps.left_out.push(MISSING.into());
     let batches: Vec<_> = Dataset::new(&Disk, vec![file.to_owned()])
         .batches()
         .map(Result::unwrap)
         .collect();
     fs::remove_file(file).unwrap();
     let created = Disk.create(file).unwrap();
-    let mut writer = TableWriter::<R>::new(&left_out, created, &Footer::default()).unwrap();
+    let mut writer = TableWriter::<R>::new(&gaps, created, &Footer::default()).unwrap();
     for batch in &batches {
         writer.copy(batch, 0..batch.rows.num_rows()).unwrap();
     }

@@ -1,0 +1,97 @@
+//! `stickslip measured`: slips of an experiment as a results directory.
+
+use super::run::reduce_and_draw;
+use super::{Exit, UsageError, catch_signals, layout, output};
+use crate::measured::{Experiment, Request};
+use crate::run::{Options, Shard, join};
+use crate::sweep::Job;
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Read measured slips into a results directory, for the statistics and figures of the model's slips
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  stickslip measured slips.csv -o results/mine --set V0=100:um/s
+  stickslip measured slips.csv -o results/mine --column onset=t_slip:ms --column drop=dF:mN --set V0=1e-4 \\
+    --set Delta=0.6:um --set frequency=29 --maximum 0.0123
+  stickslip measured rig1.csv rig2.csv -o results/mine --column run=id --column V0=velocity:mm/s
+
+A file is CSV, also with semicolons or tabs, or Parquet, and has a row for each slip. Keys are onset (s); drop and
+peak_force (N); run, which tells series apart; V0 (m/s), Kd (N/m), Delta (m), T (s) or frequency (Hz). Units may have
+prefixes; times may be in min or h. Series with Delta = 0 are the control of those with the same V0 and Kd.")]
+pub struct Arguments {
+    /// Tables of slips
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// New results directory
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    /// The column that gives a key, and its unit, in SI if left out [default: the column of that name]. Repeatable
+    #[arg(long = "column", value_name = "KEY=NAME:UNIT")]
+    columns: Vec<String>,
+    /// The value of a key in all rows. Repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE:UNIT")]
+    settings: Vec<String>,
+    /// A time at which the modulation has a maximum, in s
+    #[arg(
+        long,
+        value_name = "TIME",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    maximum: f64,
+}
+
+impl Arguments {
+    /// The command that reads the same.
+    fn command(&self) -> String {
+        let files = self.files.iter().map(|file| output::quoted_path(file));
+        let columns = self.columns.iter().map(|text| ("--column", text));
+        let flags = columns.chain(self.settings.iter().map(|text| ("--set", text)));
+        let flags = flags.map(|(flag, text)| format!("{flag} {}", output::quoted(text)));
+        let words: Vec<String> = files.chain(flags).collect();
+        let maximum = self.maximum;
+        format!("stickslip measured {} --maximum {maximum}", words.join(" "))
+    }
+}
+
+pub fn measured(arguments: &Arguments) -> Result<Exit> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let name = arguments.out.file_name().unwrap_or_default();
+    let name = name.to_string_lossy().replace(|c| !allowed(c), "-");
+    let experiment = Experiment::read(Request {
+        files: &arguments.files,
+        columns: &arguments.columns,
+        settings: &arguments.settings,
+        maximum: arguments.maximum,
+        name: &name,
+        command: &arguments.command(),
+    });
+    let experiment = experiment.map_err(|error| UsageError(format!("{error:#}")))?;
+    let sweep = &experiment.sweep;
+    output::warn(&sweep.warnings());
+    let layout = layout(&arguments.out);
+    let options = Options {
+        threads: None,
+        stop: catch_signals()?,
+        retry_failed: false,
+        shard: Shard::default(),
+        walltime: None,
+    };
+    join(&layout, sweep, options, |joined| {
+        let report = joined.run(
+            &|job: &Job, _| Ok(experiment.measurements(job)),
+            &mut |_| (),
+        )?;
+        if report.jobs_left > 0 {
+            return Ok(Exit::Stopped);
+        }
+        if let Some(reduced) = reduce_and_draw(&layout)? {
+            output::pairs(&reduced.lines)?;
+            reduced.print()?;
+        }
+        Ok(Exit::Done)
+    })
+}

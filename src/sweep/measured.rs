@@ -1,0 +1,55 @@
+//! `[measured]`: the slips of a sweep were measured, not computed. `stickslip measured` writes it.
+
+use super::source::{Refused, Section, all};
+
+/// Where measured slips come from.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// The command that reads them.
+    pub command: String,
+    /// Files, behind their SHA-256.
+    pub files: Vec<String>,
+    /// Columns of slips that the files have beside the onset.
+    columns: Vec<String>,
+}
+
+/// Columns of slips and jobs that are always known.
+const KNOWN: &[&str] = &[
+    "slip",
+    "onset",
+    "interval",
+    "T_onset",
+    "Delta_onset",
+    "n",
+    "phase",
+    "outcome",
+    "reason",
+    "slips",
+];
+
+impl Measured {
+    pub(super) fn read(section: &Section<'_>) -> Result<Self, Refused> {
+        section.only(&["command", "files", "series", "columns"])?;
+        let texts = |key| {
+            let entry = section.required(key, "`stickslip measured` writes this section")?;
+            let list = entry.list().unwrap_or_else(|| vec![entry]);
+            let text = |text: &str| text.to_owned();
+            all(list.iter().map(|entry| {
+                let found = entry.word().map(text);
+                found.ok_or_else(|| entry.must_be("a text"))
+            }))
+        };
+        // Where each series begins is for readers alone.
+        texts("series")?;
+        Ok(Self {
+            command: texts("command")?.concat(),
+            files: texts("files")?,
+            columns: texts("columns")?,
+        })
+    }
+
+    /// Whether a column of slips or jobs is known.
+    pub fn has(&self, column: &str) -> bool {
+        KNOWN.contains(&column) || self.columns.iter().any(|known| known == column)
+    }
+}
