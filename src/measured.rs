@@ -57,33 +57,23 @@ pub struct Request<'a> {
     pub maximum: f64,
     /// The name of the sweep.
     pub name: &'a str,
-    /// The command that asks for it.
-    pub command: &'a str,
 }
 
-/// A sweep with a job for each series, and the slips of each, by their seeds.
-#[derive(Clone, Debug)]
+/// A sweep with a job for each series, and the rows of each, by their seeds.
+#[derive(Debug)]
 pub struct Experiment {
     pub sweep: Sweep,
-    slips: Vec<Vec<Slip>>,
+    series: Vec<Vec<Row>>,
+    maximum: f64,
 }
 
 impl Experiment {
     /// An error names the file, and the line if it is about one.
     pub fn read(request: Request<'_>) -> Result<Self> {
-        let settings = Source::all("--set", request.settings)?;
-        let mut columns = Source::all("--column", request.columns)?;
-        let is_new = |key: &str| {
-            settings
-                .iter()
-                .chain(&columns)
-                .all(|source| source.key != key)
-        };
-        let others = KEYS.into_iter().filter(|(key, _)| is_new(key));
-        let others: Vec<Source> = others.map(|(key, _)| Source::by_name(key)).collect();
-        columns.extend(others);
+        let columns = parse_all("--column", request.columns)?;
+        let settings = parse_all("--set", request.settings)?;
         let mut files = Array::new();
-        let mut beginnings = Array::new();
+        let mut begins = Array::new();
         let mut series: Vec<Vec<Row>> = Vec::new();
         for path in request.files {
             let file = shown(path);
@@ -92,32 +82,60 @@ impl Experiment {
             let mut table = Table {
                 columns: &columns,
                 settings: &settings,
-                rows: Vec::new(),
+                series: Vec::new(),
             };
             table.read(&bytes).with_context(|| file.to_string())?;
-            for rows in table.series().with_context(|| file.to_string())? {
-                beginnings.push(format!("{file}:{}", rows[0].line));
-                series.push(rows);
-            }
+            let lines = table.series.iter().map(|rows| rows[0].line);
+            begins.extend(lines.map(|line| format!("{file}:{line}")));
+            series.extend(table.series);
         }
+        let maximum = request.maximum;
+        let columns = request
+            .columns
+            .iter()
+            .map(|text| format!("--column {text}"));
+        let settings = request.settings.iter().map(|text| format!("--set {text}"));
+        let options = columns
+            .chain(settings)
+            .chain([format!("--maximum {maximum}")]);
+        let options: Array = options.collect();
+        let rest = rest_of_sweep(&series);
         let text = format!(
-            "name = {:?}\n[measured]\ncommand = {}\nfiles = {files}\nseries = {beginnings}\n{}",
-            request.name,
-            Toml::from(request.command),
-            rest_of_sweep(&series),
+            "name = {:?}\n[measured]\nfiles = {files}\nseries = {begins}\noptions = {options}\n{rest}",
+            request.name
         );
-        let slips = series.iter().map(|rows| slips(rows, request.maximum));
+        let sweep = Sweep::parse_made(&text, "files")?;
         Ok(Self {
-            sweep: Sweep::parse_made(&text, "files")?,
-            slips: slips.collect(),
+            sweep,
+            series,
+            maximum,
         })
     }
 
     /// What was measured of a job.
     pub fn measurements(&self, job: &Job) -> Measurements {
-        let series = usize::try_from(job.parameters.seed).unwrap_or(usize::MAX);
+        let parameters = &job.parameters;
+        let series = usize::try_from(parameters.seed).unwrap_or(usize::MAX);
+        let modulation = Modulation {
+            period: parameters.modulation_period,
+            amplitude: parameters.modulation_amplitude,
+        };
+        let mut last = None;
+        let slip = |(number, row): (u64, &Row)| {
+            let onset = row.slip.onset;
+            let interval = last.replace(onset).map(|last| onset - last);
+            let phase_in = |period| phase(onset - self.maximum, period, parameters.eta());
+            Slip {
+                number,
+                interval,
+                modulation,
+                periods: interval.and_then(|interval| modulation.periods(interval)),
+                phase: modulation.period.map(phase_in),
+                ..row.slip
+            }
+        };
         Measurements {
-            slips: self.slips[series].clone(),
+            slips: (0..).zip(&self.series[series]).map(slip).collect(),
             summary: Summary {
                 satisfied: true,
                 ..Summary::default()
@@ -141,52 +159,31 @@ pub fn compare_files(measured: &Measured) -> Vec<String> {
     compared.collect()
 }
 
-/// What gives the values of a key: a column, or one value; and the factor of its unit.
-struct Source {
-    key: &'static str,
-    from: String,
-    factor: f64,
-    is_needed: bool,
+/// A key, what it gets its values from, and the factor of their unit.
+type Source<'a> = (&'static str, &'a str, f64);
+
+/// Reads the texts of a flag.
+fn parse_all<'a>(flag: &str, texts: &'a [String]) -> Result<Vec<Source<'a>>> {
+    let parse = |text: &'a String| parse(text).with_context(|| format!("{flag} {text}"));
+    let sources = texts.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    let keys: HashSet<&str> = sources.iter().map(|(key, ..)| *key).collect();
+    ensure!(
+        keys.len() == sources.len(),
+        "{flag}: gives a key twice; keep one"
+    );
+    Ok(sources)
 }
 
-impl Source {
-    /// A column with the name of its key, if it is there.
-    fn by_name(key: &'static str) -> Self {
-        Self {
-            key,
-            from: key.to_owned(),
-            factor: 1.0,
-            is_needed: key == ONSET,
-        }
-    }
-
-    /// Reads the texts of a flag.
-    fn all(flag: &str, texts: &[String]) -> Result<Vec<Self>> {
-        let parse = |text: &String| Self::parse(text).with_context(|| format!("{flag} {text}"));
-        let sources = texts.iter().map(parse).collect::<Result<Vec<_>>>()?;
-        let keys: HashSet<&str> = sources.iter().map(|source| source.key).collect();
-        ensure!(
-            keys.len() == sources.len(),
-            "{flag}: gives a key twice; keep one"
-        );
-        Ok(sources)
-    }
-
-    /// Reads `KEY=FROM` or `KEY=FROM:UNIT`.
-    fn parse(text: &str) -> Result<Self> {
-        let (key, from) = text.split_once('=').unwrap_or((text, ""));
-        let known = KEYS.into_iter().find(|(known, _)| *known == key);
-        let (key, si) = known.with_context(|| hint(key, &KEYS.map(|(key, _)| key)))?;
-        let (from, unit) = from.rsplit_once(':').unwrap_or((from, si));
-        ensure!(!from.is_empty(), "must be {key}=NAME or {key}=NAME:UNIT");
-        let factor = factor(unit, si);
-        Ok(Self {
-            key,
-            from: from.to_owned(),
-            factor: factor.with_context(|| format!("{unit}: must be {si}, or with prefixes"))?,
-            is_needed: true,
-        })
-    }
+/// Reads `KEY=FROM` or `KEY=FROM:UNIT`.
+fn parse(text: &str) -> Result<Source<'_>> {
+    let (key, from) = text.split_once('=').unwrap_or((text, ""));
+    let known = KEYS.into_iter().find(|(known, _)| *known == key);
+    let (key, si) = known.with_context(|| hint(key, &KEYS.map(|(key, _)| key)))?;
+    let (from, unit) = from.rsplit_once(':').unwrap_or((from, si));
+    ensure!(!from.is_empty(), "must be {key}=NAME or {key}=NAME:UNIT");
+    let factor = factor(unit, si);
+    let factor = factor.with_context(|| format!("{unit}: must be {si}, or with prefixes"))?;
+    Ok((key, from, factor))
 }
 
 /// The factor from a unit to that of SI.
@@ -207,26 +204,28 @@ fn factor(unit: &str, si: &str) -> Option<f64> {
 
 /// The rows of a file.
 struct Table<'a> {
-    columns: &'a [Source],
-    settings: &'a [Source],
-    rows: Vec<Row>,
+    columns: &'a [Source<'a>],
+    settings: &'a [Source<'a>],
+    series: Vec<Vec<Row>>,
 }
+
+/// The values of a row, by their keys, as texts and with the factors of their units.
+type Cells<'a> = [(&'static str, &'a str, f64)];
+
+/// Columns by their keys, with their places and the factors of their units.
+type Places = Vec<(&'static str, usize, f64)>;
 
 #[derive(Clone, Debug)]
 struct Row {
     /// Its line, or of Parquet its number, counted from 1.
     line: u64,
-    /// Of its series.
-    run: String,
-    /// Those of [`PARAMETERS`].
-    parameters: [Option<f64>; 4],
-    onset: f64,
-    /// NaN if it is not given.
-    drop: f64,
-    peak_force: f64,
+    /// The run, and the parameters of [`PARAMETERS`].
+    series: (String, [Option<f64>; 4]),
+    /// Its onset, peak force and drop; NaN if they are not given.
+    slip: Slip,
 }
 
-impl<'a> Table<'a> {
+impl Table<'_> {
     fn read(&mut self, bytes: &[u8]) -> Result<()> {
         if bytes.starts_with(b"PAR1") {
             self.read_parquet(bytes)?;
@@ -235,7 +234,7 @@ impl<'a> Table<'a> {
             self.read_text(text.trim_start_matches('\u{feff}'))?;
         }
         ensure!(
-            !self.rows.is_empty(),
+            !self.series.is_empty(),
             "has no slips below its names of columns"
         );
         Ok(())
@@ -260,14 +259,12 @@ impl<'a> Table<'a> {
             let [found, expected] = [record.len(), names.len()];
             ensure!(
                 found == expected,
-                "line {line}: has {found} cells for {expected} columns: cut off, or decimal commas between commas?"
+                "line {line}: {found} cells for {expected} columns: cut off, or decimal commas between commas?"
             );
-            let cell = |(_, place): &(&Source, usize)| match delimiter {
-                b',' => record[*place].to_owned(),
-                _ => record[*place].replace(',', "."),
-            };
-            let cells: Vec<String> = places.iter().map(cell).collect();
-            self.add(line, &places, &cells)?;
+            let point = if delimiter == b',' { "," } else { "." };
+            let cells = record.iter().map(|cell| cell.replace(',', point));
+            let added = self.add(line, &places, &cells.collect::<Vec<_>>());
+            added.with_context(|| format!("line {line}"))?;
         }
         Ok(())
     }
@@ -279,89 +276,83 @@ impl<'a> Table<'a> {
         let fields = reader.schema().fields().clone();
         let names: Vec<String> = fields.iter().map(|field| field.name().clone()).collect();
         let places = self.places(&names)?;
-        for &(source, place) in &places {
+        for &(key, place, _) in &places {
             let kind = fields[place].data_type();
             let is_known = [DataType::Float64, DataType::Int64, DataType::Utf8].contains(kind);
             ensure!(
                 is_known,
-                "column {} is {kind}; save it as Float64",
-                source.from
+                "the column of {key} is {kind}; save it as Float64"
             );
         }
-        let indices: Vec<usize> = places.iter().map(|(_, place)| *place).collect();
+        let mut line = 0;
         for batch in reader.build()? {
-            for cells in texts(&batch?.project(&indices)?) {
-                self.add(self.rows.len() as u64 + 1, &places, &cells)?;
+            for cells in texts(&batch?) {
+                line += 1;
+                let added = self.add(line, &places, &cells);
+                added.with_context(|| format!("row {line}"))?;
             }
         }
         Ok(())
     }
 
-    /// The columns among these names, each with its place.
-    fn places(&self, names: &[String]) -> Result<Vec<(&'a Source, usize)>> {
+    /// The columns among these names that give a key, unless it is set.
+    fn places(&self, names: &[String]) -> Result<Places> {
         let mut places = Vec::new();
-        for source in self.columns {
-            let place = names.iter().position(|name| *name == source.from);
-            places.extend(place.map(|place| (source, place)));
-            if place.is_none() && source.is_needed {
-                let Source { key, from, .. } = source;
+        for (key, _) in KEYS {
+            let asked = self.columns.iter().find(|column| column.0 == key);
+            let (_, name, factor) = asked.copied().unwrap_or((key, key, 1.0));
+            let place = names.iter().position(|found| found == name);
+            let is_set = self.settings.iter().any(|set| set.0 == key);
+            ensure!(
+                !is_set || place.is_none(),
+                "has a column {name} beside --set {key}; keep one"
+            );
+            places.extend(place.map(|place| (key, place, factor)));
+            if place.is_none() && (asked.is_some() || key == ONSET) {
                 let known: Vec<&str> = names.iter().map(String::as_str).collect();
-                let hint = hint(from, &known);
-                bail!("has no column {from}; {hint}, in --column {key}=NAME:UNIT");
+                let hint = hint(name, &known);
+                bail!("has no column {name}; {hint}, in --column {key}=NAME:UNIT");
             }
         }
         Ok(places)
     }
 
-    fn add(&mut self, line: u64, columns: &[(&Source, usize)], cells: &[String]) -> Result<()> {
-        let cells = columns.iter().map(|(source, _)| *source).zip(cells);
-        let set = self.settings.iter().map(|source| (source, &source.from));
-        let cells: Vec<(&Source, &String)> = cells.chain(set).collect();
-        let row = Row::read(line, &cells).with_context(|| format!("line {line}"))?;
-        self.rows.push(row);
+    fn add(&mut self, line: u64, places: &Places, cells: &[String]) -> Result<()> {
+        let cells = places
+            .iter()
+            .map(|&(key, place, factor)| (key, &*cells[place], factor));
+        let cells: Vec<_> = cells.chain(self.settings.iter().copied()).collect();
+        let row = Row::read(line, &cells)?;
+        let onset = row.slip.onset;
+        let last = self.series.last_mut();
+        let last = last.filter(|rows| rows[0].series == row.series);
+        let Some(rows) = last else {
+            let run = &row.series.0;
+            let is_new =
+                run.is_empty() || self.series.iter().all(|rows| rows[0].series != row.series);
+            ensure!(is_new, "run {run} begins again; sort by run and onset");
+            self.series.push(vec![row]);
+            return Ok(());
+        };
+        let before = rows.last().map_or(-1.0, |row| row.slip.onset);
+        ensure!(
+            onset > before,
+            "onset {onset} s is not after {before} s above it; where series begin, a column must say so: --column run=NAME"
+        );
+        rows.push(row);
         Ok(())
-    }
-
-    /// Stretches of rows of one run and with the same parameters, in which time goes on.
-    fn series(self) -> Result<Vec<Vec<Row>>> {
-        let mut runs = HashSet::new();
-        let is_of_series =
-            |row: &Row, next: &Row| row.run == next.run && row.parameters == next.parameters;
-        for rows in self.rows.chunk_by(is_of_series) {
-            let Row {
-                line,
-                run,
-                parameters,
-                ..
-            } = &rows[0];
-            let is_new = run.is_empty() || runs.insert(format!("{run} {parameters:?}"));
-            ensure!(
-                is_new,
-                "line {line}: run {run} begins again; sort by run and onset"
-            );
-            let back = rows.windows(2).find(|pair| pair[0].onset >= pair[1].onset);
-            if let Some([before, Row { line, onset, .. }]) = back {
-                let before = before.onset;
-                bail!(
-                    "line {line}: onset {onset} s is not after {before} s above it; if a series begins here, name a column \
-                     that says so, in --column run=NAME"
-                );
-            }
-        }
-        let series = self.rows.chunk_by(is_of_series).map(<[Row]>::to_vec);
-        Ok(series.collect())
     }
 }
 
 impl Row {
-    fn read(line: u64, cells: &[(&Source, &String)]) -> Result<Self> {
-        let cell = |key: &str| cells.iter().find(|(source, _)| source.key == key);
+    fn read(line: u64, cells: &Cells<'_>) -> Result<Self> {
+        let cell = |key: &str| cells.iter().find(|cell| cell.0 == key);
         let number = |key: &str| {
-            let Some((source, text)) = cell(key).filter(|(_, text)| !text.is_empty()) else {
+            let Some((_, text, factor)) = cell(key).filter(|cell| !cell.1.is_empty()) else {
                 return Ok(None);
             };
             let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-            let number = number.map(|number| number * source.factor);
+            let number = number.map(|number| number * factor);
             number
                 .map(Some)
                 .with_context(|| format!("{key} = {text}: must be a number"))
@@ -371,13 +362,16 @@ impl Row {
             onset >= 0.0,
             "onset = {onset} s: must be 0 or later; shift the times"
         );
+        let run = cell(RUN).map_or_else(String::new, |cell| cell.1.to_owned());
         Ok(Self {
             line,
-            run: cell(RUN).map_or_else(String::new, |(_, run)| (*run).clone()),
-            parameters: parameters(&number)?,
-            onset,
-            drop: number(DROP)?.unwrap_or(f64::NAN),
-            peak_force: number(PEAK_FORCE)?.unwrap_or(f64::NAN),
+            series: (run, parameters(&number)?),
+            slip: Slip {
+                onset,
+                drop: number(DROP)?.unwrap_or(f64::NAN),
+                peak_force: number(PEAK_FORCE)?.unwrap_or(f64::NAN),
+                ..Slip::default()
+            },
         })
     }
 }
@@ -386,12 +380,11 @@ impl Row {
 fn parameters(number: &dyn Fn(&str) -> Result<Option<f64>>) -> Result<[Option<f64>; 4]> {
     let mut found = [None; PARAMETERS.len()];
     for (found, symbol) in found.iter_mut().zip(PARAMETERS) {
-        let mut value = number(symbol.key())?;
-        if symbol == Symbol::T && value.is_none() {
-            value = number(FREQUENCY)?.map(|frequency| 1.0 / frequency);
-        }
         // The factor of a unit leaves a rounding error behind.
-        *found = value.map(to_twelve_digits);
+        *found = number(symbol.key())?.map(to_twelve_digits);
+        if symbol == Symbol::T && found.is_none() {
+            *found = number(FREQUENCY)?.map(|frequency| 1.0 / to_twelve_digits(frequency));
+        }
         if let Some(value) = *found {
             let allowed = symbol.description().allowed();
             let is_allowed = symbol.checked(Value::Real(value)).is_some();
@@ -412,44 +405,18 @@ fn parameters(number: &dyn Fn(&str) -> Result<Option<f64>>) -> Result<[Option<f6
     Ok(found)
 }
 
-/// The slips of a series, with phases against a maximum of the modulation at this time in s.
-fn slips(rows: &[Row], maximum: f64) -> Vec<Slip> {
-    let [velocity, _, amplitude, period] = rows[0].parameters;
-    let modulation = Modulation {
-        period,
-        amplitude: amplitude.unwrap_or_default(),
-    };
-    let eta = modulation.eta(velocity.unwrap_or_default());
-    let mut last = None;
-    let slip = |(number, row): (u64, &Row)| {
-        let interval = last.replace(row.onset).map(|last| row.onset - last);
-        Slip {
-            number,
-            onset: row.onset,
-            interval,
-            modulation,
-            periods: interval.and_then(|interval| modulation.periods(interval)),
-            phase: period.map(|period| phase(row.onset - maximum, period, eta)),
-            peak_force: row.peak_force,
-            drop: row.drop,
-            ..Slip::default()
-        }
-    };
-    (0..).zip(rows).map(slip).collect()
-}
-
 /// The sections of a sweep of these series, with what is known of their slips.
 fn rest_of_sweep(series: &[Vec<Row>]) -> String {
     let rows = || series.iter().flatten();
-    let drops = rows().any(|row| !row.drop.is_nan()).then_some(DROP);
+    let drops = rows().any(|row| !row.slip.drop.is_nan()).then_some(DROP);
     let forces = rows()
-        .any(|row| !row.peak_force.is_nan())
+        .any(|row| !row.slip.peak_force.is_nan())
         .then_some(PEAK_FORCE);
     let columns: Array = drops.into_iter().chain(forces).collect();
-    let is_modulated = rows().any(|row| row.parameters[3].is_some());
+    let is_modulated = rows().any(|row| row.series.1[3].is_some());
     let mut axes = String::new();
     for (place, symbol) in PARAMETERS.into_iter().enumerate() {
-        let values = || series.iter().map(|rows| rows[0].parameters[place]);
+        let values = || series.iter().map(|rows| rows[0].series.1[place]);
         if values().any(|value| value.is_some()) && (is_modulated || !symbol.is_of_modulation()) {
             let or_none = |value: Option<f64>| value.map_or(Toml::from("none"), Toml::from);
             let values: Array = values().map(or_none).collect();

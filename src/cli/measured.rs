@@ -44,19 +44,6 @@ pub struct Arguments {
     maximum: f64,
 }
 
-impl Arguments {
-    /// The command that reads the same.
-    fn command(&self) -> String {
-        let files = self.files.iter().map(|file| output::quoted_path(file));
-        let columns = self.columns.iter().map(|text| ("--column", text));
-        let flags = columns.chain(self.settings.iter().map(|text| ("--set", text)));
-        let flags = flags.map(|(flag, text)| format!("{flag} {}", output::quoted(text)));
-        let words: Vec<String> = files.chain(flags).collect();
-        let maximum = self.maximum;
-        format!("stickslip measured {} --maximum {maximum}", words.join(" "))
-    }
-}
-
 pub fn measured(arguments: &Arguments) -> Result<Exit> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     let name = arguments.out.file_name().unwrap_or_default();
@@ -67,7 +54,6 @@ pub fn measured(arguments: &Arguments) -> Result<Exit> {
         settings: &arguments.settings,
         maximum: arguments.maximum,
         name: &name,
-        command: &arguments.command(),
     });
     let experiment = experiment.map_err(|error| UsageError(format!("{error:#}")))?;
     let sweep = &experiment.sweep;

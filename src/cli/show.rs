@@ -114,8 +114,11 @@ fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) 
     if arguments.is_text() {
         let first = shown(&arguments.directory);
         output::print(&format!("A is {first}, B is {}\n", shown(other)))?;
-        let differences = results.sweep().differences(others.sweep()).into_iter();
-        output::lines(differences.filter(|difference| !difference.starts_with("name")))?;
+        let sweeps = [results.sweep(), others.sweep()];
+        if sweeps.iter().all(|sweep| sweep.measured().is_none()) {
+            let differences = sweeps[0].differences(sweeps[1]).into_iter();
+            output::lines(differences.filter(|difference| !difference.starts_with("name")))?;
+        }
     }
     arguments.print(&columns, count, &[], &[])
 }

@@ -1,5 +1,6 @@
 //! Sets of two directories compared seed by seed. A seed gives the same disorder in both, so its effect cancels in
-//! their difference, and smaller effects show than in two separate intervals.
+//! their difference, and smaller effects show than in two separate intervals. Measured slips have no such pair: all
+//! their series count, and the errors of both sides are independent.
 //!
 //! Values are those of the table of sets, of the jobs with seeds that both have. The error of a difference is that of a
 //! mean over these seeds, of what each adds to it: the jackknife to first order, in a time proportional to the number
@@ -13,7 +14,7 @@ use crate::model::{Parameters, Symbol};
 use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
 use crate::sets::{SetRow, column_of};
-use crate::table::columns::Kind;
+use crate::table::columns::{Interval, Kind};
 use std::collections::{BTreeMap, HashMap};
 
 /// What is compared: columns of the sets, each the mean of a sum.
@@ -32,11 +33,12 @@ fn varies(sets: &[SetJobs], symbol: Symbol) -> bool {
     symbol != Symbol::Seed && values().any(|value| Some(value) != values().next())
 }
 
-/// A set of A and one of B, with the seeds that both have, in order.
+/// A set of A and one of B, with the seeds that both have, or all seeds of each, in order.
 struct Pair<'a> {
     a: &'a SetJobs,
     b: &'a SetJobs,
-    seeds: Vec<u64>,
+    seeds_of_a: Vec<u64>,
+    seeds_of_b: Vec<u64>,
 }
 
 /// A set of some seeds: its row, and for each statistic the sums of its jobs in the order of these.
@@ -86,8 +88,13 @@ fn found_in(
     Ok(found)
 }
 
-/// Sets of A and B that agree in these parameters and have seeds in common.
-fn pairs<'a>(a: &'a [SetJobs], b: &'a [SetJobs], keys: &[Symbol]) -> Vec<Pair<'a>> {
+/// Sets of A and B that agree in these parameters, with their common seeds, of which there are any, or all.
+fn pairs<'a>(
+    a: &'a [SetJobs],
+    b: &'a [SetJobs],
+    keys: &[Symbol],
+    have_common_seeds: bool,
+) -> Vec<Pair<'a>> {
     let key = |set: &SetJobs| {
         let values = keys
             .iter()
@@ -97,18 +104,34 @@ fn pairs<'a>(a: &'a [SetJobs], b: &'a [SetJobs], keys: &[Symbol]) -> Vec<Pair<'a
     let of_b: BTreeMap<Vec<String>, &SetJobs> = b.iter().map(|set| (key(set), set)).collect();
     let pair = |set: &'a SetJobs| {
         let other = of_b.get(&key(set)).copied()?;
-        let seeds: Vec<u64> = set
-            .finished
-            .intersection(&other.finished)
-            .copied()
-            .collect();
-        (!seeds.is_empty()).then_some(Pair {
+        let is_used =
+            |seeds: &SetJobs, seed: &u64| !have_common_seeds || seeds.finished.contains(seed);
+        let seeds_of_a = set.finished.iter().filter(|seed| is_used(other, seed));
+        let seeds_of_b = other.finished.iter().filter(|seed| is_used(set, seed));
+        let pair = Pair {
             a: set,
             b: other,
-            seeds,
-        })
+            seeds_of_a: seeds_of_a.copied().collect(),
+            seeds_of_b: seeds_of_b.copied().collect(),
+        };
+        (!pair.seeds_of_a.is_empty()).then_some(pair)
     };
     a.iter().filter_map(pair).collect()
+}
+
+/// The interval of the error of a difference B - A, if those of both sides are independent.
+fn independent(b: &Found, a: &Found, name: &str) -> Option<Interval> {
+    let errors = |found: &Found| {
+        let value = found.row.number(name)?;
+        let end = |end| Some(found.row.number(&format!("{name}_{end}"))? - value);
+        Some((end("low")?, end("high")?))
+    };
+    let (b_low, b_high) = errors(b)?;
+    let (a_low, a_high) = errors(a)?;
+    Some(Interval {
+        low: -libm::hypot(b_low, a_high),
+        high: libm::hypot(b_high, a_low),
+    })
 }
 
 /// Sets of two directories A and B that agree in all parameters that either varies: these parameters, the common seeds,
@@ -118,24 +141,35 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
     let sets_of_b = sets_in(b)?;
     let is_varied = |key: &Symbol| varies(&sets_of_a, *key) || varies(&sets_of_b, *key);
     let keys: Vec<Symbol> = Symbol::ALL.into_iter().filter(is_varied).collect();
-    let pairs = pairs(&sets_of_a, &sets_of_b, &keys);
-    let of_a = pairs.iter().map(|pair| (&*pair.a.set_id, &*pair.seeds));
+    let have_common_seeds = [a, b]
+        .iter()
+        .all(|results| results.sweep().measured().is_none());
+    let pairs = pairs(&sets_of_a, &sets_of_b, &keys, have_common_seeds);
+    let of_a = pairs
+        .iter()
+        .map(|pair| (&*pair.a.set_id, &*pair.seeds_of_a));
     let found_in_a = found_in(a, &of_a.collect())?;
-    let of_b = pairs.iter().map(|pair| (&*pair.b.set_id, &*pair.seeds));
+    let of_b = pairs
+        .iter()
+        .map(|pair| (&*pair.b.set_id, &*pair.seeds_of_b));
     let found_in_b = found_in(b, &of_b.collect())?;
     let of_pair = |pair: &Pair<'_>| (&found_in_a[&pair.a.set_id], &found_in_b[&pair.b.set_id]);
     let sets: Vec<(&Found, &Found)> = pairs.iter().map(of_pair).collect();
 
     let seeds = pairs
         .iter()
-        .map(|pair| (Some(pair.seeds.len() as f64), None));
+        .map(|pair| (Some(pair.seeds_of_a.len() as f64), None));
     let mut found = vec![Values::computed("seeds", Kind::Count, seeds)];
     for (statistic, name) in STATISTICS.into_iter().enumerate() {
         let number = |found: &Found| found.row.number(name);
         let difference = |(a, b): &(&Found, &Found)| {
             let whole = number(b).zip(number(a)).map(|(b, a)| b - a);
-            let errors = Sum::difference(&b.sums[statistic], &a.sums[statistic]);
-            let interval = whole.zip(errors.interval());
+            let errors = if have_common_seeds {
+                Sum::difference(&b.sums[statistic], &a.sums[statistic]).interval()
+            } else {
+                independent(b, a, name)
+            };
+            let interval = whole.zip(errors);
             let interval = interval.map(|(whole, error)| (whole + error.low, whole + error.high));
             (whole, interval)
         };

@@ -5,10 +5,10 @@ use super::source::{Refused, Section, all};
 /// Where measured slips come from.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// The command that reads them.
-    pub command: String,
     /// Files, behind their SHA-256.
     pub files: Vec<String>,
+    /// The flags of `stickslip measured`.
+    pub options: Vec<String>,
     /// Columns of slips that the files have beside the onset.
     columns: Vec<String>,
 }
@@ -20,7 +20,7 @@ const KNOWN: &[&str] = &[
     "interval",
     "T_onset",
     "Delta_onset",
-    "n",
+    "periods",
     "phase",
     "outcome",
     "reason",
@@ -29,21 +29,22 @@ const KNOWN: &[&str] = &[
 
 impl Measured {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, Refused> {
-        section.only(&["command", "files", "series", "columns"])?;
+        section.only(&["files", "series", "options", "columns"])?;
         let texts = |key| {
             let entry = section.required(key, "`stickslip measured` writes this section")?;
-            let list = entry.list().unwrap_or_else(|| vec![entry]);
-            let text = |text: &str| text.to_owned();
+            let list = entry
+                .list()
+                .ok_or_else(|| entry.must_be("a list of texts"))?;
             all(list.iter().map(|entry| {
-                let found = entry.word().map(text);
-                found.ok_or_else(|| entry.must_be("a text"))
+                let text = entry.word().map(str::to_owned);
+                text.ok_or_else(|| entry.must_be("a text"))
             }))
         };
         // Where each series begins is for readers alone.
         texts("series")?;
         Ok(Self {
-            command: texts("command")?.concat(),
             files: texts("files")?,
+            options: texts("options")?,
             columns: texts("columns")?,
         })
     }

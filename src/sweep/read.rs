@@ -68,8 +68,9 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         at: 0,
         table: &table,
     };
-    file.only(&[&["name", "where"], &SECTIONS[..], &["measured"]].concat())
-        .ok();
+    let measured = file.entry("measured").map(|entry| entry.key);
+    let known = [&["name", "where"], &SECTIONS[..], measured.as_slice()];
+    file.only(&known.concat()).ok();
     let mut places = Places::new(source);
     let name = read_name(&file);
     let model = read_section(&file, "[model]", |model| read_model(model, &mut places));
