@@ -420,7 +420,7 @@ fn rest_of_sweep(series: &[Vec<Row>]) -> String {
         if values().any(|value| value.is_some()) && (is_modulated || !symbol.is_of_modulation()) {
             let or_none = |value: Option<f64>| value.map_or(Toml::from("none"), Toml::from);
             let values: Array = values().map(or_none).collect();
-            axes += &format!("{} = {values}\n", symbol.key());
+            axes.extend([symbol.key(), " = ", &values.to_string(), "\n"]);
         }
     }
     let count = series.len();

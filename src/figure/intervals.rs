@@ -1,15 +1,15 @@
 //! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which they fall.
 
-use super::Other;
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Layout, Place};
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
-use super::panel::{self, Layer, Panel};
+use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
-use super::style::{BLACK, Dot, GREY, GRID, LIGHT_GREY, Look};
-use crate::reduce::{Point, ascending, is_same};
+use super::style::{Dot, GREY, GRID, LIGHT_GREY, Look};
+use super::{Other, hollow_entries};
+use crate::reduce::{Point, SetRow, ascending, is_same};
 use crate::sets::{Digits, label};
 
 pub(super) const NAME: &str = "tau-T";
@@ -26,7 +26,7 @@ const LINES: u32 = 12;
 /// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
 /// τ = nT; `None` without intervals at two periods or more. Slips of sets with a phase have the colour of their V0, or
 /// of their Δ at a common V0.
-/// Slips of other directories are hollow marks.
+/// Means of other directories are hollow marks.
 pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
         let period = point.period?;
@@ -44,11 +44,16 @@ pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Opti
     for slip in &mut slips {
         slip.1.0 *= factor;
     }
-    let scaled = |(period, interval): Place| (factor * period, interval);
-    let of_other = |other: &Other| other.points.iter().filter_map(place).map(scaled).collect();
-    let of_others: Vec<Vec<Place>> = others.iter().map(of_other).collect();
-    let all = slips.iter().map(|slip| &slip.1);
-    let all: Vec<&Place> = all.chain(of_others.iter().flatten()).collect();
+    let mean = |set: &SetRow| {
+        let period = set.parameters.modulation_period?;
+        let ends = set.tau_interval?;
+        let ends = (ends.low / period, ends.high / period);
+        Some((factor * period, set.tau_mean? / period, ends))
+    };
+    let of_other = |other: &Other| other.sets.iter().filter_map(mean).collect();
+    let means: Vec<Vec<MeanPlace>> = others.iter().map(of_other).collect();
+    let of_others = means.iter().flatten().map(|mean| (mean.0, mean.1));
+    let all: Vec<Place> = slips.iter().map(|slip| slip.1).chain(of_others).collect();
     let (low, high) = logarithmic_bounds(all.iter().map(|place| place.0))?;
     let x = Axis::logarithmic(&x_label, low, high);
     let (low, high) = logarithmic_bounds(all.iter().map(|place| place.1))?;
@@ -87,8 +92,7 @@ pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Opti
         entries.push(entry(Mark::Dot(dot), "slips of sets without a phase"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
-    let others = others.iter().enumerate();
-    entries.extend(others.map(|(number, other)| entry(Mark::Hollow(number), &other.name)));
+    entries.extend(hollow_entries(others));
     let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
         let mut layers: Vec<Layer<'_>> = (1..=lines)
             .map(|n| Layer::Level(f64::from(n), GRID))
@@ -103,8 +107,7 @@ pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Opti
             };
             Layer::Dots(vec![place], dot)
         }));
-        let hollow = of_others.iter().enumerate();
-        layers.extend(hollow.map(|(number, places)| Layer::Hollow(places.clone(), number, BLACK)));
+        layers.extend(panel::hollow_marks(&means));
         Panel {
             bar: hues.bar(),
             ..Panel::inside(height, x.clone(), y, layers)

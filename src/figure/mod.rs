@@ -39,6 +39,7 @@ pub use simulation::simulation;
 pub use style::{INKS, Ink, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
+use self::legend::{Entry, Mark, entry};
 use self::quantity::Quantity;
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
@@ -47,6 +48,7 @@ use crate::reduce::{
 };
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
+use crate::results::tables::gaps;
 use crate::results::{Results, ResultsError};
 use crate::sets::{Digits, label, symbol_of};
 use crate::table::Table;
@@ -102,6 +104,12 @@ impl Other {
             bins: read(layout)?,
         })
     }
+}
+
+/// Entries of a legend with the names of other directories.
+fn hollow_entries(others: &[Other]) -> impl Iterator<Item = Entry> + use<'_> {
+    let others = others.iter().enumerate();
+    others.map(|(number, other)| entry(Mark::Hollow(number), &other.name))
 }
 
 /// Sets followed by those of other directories, and which these are, by the names of their directories.
@@ -230,7 +238,15 @@ fn draw_slips(
     let common = common(slips.iter().map(|slip| &*slip.0.1));
     let condition = figure.shown_condition();
     let look = look.with_note(&format!("{common}{condition}; {part}{matching} slips"));
-    let quantity = |option, name: &str| Ok(Quantity::of(&slips, option, name)?);
+    let unknown = gaps(results.sweep()).unknown;
+    let quantity = |option, name: &str| {
+        let quantity = Quantity::of(&slips, option, name)?;
+        let mut sources = quantity.column.sources.iter();
+        match sources.find(|source| unknown.contains(source)) {
+            Some(source) => Err(BadOption::new(option, source, "was not measured").into()),
+            None => Ok(quantity),
+        }
+    };
     custom::custom(&quantity, &[], Vec::new(), &swept(sets), figure, &look)
 }
 

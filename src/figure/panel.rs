@@ -5,7 +5,7 @@ use super::frame::{Cell, Ends, Frame, HEADING, Layout, Place};
 use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::Entry;
 use super::picture::Picture;
-use super::style::{BAR_WIDTH, Dot, Fill, Ink, Look, Stroke, hollow};
+use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, Look, Stroke, WHITE, hollow};
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 
@@ -73,6 +73,8 @@ impl Layer<'_> {
                 for point in points {
                     if frame.x.contains(point.0) && frame.y.contains(point.1) {
                         let outline = hollow(other, frame.place(point));
+                        // It is seen on any ground.
+                        sheet.line(outline.clone(), Stroke::solid(WHITE, 3.0 * BAR_WIDTH));
                         sheet.line(outline, Stroke::solid(ink, BAR_WIDTH));
                     }
                 }
@@ -98,6 +100,21 @@ impl Layer<'_> {
             Self::Drawn(draw) => draw(sheet, frame),
         }
     }
+}
+
+/// A mean with the ends of its interval, at a place along x.
+pub(super) type MeanPlace = (f64, f64, Ends);
+
+/// Means of other directories, by their numbers, with their intervals.
+pub(super) fn hollow_marks(
+    others: &[Vec<MeanPlace>],
+) -> impl Iterator<Item = Layer<'static>> + use<'_> {
+    others.iter().enumerate().flat_map(|(number, means)| {
+        let bars = means.iter().map(|&(x, _, ends)| (x, ends)).collect();
+        let places = means.iter().map(|&(x, mean, _)| (x, mean)).collect();
+        let bars = Layer::Bars(bars, Stroke::solid(BLACK, BAR_WIDTH));
+        [bars, Layer::Hollow(places, number, BLACK)]
+    })
 }
 
 pub(super) struct Panel<'a> {

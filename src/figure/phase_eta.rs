@@ -1,15 +1,15 @@
 //! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and the mean of each column.
 
-use super::Other;
 use super::axis::{Axis, angle_bounds, bounds};
 use super::frame::{Cell, Ends, Layout, OVERLAP, Place};
 use super::hues::ColourBar;
 use super::legend::{Entry, Mark, entry};
-use super::panel::{self, Layer, Panel};
+use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::style::{
-    BAR_WIDTH, BLACK, BLUE, Dot, Ink, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
+    BAR_WIDTH, BLUE, Dot, Ink, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
 };
+use super::{Other, hollow_entries};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point};
 use crate::sets::label;
@@ -104,13 +104,8 @@ pub(super) fn phase_eta(
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
-    for (number, (other, means)) in others.iter().zip(&of_others).enumerate() {
-        entries.push(entry(Mark::Hollow(number), &other.name));
-        let bars = means.iter().map(|&(eta, _, ends)| (eta, ends)).collect();
-        let places = means.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
-        layers.push(Layer::Bars(bars, Stroke::solid(BLACK, BAR_WIDTH)));
-        layers.push(Layer::Hollow(places, number, BLACK));
-    }
+    entries.extend(hollow_entries(others));
+    layers.extend(panel::hollow_marks(&of_others));
     let bar = Some(ColourBar::of_axis(&shades, cell_shade));
     let panel = Panel {
         bar,
@@ -127,7 +122,7 @@ fn phases(points: &[Point]) -> Vec<Place> {
 }
 
 /// The middle of the η of each column's slips, their mean phase in rad, and its interval, unless that is the whole turn.
-fn averages(bins: &[BackboneBin], columns: &[Column]) -> Vec<(f64, f64, Ends)> {
+fn averages(bins: &[BackboneBin], columns: &[Column]) -> Vec<MeanPlace> {
     let average = |bin: &BackboneBin| {
         let is_of_bin = |column: &&Column| (bin.eta_low..bin.eta_high).contains(&column.values.0);
         let (low, high) = columns.iter().find(is_of_bin)?.values;

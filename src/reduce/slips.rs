@@ -5,9 +5,10 @@ use super::sequence::Sequences;
 use super::values::{Values, formula};
 use crate::model::Selected;
 use crate::observe::Slip;
-use crate::results::tables::{JOBS, JobOfSlip, Loading, SLIPS};
+use crate::results::tables::{JOBS, JobOfSlip, Loading, SLIPS, gaps};
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, SetRow};
+use crate::sweep::Expression;
 use crate::table::columns::{Row, columns};
 use std::collections::{BTreeMap, HashMap};
 
@@ -92,7 +93,12 @@ pub fn means_of_slips(
     name: &str,
 ) -> Result<Option<Values>, ResultsError> {
     let columns = SlipOfSet::columns();
-    let Ok(formula) = formula(name, &columns) else {
+    let unknown = gaps(results.sweep()).unknown;
+    let is_known = |formula: &Expression<usize>| {
+        let mut names = formula.names().into_iter();
+        names.all(|place| !unknown.contains(&columns[*place].name))
+    };
+    let Some(formula) = formula(name, &columns).ok().filter(is_known) else {
         return Ok(None);
     };
     let mut jobs: Vec<BTreeMap<u64, Vec<f64>>> = vec![BTreeMap::new(); sets.len()];

@@ -153,8 +153,9 @@ class Report {
     return Number.isNaN(end("_low")) ? shownValue(column, set, 3) : withInterval(end(""), end("_low"), end("_high"));
   }
 
-  /** The command that runs one job of a set alone. */
+  /** The command that runs one job of a set alone; measured slips have none. */
   command(set, seed) {
+    if (this.sets.commands.length === 0) return "measured";
     return `${this.sets.commands[set]} --set seed=${seed} ${this.sets.command_end}`.trim();
   }
 

@@ -151,7 +151,8 @@ impl Census {
 pub(super) struct Sets {
     #[serde(flatten)]
     columns: Columns,
-    /// How the `simulate` command of a job of each set begins; then come its seed and [`Sets::command_end`].
+    /// How the `simulate` command of a job of each set begins; then come its seed and [`Sets::command_end`]. None of
+    /// measured slips.
     commands: Vec<String>,
     command_end: String,
     /// Histogram of τ of each set: numbers of bins of a width of the mean / 60, each followed by its count.
@@ -182,7 +183,9 @@ impl Sets {
         for (row, number) in read_sets(layout).zip(0_u64..) {
             let row = row?;
             if number.is_multiple_of(spacing) {
-                sets.commands.push(sweep.command_of_set(&row.parameters));
+                let command = || sweep.command_of_set(&row.parameters);
+                let is_computed = sweep.measured().is_none();
+                sets.commands.extend(is_computed.then(command));
                 sets.histograms.push(Vec::new());
                 sets.columns.push(&row, exact);
                 sets.places.insert(row.set_id.clone(), shown.len());

@@ -84,7 +84,7 @@ fn a_column_has_its_name_unit_meaning_and_kind() {
 #[test]
 fn a_cell_that_a_column_cannot_hold_is_named() {
     let error = Reading::from_cells("", &mut || Value::Null).unwrap_err();
-    assert!(error.contains("column force cannot hold Null"), "{error}");
+    assert!(error.contains("column name cannot hold Null"), "{error}");
     let period = |value: f64| {
         let mut cells = [
             Value::Real(1e-6),
