@@ -110,7 +110,7 @@ fn columns_of_table(
     names: Option<&[String]>,
     join: bool,
 ) -> PyResult<Vec<FieldRef>> {
-    let recorded = recorded_schema(table, results.sweep().recording());
+    let recorded = recorded_schema(table, results.sweep());
     let is_own = |field: &FieldRef| recorded.field_with_name(field.name()).is_ok();
     let mut all = JoinedTable::columns(results, table);
     if let Some(names) = names {

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stickslip::observe::ContactRow;
 use stickslip::results::tables::{
-    All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label,
+    All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, gaps, label,
 };
 use stickslip::single_job::{self, Records, Request, only_job};
 use stickslip::sweep::{Change, Sweep};
@@ -110,10 +110,7 @@ pub fn simulate<'py>(
                 .slips
                 .iter()
                 .map(|slip| -> SlipRow<'_> { (Cow::Borrowed(&names), Cow::Borrowed(slip)) });
-            tables.insert(
-                "slips",
-                Table::without(&sweep.recording().left_out(), slips)?,
-            );
+            tables.insert("slips", Table::with(&gaps(&sweep), slips)?);
             if sweep.recording().precursors {
                 let rows = measured
                     .precursors

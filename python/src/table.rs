@@ -11,9 +11,8 @@ use pyo3::exceptions::PyAttributeError;
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule, PyDict, PyTuple};
-use std::borrow::Cow;
 use stickslip::table::Table as TableRow;
-use stickslip::table::arrow::{DESCRIPTION, RowBuffer, UNIT};
+use stickslip::table::arrow::{DESCRIPTION, Gaps, RowBuffer, UNIT};
 
 /// A table with its units, in Arrow's memory layout.
 ///
@@ -38,15 +37,11 @@ impl Table {
 
     /// A table of rows in memory.
     pub fn of_rows<R: TableRow>(rows: impl Iterator<Item = R>) -> Result<Self, Error> {
-        Self::without(&[], rows)
+        Self::with(&Gaps::default(), rows)
     }
 
-    /// The same without the columns of these names.
-    pub fn without<R: TableRow>(
-        left_out: &[Cow<'static, str>],
-        rows: impl Iterator<Item = R>,
-    ) -> Result<Self, Error> {
-        let mut buffer = RowBuffer::new::<R>().without(left_out);
+    pub fn with<R: TableRow>(gaps: &Gaps, rows: impl Iterator<Item = R>) -> Result<Self, Error> {
+        let mut buffer = RowBuffer::new::<R>().with(gaps);
         rows.for_each(|row| buffer.push(&row));
         let batch = buffer.take()?;
         Ok(Self::new(R::NAME, batch.schema(), vec![batch]))

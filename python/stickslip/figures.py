@@ -5,6 +5,7 @@ Each returns its axes, so that anything can be added or changed: `axes.set_xlim(
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -21,6 +22,7 @@ class Tables(Protocol):
     """What figures read of `stickslip.Results`."""
 
     directory: Path
+    name: str
 
     def sets(self, columns: Sequence[str] | None = None) -> Table: ...
     def histograms(self, columns: Sequence[str] | None = None) -> Table: ...
@@ -84,19 +86,25 @@ class Plot(Guessed):
         return getattr(self, figure.replace("-", "_"))(**options)
 
     @_styled()
-    def phase_eta(self, axes: "Axes | None" = None) -> "Axes":
-        """Phases of slips (rad) against eta, with means of all slips in bins of eta and where Eq. 2 lets slips begin (Fig. 3e)."""
+    def phase_eta(self, axes: "Axes | None" = None, others: "Sequence[Tables]" = ()) -> "Axes":
+        """Phases of slips (rad) against eta, with means of all slips in bins of eta and where Eq. 2 lets slips begin (Fig. 3e).
+
+        Of other directories, computed or measured, the means are hollow marks under their names:
+        `results.plot.phase_eta(others=[stickslip.open("results/mine")])`.
+        """
         points = self._slips("phase")
         axes = axes or _new_axes()
         low, high = 0.8 * points["eta"].min(), 1.25 * points["eta"].max()
         axes.axvspan(min(low, 1), 1, color="0.9", zorder=0, label=r"$\eta$ < 1")
         _scatter(axes, points, "eta", "phase")
-        means = self._mean_phases(points)
-        eta, mean = (means["eta_low"] * means["eta_high"]) ** 0.5, means["phase_mean"]
-        across = abs(means[["eta_low", "eta_high"]].sub(eta, axis=0)).T
-        along = abs(means[["phase_mean_low", "phase_mean_high"]].sub(mean, axis=0)).T
         label = r"mean of all slips in a bin of $\eta$, 95 %"
-        axes.errorbar(eta, mean, along, across, fmt="o", color=AVERAGE, markersize=4.5, elinewidth=1, label=label)
+        _mark(axes, self._mean_phases(points), fmt="o", color=AVERAGE, markersize=4.5, label=label)
+        for other, marker in zip(others, cycle("sDv^"), strict=False):
+            plot = Plot(other)
+            means = plot._mean_phases(plot._slips("phase"))
+            hollow = {"markerfacecolor": "white", "markersize": 6, "zorder": 4}
+            _mark(axes, means, fmt=marker, color="black", label=other.name, **hollow)
+            low, high = min(low, 0.8 * means["eta_low"].min()), max(high, 1.25 * means["eta_high"].max())
         axes.plot(*_least_phases(high), color=THEORY, linewidth=1.6, label=r"$\phi_{\min}$, Eq. 2")
         label = r"$\eta = 2\pi\Delta/(T\,V_0)$"
         axes.set(xscale="log", xlim=(low, high), xlabel=label, ylabel=r"Phase $\phi$ (rad)")
@@ -177,6 +185,14 @@ def _scatter(axes: "Axes", points: "pandas.DataFrame", x: str, y: str) -> None:
     for has_phase, colour, label in ((False, OTHERS, "other slips"), (True, PHASED, "slips of sets with a phase")):
         of_kind = points[points["has_phase"] == has_phase]
         axes.plot(of_kind[x], of_kind[y], ".", color=colour, markersize=MARKER, alpha=0.5, markeredgewidth=0, label=label)
+
+
+def _mark(axes: "Axes", means: "pandas.DataFrame", **marks: Any) -> None:
+    """Mean phases with their intervals, over the eta of their slips."""
+    eta, mean = (means["eta_low"] * means["eta_high"]) ** 0.5, means["phase_mean"]
+    across = abs(means[["eta_low", "eta_high"]].sub(eta, axis=0)).T
+    along = abs(means[["phase_mean_low", "phase_mean_high"]].sub(mean, axis=0)).T
+    axes.errorbar(eta, mean, along, across, elinewidth=1, **marks)
 
 
 def _least_phases(high: float) -> "tuple[numpy.ndarray, numpy.ndarray]":

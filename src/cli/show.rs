@@ -572,7 +572,7 @@ fn note_on_drive(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
 fn note_on_single_series(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let single = rows.iter().filter(|row| row.finished_jobs == 1).count() as u64;
     let sets = output::count(single, "set");
-    let note = "have a single series: their error is from the correlation within it";
+    let note = "with a single series: the error is from the correlation within the series";
     (single > 0 && sweep.measured().is_some()).then(|| format!("{sets} {note}"))
 }
 

@@ -26,6 +26,7 @@ mod grid;
 mod grid_hard_cases;
 mod hard_cases;
 mod kills;
+mod measured;
 mod moved;
 mod outputs;
 mod program;

@@ -1,0 +1,371 @@
+//! Measured slips in the built program: read in any form, reduced as the model's, refused where they make no sense.
+
+use crate::program::{Cell, Folder};
+use std::fs;
+
+/// The model, as a source of slips: without modulation and with two.
+const MODEL: &str = "name = \"model\"\n[model]\nN = 10\nNs = 5\n[axes]\nseed = { count = 9 }\n\
+                     zip = { Delta = [0, 1e-6, 1e-6], frequency = [29, 29, 58] }\n\
+                     [record]\nslips = 60\ndiscard = 0\n";
+const COLUMNS: &str = "--column run=id --column onset=t:ms --column V0=v:um/s --column Delta=amp:µm \
+                       --column frequency=f --column drop=d:mN --column peak_force=F:kN";
+
+/// The slips of the model as an experiment would write them, with the seeds of each set counted on.
+fn experiment(folder: &Folder, digits: usize) -> String {
+    folder.write("model.toml", MODEL);
+    folder.ends(0, "run model.toml --out model");
+    folder.ends(0, "export model --out exported --format csv");
+    let text = fs::read_to_string(folder.path("exported/slips.csv")).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let place = |name: &str| names.iter().position(|known| *known == name).unwrap();
+    let mut rows = vec!["id;t;v;amp;f;d;F".to_owned()];
+    for cells in lines {
+        let cell = |name: &str| cells[place(name)];
+        let scaled = |name: &str, factor: f64| {
+            let value: f64 = cell(name).parse().unwrap();
+            format!("{:.digits$e}", factor * value)
+        };
+        rows.push(format!(
+            "{}/{}/{};{};{};{};{};{};{}",
+            cell("Delta"),
+            cell("frequency"),
+            cell("seed"),
+            scaled("onset", 1e3),
+            scaled("V0", 1e6),
+            scaled("Delta", 1e6),
+            cell("frequency"),
+            scaled("drop", 1e3),
+            scaled("peak_force", 1e-3),
+        ));
+    }
+    // With decimal commas.
+    rows.join("\r\n").replace('.', ",")
+}
+
+/// The names of all columns of sets that are numbers, and their values set by set.
+fn numbers(folder: &Folder, directory: &str) -> Vec<(String, Vec<Option<f64>>)> {
+    let rows = folder.file(&format!("{directory}/reduced/sets.parquet"));
+    let number = |cell: &Cell| match cell {
+        Cell::Real(bits) => Some(f64::from_bits(*bits)),
+        Cell::Count(count) => Some(*count as f64),
+        _ => None,
+    };
+    let fields = rows.schema.as_ref().unwrap().fields().iter();
+    fields
+        .map(|field| {
+            (
+                field.name().clone(),
+                rows.column(field.name()).map(number).collect(),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn slips_of_the_model_read_back_in_other_units_have_the_same_statistics() {
+    let folder = Folder::new();
+    folder.write("slips.csv", &experiment(&folder, 14));
+    let read = folder.ends(
+        0,
+        &format!("measured slips.csv -o out {COLUMNS} --set Kd=40:N/um"),
+    );
+    assert!(
+        read.stdout.contains("slips           1620"),
+        "{}",
+        read.stdout
+    );
+    let expected = numbers(&folder, "model");
+    let mut same = 0;
+    for ((name, found), (_, expected)) in numbers(&folder, "out").iter().zip(&expected) {
+        // What only a model knows, and the drive alone, for which this model has no control.
+        let is_known = found.iter().all(Option::is_some) || expected.iter().all(Option::is_none);
+        if !is_known || name.contains("drive") || name.contains("excess") {
+            continue;
+        }
+        same += 1;
+        for (found, expected) in found.iter().zip(expected) {
+            let off = found.zip(*expected).map_or(0.0, |(found, expected)| {
+                (found - expected).abs() / expected.abs().max(1e-9)
+            });
+            assert!(off < 1e-9, "{name}: {found:?}, {expected:?}");
+        }
+    }
+    assert!(same > 40, "{same}");
+    // Against its own control, and no parameter that nobody measured.
+    let sets = folder.file("out/reduced/sets.parquet");
+    assert_eq!(sets.reals("resultant_excess").len(), 2);
+    for (table, unknown) in [
+        ("slips", "size"),
+        ("slips", "onset_cut"),
+        ("jobs", "N"),
+        ("jobs", "breaks"),
+    ] {
+        let rows = folder.table("out", table);
+        assert!(
+            rows.column(unknown).all(|cell| *cell == Cell::Null),
+            "{unknown}"
+        );
+    }
+    assert!(sets.column("N").all(|cell| *cell == Cell::Null));
+    assert_eq!(sets.reals("Kd"), [4e7; 3]);
+    assert_eq!(folder.table("out", "slips").unit("size"), "");
+}
+
+#[test]
+fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
+    let folder = Folder::new();
+    folder.write("slips.csv", &experiment(&folder, 8));
+    let command = format!("measured slips.csv -o out {COLUMNS}");
+    folder.ends(0, &command);
+    let before = folder.tables("out");
+    folder.ends(0, &command);
+    assert_eq!(folder.tables("out"), before);
+    for command in [
+        "run out",
+        "plan out",
+        "batch slurm out --workers 2 --threads 2 --time 1h",
+    ] {
+        let refused = folder.ends(2, command);
+        assert!(
+            refused.stderr.contains("were measured"),
+            "{command}: {}",
+            refused.stderr
+        );
+    }
+    let other = folder.ends(
+        2,
+        "measured slips.csv -o out --column run=id --column onset=t --set V0=1e-4",
+    );
+    assert!(
+        other.stderr.contains("holds other results"),
+        "{}",
+        other.stderr
+    );
+    folder.ends(2, "run model.toml --out out");
+
+    let verified = |code| folder.ends(code, "verify out").stdout;
+    assert!(verified(0).contains("slips.csv: as it was read"));
+    folder.write("slips.csv", "changed");
+    assert!(verified(0).contains("slips.csv: differs from what was read"));
+    fs::remove_file(folder.path("slips.csv")).unwrap();
+    assert!(verified(0).contains("slips.csv: cannot be read here"));
+
+    for command in [
+        "status out",
+        "reduce out",
+        "report out",
+        "export out --out csv --format csv",
+        "show out --json",
+    ] {
+        folder.ends(0, command);
+    }
+    assert!(
+        !fs::read_to_string(folder.path("out/report.html"))
+            .unwrap()
+            .contains("simulate --set")
+    );
+    let seeds = folder.ends(0, "show model out").stdout;
+    assert!(
+        seeds.contains("⟨τ⟩, B − A") && !seeds.contains("model.N"),
+        "{seeds}"
+    );
+    let unknown = folder.ends(2, "plot out --of slips --x onset --y size");
+    assert!(
+        unknown.stderr.contains("--y size: was not measured"),
+        "{}",
+        unknown.stderr
+    );
+    folder.ends(2, "show out --columns size");
+}
+
+#[test]
+fn figures_show_other_directories_as_hollow_marks_under_their_names() {
+    let folder = Folder::new();
+    folder.write("slips.csv", &experiment(&folder, 8));
+    folder.ends(0, &format!("measured slips.csv -o mine {COLUMNS}"));
+    let figure =
+        |name: &str| fs::read_to_string(folder.path(&format!("model/figures/{name}.svg"))).unwrap();
+    let standing = ["phi-eta", "tau-T", "overview"];
+    let before = standing.map(figure);
+    folder.ends(0, "plot model --with mine");
+    for (name, before) in standing.iter().zip(before) {
+        let with = figure(name);
+        assert!(
+            with.contains(">mine<") && !before.contains(">mine<"),
+            "{name}"
+        );
+        assert!(
+            with.matches("<path").count() > before.matches("<path").count(),
+            "{name}"
+        );
+    }
+    folder.ends(
+        0,
+        "plot mine --with model --x frequency --y drop_mean -o custom.svg",
+    );
+    let custom = fs::read_to_string(folder.path("custom.svg")).unwrap();
+    assert!(custom.contains(">model<"), "{custom}");
+    // What it was drawn from stands as it was.
+    folder.ends(0, "plot model");
+    assert!(!figure("phi-eta").contains(">mine<"));
+    folder.ends(2, "plot model --with nowhere");
+}
+
+/// Ten slips, and what else a line holds.
+fn lines(head: &str, line: impl Fn(u32) -> String) -> String {
+    let lines = (1..11).map(line).collect::<Vec<_>>().join("\n");
+    format!("{head}\n{lines}\n")
+}
+
+#[test]
+fn files_of_other_programs_just_work() {
+    let folder = Folder::new();
+    let plain = lines("onset,drop", |n| format!("{}.5,3", n * n));
+    let forms = [
+        ("plain.csv", plain.clone()),
+        ("bom.csv", format!("\u{feff}{plain}")),
+        ("windows.csv", plain.replace('\n', "\r\n")),
+        ("quoted.csv", plain.replace("onset", "\"onset\"")),
+        ("comments.csv", format!("# rig 1\n{plain}\n# end\n")),
+        ("tabs.tsv", plain.replace(',', "\t")),
+        ("german.csv", plain.replace(',', ";").replace('.', ",")),
+        ("spaces.csv", plain.replace(',', " , ")),
+        ("no-end.csv", plain.trim_end().to_owned()),
+    ];
+    let mut found = Vec::new();
+    for (name, text) in forms {
+        folder.write(name, &text);
+        folder.ends(0, &format!("measured {name} -o {name}-out --set V0=1e-4"));
+        found.push(folder.table(&format!("{name}-out"), "slips").reals("onset"));
+    }
+    assert!(found.iter().all(|onsets| *onsets == found[0]), "{found:?}");
+    assert_eq!(found[0].len(), 10);
+    folder.ends(
+        0,
+        "simulate --set N=10 --set Ns=5 --slips 9 --slip-table slips.parquet",
+    );
+    folder.ends(
+        0,
+        "measured slips.parquet slips.parquet -o both --column run=seed",
+    );
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
+    let folder = Folder::new();
+    let good = lines("onset,drop", |n| format!("{n},3"));
+    let cases = [
+        (good.replace("onset", "t"), "", "has no column onset"),
+        (good.clone(), "--column onset=time", "has no column time"),
+        (good.clone(), "--column drop=size", "has no column size"),
+        (
+            good.clone(),
+            "--column onset=onset:furlong",
+            "furlong: must be s",
+        ),
+        (good.clone(), "--column onst=drop", "did you mean onset?"),
+        (good.clone(), "--set drop=3", "beside --set drop"),
+        (
+            good.replace("\n4,3", "\n3,3"),
+            "",
+            "line 5: onset 3 s is not after 3 s",
+        ),
+        (
+            good.replace("\n4,3", "\n2.5,3"),
+            "",
+            "line 5: onset 2.5 s is not after 3 s",
+        ),
+        (
+            good.replace("\n4,3", "\nNaN,3"),
+            "",
+            "line 5: onset = NaN: must be a number",
+        ),
+        (good.replace("\n4,3", "\n,3"), "", "line 5: onset: is empty"),
+        (
+            good.replace("\n4,3", "\n4,x"),
+            "",
+            "line 5: drop = x: must be a number",
+        ),
+        (good.replace("\n4,3", "\n-4,3"), "", "line 5: onset = -4 s"),
+        (
+            good.replace("\n4,3", "\n4"),
+            "",
+            "line 5: 1 cells for 2 columns",
+        ),
+        (good.replace("\n4,3", "\n4,0,3,1"), "", "decimal commas"),
+        (
+            good.replace("\n4,3", "\nonset,drop"),
+            "",
+            "line 5: onset = onset",
+        ),
+        (String::new(), "", "has no column onset"),
+        ("onset,drop\n".to_owned(), "", "has no slips"),
+        ("\u{0}\u{1}PAR".to_owned(), "", "has no column onset"),
+        ("PAR1".to_owned(), "", "slips.csv: "),
+        (
+            good.clone(),
+            "--set V0=-1",
+            "V0 = -1: must be a finite number > 0",
+        ),
+        (
+            good.clone(),
+            "--set Delta=1e-6",
+            "Delta > 0: needs T or frequency",
+        ),
+        (good.clone(), "--set Kd=0", "Kd = 0: must be"),
+    ];
+    for (text, options, expected) in cases {
+        folder.write("slips.csv", &text);
+        let speed = if options.contains("V0") {
+            ""
+        } else {
+            "--set V0=1e-4"
+        };
+        let refused = folder.ends(2, &format!("measured slips.csv -o out {speed} {options}"));
+        assert!(
+            refused.stderr.starts_with("error: ") && refused.stderr.contains(expected),
+            "{expected}: {}",
+            refused.stderr
+        );
+        assert!(!folder.path("out").exists(), "{expected}");
+    }
+    folder.write("slips.csv", &good);
+    let without = folder.ends(2, "measured slips.csv -o out");
+    assert!(
+        without.stderr.contains("line 2: V0 is missing"),
+        "{}",
+        without.stderr
+    );
+    folder.write(
+        "runs.csv",
+        &lines("onset,run", |n| format!("{n},{}", n / 3 % 2)),
+    );
+    let again = folder.ends(2, "measured runs.csv -o out --set V0=1e-4");
+    assert!(
+        again.stderr.contains("line 7: run 0 begins again"),
+        "{}",
+        again.stderr
+    );
+    let fast = folder.ends(0, "measured slips.csv -o fast --set V0=100");
+    assert!(fast.stderr.contains("far too fast"), "{}", fast.stderr);
+}
+
+#[test]
+fn a_missing_control_and_a_single_series_are_named() {
+    let folder = Folder::new();
+    folder.write("slips.csv", &lines("onset", |n| format!("{}", n * n)));
+    let options = "--set V0=2e-4 --set Kd=3e7 --set Delta=1e-6 --set T=0.03 --maximum 0.01";
+    let read = folder.ends(0, &format!("measured slips.csv -o out {options}"));
+    let expected = [
+        "R without slips measured at Δ = 0 and V₀ = 2·10⁻⁴ m/s, K_d = 3·10⁷ N/m",
+        "1 set with a single series: the error is from the correlation within the series",
+    ];
+    for expected in expected {
+        assert!(read.stdout.contains(expected), "{}", read.stdout);
+    }
+    let phases = folder.table("out", "slips").reals("phase");
+    let turns = (1.0 - 0.01) / 0.03_f64;
+    let expected = std::f64::consts::TAU * (turns - turns.round());
+    assert!((phases[0] - expected).abs() < 1e-9, "{phases:?}");
+}
