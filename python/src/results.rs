@@ -14,10 +14,10 @@ use stickslip::reduce::{
 };
 use stickslip::results::exported::{JoinedTable, with_columns};
 use stickslip::results::layout::Layout;
-use stickslip::results::tables::{JOBS, TABLES, recorded_schema};
+use stickslip::results::tables::{JOBS, TABLES, gaps, recorded_schema};
 use stickslip::results::{Results, ResultsError};
 use stickslip::table::Table as TableRow;
-use stickslip::table::arrow::schema;
+use stickslip::table::arrow::{Gaps, RowBuffer, schema};
 use stickslip::table::file::{Batch, Dataset};
 use stickslip::table::storage::Disk;
 
@@ -153,19 +153,24 @@ fn read_table(
 
 /// Name and columns of a table of reduced data.
 fn reduced_columns(results: &Results<'_>, table: &str) -> PyResult<(&'static str, Fields)> {
-    fn of<R: TableRow>() -> (&'static str, Fields) {
-        (R::NAME, schema::<R>().fields().clone())
+    fn of<R: TableRow>(gaps: &Gaps) -> (&'static str, Fields) {
+        let rows = RowBuffer::new::<R>().with(gaps);
+        (R::NAME, rows.schema().fields().clone())
     }
+    let gaps = Gaps {
+        left_out: Vec::new(),
+        ..gaps(results.sweep())
+    };
     if table == SetRow::NAME && results.round().is_some() {
         return Ok((SetRow::NAME, schema::<SetInRounds>().fields().clone()));
     }
     let all = [
-        of::<SetRow>(),
-        of::<EdgeRow>(),
-        of::<TriggerRow>(),
-        of::<HistogramBin>(),
-        of::<BackboneBin>(),
-        of::<Point>(),
+        of::<SetRow>(&gaps),
+        of::<EdgeRow>(&gaps),
+        of::<TriggerRow>(&gaps),
+        of::<HistogramBin>(&gaps),
+        of::<BackboneBin>(&gaps),
+        of::<Point>(&gaps),
     ];
     let found = all.into_iter().find(|(name, _)| *name == table);
     found.ok_or_else(|| PyValueError::new_err(format!("there is no table {table}")))

@@ -102,7 +102,7 @@ fn the_parts_of_a_killed_process_are_taken_over_and_the_status_shows_living_work
 fn a_run_that_leaves_the_rest_to_others_ends_with_3_and_a_worker_of_many_with_0() {
     let folder = Folder::new();
     // The first part takes seconds.
-    let text = "name = \"long\"\n[[axes.zip]]\nN = [150, 3]\nNs = [100, 2]\n[axes]\nseed = [0]\n[record]\nslips = 60\n";
+    let text = "name = \"long\"\n[[axes.zip]]\nN = [150, 3]\nNs = [100, 2]\n[axes]\nseed = [0]\n[record]\nslips = 300\n";
     folder.write("long.toml", text);
     let mut first = folder.start("run long.toml --out r --threads 1 --no-reduce");
     let claims = folder.path("r/run/claims/part-000-000000.0");

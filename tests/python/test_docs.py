@@ -113,7 +113,7 @@ def test_the_readme_installs_first_what_needs_no_download():
 def commands(page):
     """The commands of `stickslip` on a page, in blocks and in lines, with values for what stands for one."""
     text = page.read_text()
-    blocks = "".join(re.findall(r"^```sh\n(.*?)^```", text, re.M | re.S))
+    blocks = "".join(re.findall(r"^```sh\n(.*?)^```", text, re.M | re.S)).replace("\\\n", " ")
     found = re.findall(r"^(?:exec )?stickslip (.*?)(?: -- .*| [>#] .*)?$", blocks, re.M)
     found += re.findall(r"`stickslip ([^`]+)`", text)
     found += re.findall(r"^    stickslip (.*?)(?:   .*)?$", text, re.M)
