@@ -11,13 +11,14 @@ use crate::model::theory::to_twelve_digits;
 use crate::model::{Symbol, Value};
 use crate::observe::{Measurements, Modulation, Slip, phase};
 use crate::solver::Summary;
-use crate::sweep::{Job, Measured, Sweep, hint};
+use crate::sweep::{Job, Measured, Sweep, nearest};
 use crate::table::arrow::texts;
 use crate::table::checksum::hexadecimal;
 use crate::table::shown::shown;
 use anyhow::{Context, Result, bail, ensure};
 use arrow_schema::DataType;
 use bytes::Bytes;
+use csv::StringRecord;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use sha2::{Digest, Sha256};
 use std::collections::HashSet;
@@ -27,22 +28,18 @@ use std::str;
 use toml_edit::{Array, Value as Toml};
 
 /// What columns, or the command line, can give, and in which unit.
-const KEYS: [(&str, &str); 9] = [
-    (ONSET, "s"),
-    (DROP, "N"),
-    (PEAK_FORCE, "N"),
-    (RUN, ""),
+const KEYS: [(&str, &str); 10] = [
+    ("onset", "s"),
+    ("drop", "N"),
+    ("peak_force", "N"),
+    ("run", ""),
     ("V0", "m/s"),
     ("Kd", "N/m"),
     ("Delta", "m"),
     ("T", "s"),
-    (FREQUENCY, "Hz"),
+    ("frequency", "Hz"),
+    ("maximum", "s"),
 ];
-const ONSET: &str = "onset";
-const DROP: &str = "drop";
-const PEAK_FORCE: &str = "peak_force";
-const RUN: &str = "run";
-const FREQUENCY: &str = "frequency";
 const PARAMETERS: [Symbol; 4] = [Symbol::V0, Symbol::Kd, Symbol::Delta, Symbol::T];
 
 /// What is to be read.
@@ -53,7 +50,7 @@ pub struct Request<'a> {
     pub columns: &'a [String],
     /// `KEY=VALUE:UNIT`, for all rows.
     pub settings: &'a [String],
-    /// The time of a maximum of the modulation, in s.
+    /// The time of a maximum of the modulation where no column gives it, in s.
     pub maximum: f64,
     /// The name of the sweep.
     pub name: &'a str,
@@ -72,13 +69,20 @@ impl Experiment {
     pub fn read(request: Request<'_>) -> Result<Self> {
         let columns = parse_all("--column", request.columns)?;
         let settings = parse_all("--set", request.settings)?;
+        let mut checksums = HashSet::new();
         let mut files = Array::new();
         let mut begins = Array::new();
         let mut series: Vec<Vec<Row>> = Vec::new();
         for path in request.files {
             let file = shown(path);
             let bytes = fs::read(path).with_context(|| file.to_string())?;
-            files.push(format!("{}  {file}", hexadecimal(&Sha256::digest(&bytes))));
+            let checksum = hexadecimal(&Sha256::digest(&bytes));
+            let is_new = checksums.insert(checksum.clone());
+            ensure!(
+                is_new,
+                "{file}: holds the same as a file before it; name it once"
+            );
+            files.push(format!("{checksum}  {file}"));
             let mut table = Table {
                 columns: &columns,
                 settings: &settings,
@@ -90,15 +94,15 @@ impl Experiment {
             series.extend(table.series);
         }
         let maximum = request.maximum;
-        let columns = request
-            .columns
-            .iter()
-            .map(|text| format!("--column {text}"));
-        let settings = request.settings.iter().map(|text| format!("--set {text}"));
-        let options = columns
-            .chain(settings)
-            .chain([format!("--maximum {maximum}")]);
-        let options: Array = options.collect();
+        let columns = request.columns.iter().map(|text| ("--column", text));
+        let settings = request.settings.iter().map(|text| ("--set", text));
+        let mut options = vec![format!("--maximum {maximum}")];
+        options.extend(
+            columns
+                .chain(settings)
+                .map(|(flag, text)| format!("{flag} {text}")),
+        );
+        let options = Array::from_iter(options);
         let rest = rest_of_sweep(&series);
         let text = format!(
             "name = {:?}\n[measured]\nfiles = {files}\nseries = {begins}\noptions = {options}\n{rest}",
@@ -124,7 +128,8 @@ impl Experiment {
         let slip = |(number, row): (u64, &Row)| {
             let onset = row.slip.onset;
             let interval = last.replace(onset).map(|last| onset - last);
-            let phase_in = |period| phase(onset - self.maximum, period, parameters.eta());
+            let time = onset - row.maximum.unwrap_or(self.maximum);
+            let phase_in = |period| phase(time, period, parameters.eta());
             Slip {
                 number,
                 interval,
@@ -178,12 +183,20 @@ fn parse_all<'a>(flag: &str, texts: &'a [String]) -> Result<Vec<Source<'a>>> {
 fn parse(text: &str) -> Result<Source<'_>> {
     let (key, from) = text.split_once('=').unwrap_or((text, ""));
     let known = KEYS.into_iter().find(|(known, _)| *known == key);
-    let (key, si) = known.with_context(|| hint(key, &KEYS.map(|(key, _)| key)))?;
+    let (key, si) = known.with_context(|| guess(key, &KEYS.map(|(key, _)| key)))?;
     let (from, unit) = from.rsplit_once(':').unwrap_or((from, si));
     ensure!(!from.is_empty(), "must be {key}=NAME or {key}=NAME:UNIT");
     let factor = factor(unit, si);
     let factor = factor.with_context(|| format!("{unit}: must be {si}, or with prefixes"))?;
     Ok((key, from, factor))
+}
+
+/// What is meant by an unknown word: the nearest of those known, or all.
+fn guess(word: &str, known: &[&str]) -> String {
+    nearest(word, known).map_or_else(
+        || format!("there are {}", known.join(", ")),
+        |near| format!("did you mean {near}?"),
+    )
 }
 
 /// The factor from a unit to that of SI.
@@ -223,6 +236,8 @@ struct Row {
     series: (String, [Option<f64>; 4]),
     /// Its onset, peak force and drop; NaN if they are not given.
     slip: Slip,
+    /// The time of a maximum of the modulation, in s.
+    maximum: Option<f64>,
 }
 
 impl Table<'_> {
@@ -230,7 +245,10 @@ impl Table<'_> {
         if bytes.starts_with(b"PAR1") {
             self.read_parquet(bytes)?;
         } else {
-            let text = str::from_utf8(bytes).context("is neither Parquet nor UTF-8 text")?;
+            let text = str::from_utf8(bytes);
+            let text = text.context("is neither Parquet nor UTF-8 text; save it as UTF-8")?;
+            // For the reader to count lines right.
+            let text = text.replace("\r\n", "\n") + "\n";
             self.read_text(text.trim_start_matches('\u{feff}'))?;
         }
         ensure!(
@@ -253,9 +271,9 @@ impl Table<'_> {
             .from_reader(text.as_bytes());
         let names: Vec<String> = reader.headers()?.iter().map(str::to_owned).collect();
         let places = self.places(&names)?;
-        for record in reader.records() {
-            let record = record?;
-            let line = record.position().map_or(0, csv::Position::line);
+        let mut record = StringRecord::new();
+        while reader.read_record(&mut record)? {
+            let line = reader.position().line() - 1;
             let [found, expected] = [record.len(), names.len()];
             ensure!(
                 found == expected,
@@ -308,10 +326,10 @@ impl Table<'_> {
                 "has a column {name} beside --set {key}; keep one"
             );
             places.extend(place.map(|place| (key, place, factor)));
-            if place.is_none() && (asked.is_some() || key == ONSET) {
+            if place.is_none() && (asked.is_some() || key == "onset") {
                 let known: Vec<&str> = names.iter().map(String::as_str).collect();
-                let hint = hint(name, &known);
-                bail!("has no column {name}; {hint}, in --column {key}=NAME:UNIT");
+                let guess = guess(name, &known);
+                bail!("has no column {name}; {guess}, in --column {key}=NAME:UNIT");
             }
         }
         Ok(places)
@@ -330,7 +348,10 @@ impl Table<'_> {
             let run = &row.series.0;
             let is_new =
                 run.is_empty() || self.series.iter().all(|rows| rows[0].series != row.series);
-            ensure!(is_new, "run {run} begins again; sort by run and onset");
+            ensure!(
+                is_new,
+                "run {run} begins again: sort by run and onset, and give it one V0, Kd, Delta and T"
+            );
             self.series.push(vec![row]);
             return Ok(());
         };
@@ -347,8 +368,9 @@ impl Table<'_> {
 impl Row {
     fn read(line: u64, cells: &Cells<'_>) -> Result<Self> {
         let cell = |key: &str| cells.iter().find(|cell| cell.0 == key);
+        let is_given = |text: &str| !["", "-", "NA"].contains(&text);
         let number = |key: &str| {
-            let Some((_, text, factor)) = cell(key).filter(|cell| !cell.1.is_empty()) else {
+            let Some((_, text, factor)) = cell(key).filter(|cell| is_given(cell.1)) else {
                 return Ok(None);
             };
             let number = text.parse().ok().filter(|number: &f64| number.is_finite());
@@ -357,21 +379,22 @@ impl Row {
                 .map(Some)
                 .with_context(|| format!("{key} = {text}: must be a number"))
         };
-        let onset = number(ONSET)?.context("onset: is empty")?;
+        let onset = number("onset")?.context("onset: is empty")?;
         ensure!(
             onset >= 0.0,
             "onset = {onset} s: must be 0 or later; shift the times"
         );
-        let run = cell(RUN).map_or_else(String::new, |cell| cell.1.to_owned());
+        let run = cell("run").map_or_else(String::new, |cell| cell.1.to_owned());
         Ok(Self {
             line,
             series: (run, parameters(&number)?),
             slip: Slip {
                 onset,
-                drop: number(DROP)?.unwrap_or(f64::NAN),
-                peak_force: number(PEAK_FORCE)?.unwrap_or(f64::NAN),
+                drop: number("drop")?.unwrap_or(f64::NAN),
+                peak_force: number("peak_force")?.unwrap_or(f64::NAN),
                 ..Slip::default()
             },
+            maximum: number("maximum")?,
         })
     }
 }
@@ -383,7 +406,8 @@ fn parameters(number: &dyn Fn(&str) -> Result<Option<f64>>) -> Result<[Option<f6
         // The factor of a unit leaves a rounding error behind.
         *found = number(symbol.key())?.map(to_twelve_digits);
         if symbol == Symbol::T && found.is_none() {
-            *found = number(FREQUENCY)?.map(|frequency| 1.0 / to_twelve_digits(frequency));
+            let frequency = number("frequency")?.filter(|frequency| *frequency != 0.0);
+            *found = frequency.map(|frequency| 1.0 / to_twelve_digits(frequency));
         }
         if let Some(value) = *found {
             let allowed = symbol.description().allowed();
@@ -408,10 +432,10 @@ fn parameters(number: &dyn Fn(&str) -> Result<Option<f64>>) -> Result<[Option<f6
 /// The sections of a sweep of these series, with what is known of their slips.
 fn rest_of_sweep(series: &[Vec<Row>]) -> String {
     let rows = || series.iter().flatten();
-    let drops = rows().any(|row| !row.slip.drop.is_nan()).then_some(DROP);
+    let drops = rows().any(|row| !row.slip.drop.is_nan()).then_some("drop");
     let forces = rows()
         .any(|row| !row.slip.peak_force.is_nan())
-        .then_some(PEAK_FORCE);
+        .then_some("peak_force");
     let columns: Array = drops.into_iter().chain(forces).collect();
     let is_modulated = rows().any(|row| row.series.1[3].is_some());
     let mut axes = String::new();

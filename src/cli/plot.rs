@@ -99,6 +99,10 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         .iter()
         .map(other)
         .collect::<Result<Vec<Other>>>()?;
+    if arguments.custom.of == Dots::Slips && !others.is_empty() {
+        let problem = "--with: figures of slips show one directory; leave --of slips out";
+        return Err(UsageError(problem.to_owned()).into());
+    }
     let files = if let Some(figure) = arguments.custom.figure() {
         let picture = draw_custom(&results, &others, &figure, &look)?;
         if look.style == Style::Print {

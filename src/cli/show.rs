@@ -482,7 +482,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         note_on_cut_jobs(rows),
         note_on_few_cycles(rows),
         note_on_drive(sweep, rows),
-        note_on_single_series(sweep, rows),
+        note_on_series(sweep, rows),
         note_on_model(sweep, rows),
         failed,
         note_on_removed_sets(sweep, rows),
@@ -550,12 +550,12 @@ fn note_on_drive(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
             };
             let settings = [Symbol::V0, Symbol::Kd].into_iter().filter_map(setting);
             let settings: Vec<String> = settings.collect();
-            format!("slips measured at Δ = 0 and {}", settings.join(", "))
+            format!("a control, slips at Δ = 0 and {}", settings.join(", "))
         } else {
             "control = true".to_owned()
         };
         return Some(format!(
-            "R without {control}: the load alone makes some of it (docs/statistics.md)"
+            "R without {control}: the drive alone makes some of it (docs/statistics.md)"
         ));
     }
     let is_explained = |row: &&SetRow| {
@@ -568,12 +568,30 @@ fn note_on_drive(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     (explained > 0).then(|| format!("R of {sets} {note}"))
 }
 
-/// That an error comes from a single series.
-fn note_on_single_series(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
-    let single = rows.iter().filter(|row| row.finished_jobs == 1).count() as u64;
-    let sets = output::count(single, "set");
-    let note = "with a single series: the error is from the correlation within the series";
-    (single > 0 && sweep.measured().is_some()).then(|| format!("{sets} {note}"))
+/// Of how many sets of measured slips something is to be said.
+fn note_on_series(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
+    sweep.measured()?;
+    let is_single = |row: &SetRow| row.finished_jobs == 1;
+    let is_below = |row: &SetRow| {
+        row.resultant_excess_interval
+            .is_some_and(|ends| ends.high < 0.0)
+    };
+    let notes: [(fn(&SetRow) -> bool, &str); 2] = [
+        (
+            is_single,
+            "with a single series: the error is from the correlation within the series",
+        ),
+        (
+            is_below,
+            "with less R than the drive alone makes: are all times counted from a maximum of the modulation?",
+        ),
+    ];
+    let note = |(applies, note): (fn(&SetRow) -> bool, &str)| {
+        let sets = rows.iter().filter(|row| applies(row)).count() as u64;
+        (sets > 0).then(|| format!("{} {note}", output::count(sets, "set")))
+    };
+    let notes: Vec<String> = notes.into_iter().filter_map(note).collect();
+    (!notes.is_empty()).then(|| notes.join("\n"))
 }
 
 /// What swept parameters change beside what their names say.

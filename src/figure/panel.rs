@@ -5,7 +5,7 @@ use super::frame::{Cell, Ends, Frame, HEADING, Layout, Place};
 use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::Entry;
 use super::picture::Picture;
-use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, Look, RADIUS, Stroke, WHITE, hollow};
+use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, Look, Stroke, WHITE, hollow};
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 
@@ -72,11 +72,9 @@ impl Layer<'_> {
             Self::Hollow(points, other, ink) => {
                 for point in points {
                     if frame.x.contains(point.0) && frame.y.contains(point.1) {
-                        let centre = frame.place(point);
-                        let outline = hollow(other, centre);
+                        let outline = hollow(other, frame.place(point));
                         // It is seen on any ground.
-                        sheet.discs([centre], Dot::solid(WHITE, RADIUS));
-                        sheet.line(outline.clone(), Stroke::solid(WHITE, 3.0 * BAR_WIDTH));
+                        sheet.line(outline.clone(), Stroke::solid(WHITE, 2.5 * BAR_WIDTH));
                         sheet.line(outline, Stroke::solid(ink, BAR_WIDTH));
                     }
                 }

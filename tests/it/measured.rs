@@ -210,6 +210,7 @@ fn figures_show_other_directories_as_hollow_marks_under_their_names() {
     folder.ends(0, "plot model");
     assert!(!figure("phi-eta").contains(">mine<"));
     folder.ends(2, "plot model --with nowhere");
+    folder.ends(2, "plot model --with mine --of slips --x onset --y drop");
 }
 
 /// Ten slips, and what else a line holds.
@@ -247,7 +248,11 @@ fn files_of_other_programs_just_work() {
     );
     folder.ends(
         0,
-        "measured slips.parquet slips.parquet -o both --column run=seed",
+        "simulate --set N=10 --set Ns=5 --set seed=1 --slips 9 --slip-table other.parquet",
+    );
+    folder.ends(
+        0,
+        "measured slips.parquet other.parquet -o both --column run=seed",
     );
 }
 
@@ -347,6 +352,18 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
         "{}",
         again.stderr
     );
+    let twice = folder.ends(2, "measured slips.csv slips.csv -o out --set V0=1e-4");
+    assert!(twice.stderr.contains("holds the same"), "{}", twice.stderr);
+    // Lines count whatever ends them, and comments and line breaks within a cell.
+    let breaks = good.replace("\n4,3", "\n# a\n\n4,x").replace('\n', "\r\n");
+    folder.write("slips.csv", &breaks);
+    let counted = folder.ends(2, "measured slips.csv -o out --set V0=1e-4");
+    assert!(
+        counted.stderr.contains("line 7: drop = x"),
+        "{}",
+        counted.stderr
+    );
+    folder.write("slips.csv", &good);
     let fast = folder.ends(0, "measured slips.csv -o fast --set V0=100");
     assert!(fast.stderr.contains("far too fast"), "{}", fast.stderr);
 }
@@ -358,7 +375,7 @@ fn a_missing_control_and_a_single_series_are_named() {
     let options = "--set V0=2e-4 --set Kd=3e7 --set Delta=1e-6 --set T=0.03 --maximum 0.01";
     let read = folder.ends(0, &format!("measured slips.csv -o out {options}"));
     let expected = [
-        "R without slips measured at Δ = 0 and V₀ = 2·10⁻⁴ m/s, K_d = 3·10⁷ N/m",
+        "R without a control, slips at Δ = 0 and V₀ = 2·10⁻⁴ m/s, K_d = 3·10⁷ N/m",
         "1 set with a single series: the error is from the correlation within the series",
     ];
     for expected in expected {
@@ -368,4 +385,34 @@ fn a_missing_control_and_a_single_series_are_named() {
     let turns = (1.0 - 0.01) / 0.03_f64;
     let expected = std::f64::consts::TAU * (turns - turns.round());
     assert!((phases[0] - expected).abs() < 1e-9, "{phases:?}");
+
+    // Each series from its own maximum; and if that is forgotten, phases scatter more than the drive lets them.
+    let mut text = "run,onset,Delta,zero\n".to_owned();
+    for run in 0..24 {
+        for slip in 1..40 {
+            let shift = 0.125 * f64::from(run);
+            let time = 7.0 * f64::from(slip) + f64::from(slip * 5 % 7);
+            text += &format!("free {run},{time},0,0\n");
+            text += &format!(
+                "{run},{},1e-6,{shift}\n",
+                30.0 * f64::from(slip) - 1.0 + shift
+            );
+        }
+    }
+    let (head, rows) = text.split_once('\n').unwrap();
+    let mut rows: Vec<&str> = rows.lines().collect();
+    rows.sort_by_key(|row| row.split(',').next());
+    folder.write("series.csv", &format!("{head}\n{}\n", rows.join("\n")));
+    let command = "measured series.csv --set V0=1e-6 --set T=3";
+    let aligned = folder.ends(0, &format!("{command} -o aligned --column maximum=zero"));
+    assert!(
+        folder
+            .file("aligned/reduced/sets.parquet")
+            .reals("resultant_length")[0]
+            > 0.999
+    );
+    let note = "1 set with less R than the drive alone makes";
+    assert!(!aligned.stdout.contains(note), "{}", aligned.stdout);
+    let forgotten = folder.ends(0, &format!("{command} -o forgotten"));
+    assert!(forgotten.stdout.contains(note), "{}", forgotten.stdout);
 }
