@@ -11,7 +11,7 @@ use crate::model::theory::to_twelve_digits;
 use crate::model::{Symbol, Value};
 use crate::observe::{Measurements, Modulation, Slip, phase};
 use crate::solver::Summary;
-use crate::sweep::{Job, Measured, Sweep, nearest};
+use crate::sweep::{Job, MAX_NAME, Measured, Sweep, nearest};
 use crate::table::arrow::texts;
 use crate::table::checksum::hexadecimal;
 use crate::table::shown::shown;
@@ -23,7 +23,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderB
 use sha2::{Digest, Sha256};
 use std::collections::HashSet;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str;
 use toml_edit::{Array, Value as Toml};
 
@@ -42,6 +42,9 @@ const KEYS: [(&str, &str); 10] = [
 ];
 const PARAMETERS: [Symbol; 4] = [Symbol::V0, Symbol::Kd, Symbol::Delta, Symbol::T];
 
+/// Most names in a message.
+const MAX_SHOWN: usize = 20;
+
 /// What is to be read.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
@@ -52,8 +55,6 @@ pub struct Request<'a> {
     pub settings: &'a [String],
     /// The time of a maximum of the modulation where no column gives it, in s.
     pub maximum: f64,
-    /// The name of the sweep.
-    pub name: &'a str,
 }
 
 /// A sweep with a job for each series, and the rows of each, by their seeds.
@@ -103,10 +104,10 @@ impl Experiment {
                 .map(|(flag, text)| format!("{flag} {text}")),
         );
         let options = Array::from_iter(options);
-        let rest = rest_of_sweep(&series);
+        let name = sweep_name(&request.files[0]);
+        let rest = rest_of_sweep(&series)?;
         let text = format!(
-            "name = {:?}\n[measured]\nfiles = {files}\nseries = {begins}\noptions = {options}\n{rest}",
-            request.name
+            "name = \"{name}\"\n[measured]\nfiles = {files}\nseries = {begins}\noptions = {options}\n{rest}"
         );
         let sweep = Sweep::parse_made(&text, "files")?;
         Ok(Self {
@@ -193,8 +194,9 @@ fn parse(text: &str) -> Result<Source<'_>> {
 
 /// What is meant by an unknown word: the nearest of those known, or all.
 fn guess(word: &str, known: &[&str]) -> String {
+    let first = &known[..known.len().min(MAX_SHOWN)];
     nearest(word, known).map_or_else(
-        || format!("there are {}", known.join(", ")),
+        || format!("there are {}", first.join(", ")),
         |near| format!("did you mean {near}?"),
     )
 }
@@ -259,30 +261,42 @@ impl Table<'_> {
     }
 
     fn read_text(&mut self, text: &str) -> Result<()> {
-        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-        let names = lines.next().unwrap_or_default();
-        let count = |delimiter: &u8| names.bytes().filter(|byte| byte == delimiter).count();
-        let delimiter = b"\t;,".iter().copied().max_by_key(count).unwrap_or(b',');
+        let is_head = |line: &&str| line.starts_with('#') || line.trim().is_empty();
+        let head = text.lines().take_while(is_head).count();
+        let text: String = text.split_inclusive('\n').skip(head).collect();
+        let names = text.lines().next().unwrap_or_default();
+        let mut others = b"\t;".iter().copied();
+        let other = others.find(|delimiter| names.as_bytes().contains(delimiter));
         let mut reader = csv::ReaderBuilder::new()
-            .delimiter(delimiter)
-            .comment(Some(b'#'))
+            .delimiter(other.unwrap_or(b','))
             .trim(csv::Trim::All)
             .flexible(true)
             .from_reader(text.as_bytes());
         let names: Vec<String> = reader.headers()?.iter().map(str::to_owned).collect();
         let places = self.places(&names)?;
+        let point = if other.is_some() { "." } else { "," };
         let mut record = StringRecord::new();
+        let mut last = head as u64 + 1;
         while reader.read_record(&mut record)? {
-            let line = reader.position().line() - 1;
+            let begin = last + 1;
+            // The next one begins below it.
+            last = head as u64 + reader.position().line() - 1;
+            let is_broken = record.iter().any(|cell| cell.contains('\n'));
+            ensure!(
+                !is_broken,
+                "line {begin}: a cell has several lines: is a quote left open?"
+            );
             let [found, expected] = [record.len(), names.len()];
             ensure!(
                 found == expected,
-                "line {line}: {found} cells for {expected} columns: cut off, or decimal commas between commas?"
+                "line {last}: {found} cells for {expected} columns: cut off, or decimal commas between commas?"
             );
-            let point = if delimiter == b',' { "," } else { "." };
-            let cells = record.iter().map(|cell| cell.replace(',', point));
-            let added = self.add(line, &places, &cells.collect::<Vec<_>>());
-            added.with_context(|| format!("line {line}"))?;
+            let mut cells: Vec<String> = record.iter().map(str::to_owned).collect();
+            for &(_, place, _) in places.iter().filter(|place| place.0 != "run") {
+                cells[place] = cells[place].replace(',', point);
+            }
+            let added = self.add(last, &places, &cells);
+            added.with_context(|| format!("line {last}"))?;
         }
         Ok(())
     }
@@ -293,21 +307,23 @@ impl Table<'_> {
         let reader = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options)?;
         let fields = reader.schema().fields().clone();
         let names: Vec<String> = fields.iter().map(|field| field.name().clone()).collect();
-        let places = self.places(&names)?;
-        for &(key, place, _) in &places {
-            let kind = fields[place].data_type();
+        let mut places = self.places(&names)?;
+        let mut indices = Vec::new();
+        for (key, place, _) in &mut places {
+            let kind = fields[*place].data_type();
             let is_known = [DataType::Float64, DataType::Int64, DataType::Utf8].contains(kind);
             ensure!(
                 is_known,
-                "the column of {key} is {kind}; save it as Float64"
+                "the column of {key} is {kind}; save it as 64-bit numbers"
             );
+            indices.push(std::mem::replace(place, indices.len()));
         }
-        let mut line = 0;
+        let mut row = 0;
         for batch in reader.build()? {
-            for cells in texts(&batch?) {
-                line += 1;
-                let added = self.add(line, &places, &cells);
-                added.with_context(|| format!("row {line}"))?;
+            for cells in texts(&batch?.project(&indices)?) {
+                row += 1;
+                let added = self.add(row, &places, &cells);
+                added.with_context(|| format!("row {row}"))?;
             }
         }
         Ok(())
@@ -319,7 +335,12 @@ impl Table<'_> {
         for (key, _) in KEYS {
             let asked = self.columns.iter().find(|column| column.0 == key);
             let (_, name, factor) = asked.copied().unwrap_or((key, key, 1.0));
-            let place = names.iter().position(|found| found == name);
+            let mut found = (0..names.len()).filter(|&place| names[place] == name);
+            let place = found.next();
+            ensure!(
+                found.next().is_none(),
+                "has several columns {name}; rename one"
+            );
             let is_set = self.settings.iter().any(|set| set.0 == key);
             ensure!(
                 !is_set || place.is_none(),
@@ -373,8 +394,12 @@ impl Row {
             let Some((_, text, factor)) = cell(key).filter(|cell| is_given(cell.1)) else {
                 return Ok(None);
             };
-            let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-            let number = number.map(|number| number * factor);
+            let number = text
+                .trim()
+                .parse::<f64>()
+                .ok()
+                .map(|number| number * factor);
+            let number = number.filter(|number| number.is_finite());
             number
                 .map(Some)
                 .with_context(|| format!("{key} = {text}: must be a number"))
@@ -405,9 +430,10 @@ fn parameters(number: &dyn Fn(&str) -> Result<Option<f64>>) -> Result<[Option<f6
     for (found, symbol) in found.iter_mut().zip(PARAMETERS) {
         // The factor of a unit leaves a rounding error behind.
         *found = number(symbol.key())?.map(to_twelve_digits);
-        if symbol == Symbol::T && found.is_none() {
-            let frequency = number("frequency")?.filter(|frequency| *frequency != 0.0);
-            *found = frequency.map(|frequency| 1.0 / to_twelve_digits(frequency));
+        let frequency = number("frequency")?.filter(|frequency| *frequency != 0.0);
+        if let Some(frequency) = frequency.filter(|_| symbol == Symbol::T) {
+            ensure!(found.is_none(), "T and frequency are given; keep one");
+            *found = Some(1.0 / to_twelve_digits(frequency));
         }
         if let Some(value) = *found {
             let allowed = symbol.description().allowed();
@@ -429,8 +455,22 @@ fn parameters(number: &dyn Fn(&str) -> Result<Option<f64>>) -> Result<[Option<f6
     Ok(found)
 }
 
+/// The name of a file without its ending, as far as a sweep can be called so.
+fn sweep_name(file: &Path) -> String {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    let allowed = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+    let name = stem.replace(|letter| !allowed(letter), "-");
+    let name = name.trim_matches('-');
+    let end = name.len().min(MAX_NAME);
+    if name.is_empty() {
+        "measured".to_owned()
+    } else {
+        name[..end].to_owned()
+    }
+}
+
 /// The sections of a sweep of these series, with what is known of their slips.
-fn rest_of_sweep(series: &[Vec<Row>]) -> String {
+fn rest_of_sweep(series: &[Vec<Row>]) -> Result<String> {
     let rows = || series.iter().flatten();
     let drops = rows().any(|row| !row.slip.drop.is_nan()).then_some("drop");
     let forces = rows()
@@ -441,7 +481,14 @@ fn rest_of_sweep(series: &[Vec<Row>]) -> String {
     let mut axes = String::new();
     for (place, symbol) in PARAMETERS.into_iter().enumerate() {
         let values = || series.iter().map(|rows| rows[0].series.1[place]);
-        if values().any(|value| value.is_some()) && (is_modulated || !symbol.is_of_modulation()) {
+        let is_of_all = symbol == Symbol::T || values().all(|value| value.is_some());
+        let is_of_none = values().all(|value| value.is_none());
+        ensure!(
+            is_of_all || is_of_none,
+            "{} of some series is missing",
+            symbol.key()
+        );
+        if !is_of_none && (is_modulated || !symbol.is_of_modulation()) {
             let or_none = |value: Option<f64>| value.map_or(Toml::from("none"), Toml::from);
             let values: Array = values().map(or_none).collect();
             axes.extend([symbol.key(), " = ", &values.to_string(), "\n"]);
@@ -449,7 +496,7 @@ fn rest_of_sweep(series: &[Vec<Row>]) -> String {
     }
     let count = series.len();
     let most = series.iter().map(Vec::len).max().unwrap_or(1);
-    format!(
+    Ok(format!(
         "columns = {columns}\n[axes.zip]\nseed = {{ count = {count} }}\n{axes}[record]\nslips = {most}\ndiscard = 0\n"
-    )
+    ))
 }

@@ -5,6 +5,7 @@ use super::{Exit, UsageError, catch_signals, layout, output};
 use crate::measured::{Experiment, Request};
 use crate::run::{Options, Shard, join};
 use crate::sweep::Job;
+use crate::table::shown::shown_text;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -35,27 +36,24 @@ pub struct Arguments {
     #[arg(long = "set", value_name = "KEY=VALUE:UNIT")]
     settings: Vec<String>,
     /// A time at which the modulation has a maximum, in s
-    #[arg(
-        long,
-        value_name = "TIME",
-        default_value_t = 0.0,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "TIME", default_value = "0", value_parser = time, allow_hyphen_values = true)]
     maximum: f64,
 }
 
+fn time(text: &str) -> Result<f64, &'static str> {
+    let time = text.parse().ok().filter(|time: &f64| time.is_finite());
+    time.ok_or("must be a number, in s")
+}
+
 pub fn measured(arguments: &Arguments) -> Result<Exit> {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    let name = arguments.out.file_name().unwrap_or_default();
-    let name = name.to_string_lossy().replace(|c| !allowed(c), "-");
     let experiment = Experiment::read(Request {
         files: &arguments.files,
         columns: &arguments.columns,
         settings: &arguments.settings,
         maximum: arguments.maximum,
-        name: &name,
     });
-    let experiment = experiment.map_err(|error| UsageError(format!("{error:#}")))?;
+    let refused = |error: anyhow::Error| UsageError(shown_text(&format!("{error:#}")).to_string());
+    let experiment = experiment.map_err(refused)?;
     let sweep = &experiment.sweep;
     output::warn(&sweep.warnings());
     let layout = layout(&arguments.out);

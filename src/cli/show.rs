@@ -571,26 +571,25 @@ fn note_on_drive(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
 /// Of how many sets of measured slips something is to be said.
 fn note_on_series(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     sweep.measured()?;
-    let is_single = |row: &SetRow| row.finished_jobs == 1;
-    let is_below = |row: &SetRow| {
-        row.resultant_excess_interval
-            .is_some_and(|ends| ends.high < 0.0)
-    };
-    let notes: [(fn(&SetRow) -> bool, &str); 2] = [
-        (
-            is_single,
-            "with a single series: the error is from the correlation within the series",
-        ),
-        (
-            is_below,
-            "with less R than the drive alone makes: are all times counted from a maximum of the modulation?",
-        ),
-    ];
-    let note = |(applies, note): (fn(&SetRow) -> bool, &str)| {
+    let noted = |applies: &dyn Fn(&SetRow) -> bool, note: &str| {
         let sets = rows.iter().filter(|row| applies(row)).count() as u64;
         (sets > 0).then(|| format!("{} {note}", output::count(sets, "set")))
     };
-    let notes: Vec<String> = notes.into_iter().filter_map(note).collect();
+    let is_below = |row: &SetRow| {
+        let excess = row.resultant_excess_interval;
+        excess.is_some_and(|ends| ends.high < 0.0)
+    };
+    let notes = [
+        noted(
+            &|row| row.finished_jobs == 1,
+            "with a single series: the error is from the correlation within the series",
+        ),
+        noted(
+            &is_below,
+            "with less R than the drive alone makes: are all times counted from a maximum of the modulation?",
+        ),
+    ];
+    let notes: Vec<String> = notes.into_iter().flatten().collect();
     (!notes.is_empty()).then(|| notes.join("\n"))
 }
 

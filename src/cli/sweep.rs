@@ -123,8 +123,10 @@ pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result
         (None, Some(preset)) => preset.sweep(),
         (None, None) => return of_flags(&single_job::sweep_text(changes)),
     }?;
-    if sweep.measured().is_some() {
-        let problem = "its slips were measured; nothing is to be run, and `stickslip measured` reads them again";
+    if let Some(measured) = sweep.measured() {
+        let again = output::command(measured, "DIR");
+        let problem =
+            format!("its slips were measured; nothing is to be run, and {again} reads them again");
         return Err(UsageError(format!("{}: {problem}", sweep.name())).into());
     }
     vary(sweep, changes)

@@ -187,6 +187,9 @@ impl Sweep {
     /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in
     /// digits that read back to the same bits.
     pub fn command(&self, job: &Job) -> String {
+        if self.measured.is_some() {
+            return format!("series {} of the measured ones", job.parameters.seed);
+        }
         let mut words = vec![self.command_of_set(&job.parameters)];
         let seed = job.parameters.seed;
         if seed != Parameters::default().seed {

@@ -44,6 +44,7 @@ pub use plan::{
     Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, PartName, Plan, Totals,
 };
 pub use quantity::{MAX_NAMES, SYNONYMS, hint, nearest, synonym};
+pub use read::MAX_NAME;
 pub use rounds::{
     Bounds, Goal, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
 };

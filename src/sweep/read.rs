@@ -25,7 +25,7 @@ use std::iter;
 use std::path::Path;
 
 /// Longest name of a sweep, in characters: it becomes a folder.
-const MAX_NAME: usize = 100;
+pub const MAX_NAME: usize = 100;
 
 impl Sweep {
     pub fn from_file(path: &Path) -> Result<Self, SweepError> {

@@ -146,6 +146,19 @@ fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
 
     let verified = |code| folder.ends(code, "verify out").stdout;
     assert!(verified(0).contains("slips.csv: as it was read"));
+    // What is damaged is read again, also under another name of the directory.
+    fs::rename(folder.path("out"), folder.path("moved")).unwrap();
+    let part = folder.parts("moved", "slips").remove(0);
+    fs::write(&part, "damaged").unwrap();
+    let next = folder.ends(4, "verify moved").stdout;
+    assert!(
+        next.contains("stickslip measured slips.csv --maximum 0 --column run=id"),
+        "{next}"
+    );
+    folder.ends(0, "verify moved --repair");
+    folder.ends(0, &command.replace("-o out", "-o moved"));
+    assert_eq!(folder.tables("moved"), before);
+    fs::rename(folder.path("moved"), folder.path("out")).unwrap();
     folder.write("slips.csv", "changed");
     assert!(verified(0).contains("slips.csv: differs from what was read"));
     fs::remove_file(folder.path("slips.csv")).unwrap();
@@ -192,7 +205,7 @@ fn figures_show_other_directories_as_hollow_marks_under_their_names() {
     for (name, before) in standing.iter().zip(before) {
         let with = figure(name);
         assert!(
-            with.contains(">mine<") && !before.contains(">mine<"),
+            with.contains(">slips<") && !before.contains(">slips<"),
             "{name}"
         );
         assert!(
@@ -208,7 +221,7 @@ fn figures_show_other_directories_as_hollow_marks_under_their_names() {
     assert!(custom.contains(">model<"), "{custom}");
     // What it was drawn from stands as it was.
     folder.ends(0, "plot model");
-    assert!(!figure("phi-eta").contains(">mine<"));
+    assert!(!figure("phi-eta").contains(">slips<"));
     folder.ends(2, "plot model --with nowhere");
     folder.ends(2, "plot model --with mine --of slips --x onset --y drop");
 }
@@ -228,7 +241,7 @@ fn files_of_other_programs_just_work() {
         ("bom.csv", format!("\u{feff}{plain}")),
         ("windows.csv", plain.replace('\n', "\r\n")),
         ("quoted.csv", plain.replace("onset", "\"onset\"")),
-        ("comments.csv", format!("# rig 1\n{plain}\n# end\n")),
+        ("comments.csv", format!("\n# rig 1\n\n{plain}\n\n")),
         ("tabs.tsv", plain.replace(',', "\t")),
         ("german.csv", plain.replace(',', ";").replace('.', ",")),
         ("spaces.csv", plain.replace(',', " , ")),
@@ -304,6 +317,27 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
             "",
             "line 5: onset = onset",
         ),
+        (
+            good.replace("\n4,3", "\n4,\"3"),
+            "",
+            "line 5: a cell has several lines",
+        ),
+        (
+            good.replace("onset,drop", "onset,onset"),
+            "",
+            "several columns onset",
+        ),
+        (
+            good.clone(),
+            "--set Delta=1e-6 --set T=1 --set frequency=1",
+            "T and frequency are given",
+        ),
+        (good.clone(), "--maximum nan", "must be a number"),
+        (
+            good.clone(),
+            "--set N=9",
+            "there are onset, drop, peak_force, run, V0, Kd",
+        ),
         (String::new(), "", "has no column onset"),
         ("onset,drop\n".to_owned(), "", "has no slips"),
         ("\u{0}\u{1}PAR".to_owned(), "", "has no column onset"),
@@ -335,6 +369,12 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
         );
         assert!(!folder.path("out").exists(), "{expected}");
     }
+}
+
+#[test]
+fn series_are_refused_where_they_run_into_each_other_and_lines_are_counted_right() {
+    let folder = Folder::new();
+    let good = lines("onset,drop", |n| format!("{n},3"));
     folder.write("slips.csv", &good);
     let without = folder.ends(2, "measured slips.csv -o out");
     assert!(
@@ -354,12 +394,12 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
     );
     let twice = folder.ends(2, "measured slips.csv slips.csv -o out --set V0=1e-4");
     assert!(twice.stderr.contains("holds the same"), "{}", twice.stderr);
-    // Lines count whatever ends them, and comments and line breaks within a cell.
-    let breaks = good.replace("\n4,3", "\n# a\n\n4,x").replace('\n', "\r\n");
+    // Lines count whatever ends them, and those without a row.
+    let breaks = format!("# a\n\n{}", good.replace("\n4,3", "\n\n4,x")).replace('\n', "\r\n");
     folder.write("slips.csv", &breaks);
     let counted = folder.ends(2, "measured slips.csv -o out --set V0=1e-4");
     assert!(
-        counted.stderr.contains("line 7: drop = x"),
+        counted.stderr.contains("line 8: drop = x"),
         "{}",
         counted.stderr
     );
@@ -387,22 +427,21 @@ fn a_missing_control_and_a_single_series_are_named() {
     assert!((phases[0] - expected).abs() < 1e-9, "{phases:?}");
 
     // Each series from its own maximum; and if that is forgotten, phases scatter more than the drive lets them.
-    let mut text = "run,onset,Delta,zero\n".to_owned();
+    let mut rows = Vec::new();
     for run in 0..24 {
         for slip in 1..40 {
             let shift = 0.125 * f64::from(run);
             let time = 7.0 * f64::from(slip) + f64::from(slip * 5 % 7);
-            text += &format!("free {run},{time},0,0\n");
-            text += &format!(
-                "{run},{},1e-6,{shift}\n",
-                30.0 * f64::from(slip) - 1.0 + shift
-            );
+            rows.push(format!("free {run},{time},0,0"));
+            let time = 30.0 * f64::from(slip) - 1.0 + shift;
+            rows.push(format!("{run},{time},1e-6,{shift}"));
         }
     }
-    let (head, rows) = text.split_once('\n').unwrap();
-    let mut rows: Vec<&str> = rows.lines().collect();
-    rows.sort_by_key(|row| row.split(',').next());
-    folder.write("series.csv", &format!("{head}\n{}\n", rows.join("\n")));
+    rows.sort_by_key(|row: &String| row.split(',').next().map(str::to_owned));
+    folder.write(
+        "series.csv",
+        &format!("run,onset,Delta,zero\n{}\n", rows.join("\n")),
+    );
     let command = "measured series.csv --set V0=1e-6 --set T=3";
     let aligned = folder.ends(0, &format!("{command} -o aligned --column maximum=zero"));
     assert!(
