@@ -336,6 +336,21 @@ mod tests {
     }
 
     #[test]
+    fn the_seeds_of_a_row_are_those_of_its_period() {
+        let axis = Axis::table(vec![
+            column("seed", &[0.0, 1.0, 2.0, 3.0]),
+            column("Delta", &[1e-6; 4]),
+            column("T", &[0.1, 0.1, 0.2, 0.2]),
+        ]);
+        let wanted = Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(0.2),
+            ..Parameters::default()
+        };
+        assert_eq!(axis.unwrap().seeds(&wanted, 9), Some(vec![2, 3]));
+    }
+
+    #[test]
     fn the_ends_of_a_range_are_exact_and_its_steps_even() {
         for logarithmic in [false, true] {
             let range = Range {

@@ -331,6 +331,24 @@ mod tests {
     }
 
     #[test]
+    fn what_is_not_known_is_null_and_reads_back_as_what_stands_for_it() {
+        let gaps = Gaps {
+            unknown: vec!["force".into(), "Delta".into()],
+            ..Gaps::default()
+        };
+        let mut buffer = RowBuffer::new::<Readings>().with(&gaps);
+        buffer.push(&readings()[1]);
+        let batch = buffer.take().unwrap();
+        let is_null = |name: &str| batch.column_by_name(name).unwrap().is_null(0);
+        assert!(is_null("force") && is_null("Delta") && !is_null("phase"));
+        let (reading, selected) = rows::<Readings>(&batch).unwrap().remove(0);
+        assert!(reading.force.is_nan());
+        let delta = crate::model::Symbol::Delta;
+        assert_eq!(selected.unknown, [delta]);
+        assert_eq!(selected.get(delta), Value::Null);
+    }
+
+    #[test]
     fn copied_rows_equal_pushed_rows() {
         let mut copied = RowBuffer::new::<Readings>();
         copied.copy(&batch(), 0..1).unwrap();

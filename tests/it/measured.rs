@@ -2,6 +2,7 @@
 
 use crate::program::{Cell, Folder};
 use std::fs;
+use stickslip::measured::{Experiment, Request};
 
 /// The model, as a source of slips: without modulation and with two.
 const MODEL: &str = "name = \"model\"\n[model]\nN = 10\nNs = 5\n[axes]\nseed = { count = 9 }\n\
@@ -454,4 +455,33 @@ fn a_missing_control_and_a_single_series_are_named() {
     assert!(!aligned.stdout.contains(note), "{}", aligned.stdout);
     let forgotten = folder.ends(0, &format!("{command} -o forgotten"));
     assert!(forgotten.stdout.contains(note), "{}", forgotten.stdout);
+}
+
+#[test]
+fn no_cut_or_changed_file_makes_a_panic() {
+    let folder = Folder::new();
+    folder.ends(
+        0,
+        "simulate --set N=10 --set Ns=5 --slips 9 --slip-table slips.parquet",
+    );
+    let parquet = fs::read(folder.path("slips.parquet")).unwrap();
+    let text = lines("run,onset,drop,V0", |n| format!("\"a\",{n}.5,3e2,1e-4"));
+    for (name, bytes) in [("a.csv", text.into_bytes()), ("a.parquet", parquet)] {
+        let file = [folder.path(name)];
+        let step = bytes.len() / 97 + 1;
+        for place in (0..bytes.len()).step_by(step) {
+            let mut changed = bytes.clone();
+            changed[place] ^= 0x15;
+            for bytes in [&bytes[..place], &changed] {
+                fs::write(&file[0], bytes).unwrap();
+                let read = Experiment::read(Request {
+                    files: &file,
+                    columns: &[],
+                    settings: &[],
+                    maximum: 0.0,
+                });
+                assert!(read.is_ok() || format!("{:#}", read.unwrap_err()).contains(name));
+            }
+        }
+    }
 }
