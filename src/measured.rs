@@ -24,7 +24,6 @@ use sha2::{Digest, Sha256};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::str;
 use toml_edit::{Array, Value as Toml};
 
 /// What columns, or the command line, can give, and in which unit.
@@ -89,7 +88,7 @@ impl Experiment {
                 settings: &settings,
                 series: Vec::new(),
             };
-            table.read(&bytes).with_context(|| file.to_string())?;
+            table.read(bytes).with_context(|| file.to_string())?;
             let lines = table.series.iter().map(|rows| rows[0].line);
             begins.extend(lines.map(|line| format!("{file}:{line}")));
             series.extend(table.series);
@@ -232,7 +231,7 @@ type Places = Vec<(&'static str, usize, f64)>;
 
 #[derive(Clone, Debug)]
 struct Row {
-    /// Its line, or of Parquet its number, counted from 1.
+    /// Its line, counted from 1; of Parquet below one of names.
     line: u64,
     /// The run, and the parameters of [`PARAMETERS`].
     series: (String, [Option<f64>; 4]),
@@ -243,16 +242,16 @@ struct Row {
 }
 
 impl Table<'_> {
-    fn read(&mut self, bytes: &[u8]) -> Result<()> {
-        if bytes.starts_with(b"PAR1") {
-            self.read_parquet(bytes)?;
+    fn read(&mut self, bytes: Vec<u8>) -> Result<()> {
+        let text = if bytes.starts_with(b"PAR1") {
+            text_of_parquet(bytes)?
         } else {
-            let text = str::from_utf8(bytes);
+            let text = String::from_utf8(bytes).ok();
             let text = text.context("is neither Parquet nor UTF-8 text; save it as UTF-8")?;
             // For the reader to count lines right.
-            let text = text.replace("\r\n", "\n") + "\n";
-            self.read_text(text.trim_start_matches('\u{feff}'))?;
-        }
+            text.replace("\r\n", "\n") + "\n"
+        };
+        self.read_text(text.trim_start_matches('\u{feff}'))?;
         ensure!(
             !self.series.is_empty(),
             "has no slips below its names of columns"
@@ -297,34 +296,6 @@ impl Table<'_> {
             }
             let added = self.add(last, &places, &cells);
             added.with_context(|| format!("line {last}"))?;
-        }
-        Ok(())
-    }
-
-    fn read_parquet(&mut self, bytes: &[u8]) -> Result<()> {
-        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let bytes = Bytes::from(bytes.to_vec());
-        let reader = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options)?;
-        let fields = reader.schema().fields().clone();
-        let names: Vec<String> = fields.iter().map(|field| field.name().clone()).collect();
-        let mut places = self.places(&names)?;
-        let mut indices = Vec::new();
-        for (key, place, _) in &mut places {
-            let kind = fields[*place].data_type();
-            let is_known = [DataType::Float64, DataType::Int64, DataType::Utf8].contains(kind);
-            ensure!(
-                is_known,
-                "the column of {key} is {kind}; save it as 64-bit numbers"
-            );
-            indices.push(std::mem::replace(place, indices.len()));
-        }
-        let mut row = 0;
-        for batch in reader.build()? {
-            for cells in texts(&batch?.project(&indices)?) {
-                row += 1;
-                let added = self.add(row, &places, &cells);
-                added.with_context(|| format!("row {row}"))?;
-            }
         }
         Ok(())
     }
@@ -384,6 +355,25 @@ impl Table<'_> {
         rows.push(row);
         Ok(())
     }
+}
+
+/// The columns of numbers and texts of a Parquet file as CSV.
+fn text_of_parquet(bytes: Vec<u8>) -> Result<String> {
+    let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+    let reader =
+        ParquetRecordBatchReaderBuilder::try_new_with_options(Bytes::from(bytes), options)?;
+    let fields = reader.schema().fields().clone();
+    let kinds = [DataType::Float64, DataType::Int64, DataType::Utf8];
+    let is_read = |place: &usize| kinds.contains(fields[*place].data_type());
+    let places: Vec<usize> = (0..fields.len()).filter(is_read).collect();
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(places.iter().map(|place| fields[*place].name()))?;
+    for batch in reader.build()? {
+        for cells in texts(&batch?.project(&places)?) {
+            writer.write_record(cells)?;
+        }
+    }
+    Ok(String::from_utf8(writer.into_inner()?)?)
 }
 
 impl Row {

@@ -20,8 +20,9 @@ Examples:
   stickslip measured rig1.csv rig2.csv -o results/mine --column run=id --column V0=velocity:mm/s
 
 A file is CSV, also with semicolons or tabs, or Parquet, and has a row for each slip. Keys are onset (s); drop and
-peak_force (N); run, which tells series apart; V0 (m/s), Kd (N/m), Delta (m), T (s) or frequency (Hz); maximum (s), as
-the flag, where series differ in it. Units may have prefixes; times may be in min or h. Series with Delta = 0 are the control of those with the same V0 and Kd.")]
+peak_force (N); run, where series begin; V0 (m/s), Kd (N/m), Delta (m), T (s) or frequency (Hz); and maximum (s), as
+the flag, if series differ in it. Units may have prefixes; times may be in min or h. Series with Delta = 0 are the
+control of those with the same V0 and Kd.")]
 pub struct Arguments {
     /// Tables of slips
     #[arg(value_name = "FILE", required = true)]

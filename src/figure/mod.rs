@@ -84,7 +84,7 @@ pub const STANDING: &[&str] = &[
 const MAX_SETS: usize = 100_000;
 const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 
-/// Another directory, of which figures show results as hollow marks.
+/// Another directory, of which figures show results as hollow marks under the name of its folder.
 #[derive(Clone, Debug)]
 pub struct Other {
     name: String,
@@ -97,8 +97,9 @@ impl Other {
     /// Reads a directory whose reduced data are up to date.
     pub fn read(results: &Results<'_>) -> Result<Self> {
         let layout = results.layout();
+        let folder = layout.root().file_name().unwrap_or_default();
         Ok(Self {
-            name: results.sweep().name().to_owned(),
+            name: folder.to_string_lossy().into_owned(),
             sets: sets_with_results(layout).map_err(advise(ADVICE))?,
             points: read(layout)?,
             bins: read(layout)?,

@@ -281,7 +281,7 @@ fn a_part_whose_process_is_killed_each_time_stops_no_others_and_is_done_once_non
 #[test]
 fn a_worker_of_the_original_is_none_of_a_copy() {
     let folder = Folder::new();
-    folder.write("long.toml", &LONG_FIRST.replace("slips = 2", "slips = 50"));
+    folder.write("long.toml", &LONG_FIRST.replace("slips = 2", "slips = 300"));
     let mut child = folder.start("run long.toml --no-reduce --out r --threads 1");
     while !folder.path("r/run/log").exists() {
         assert!(child.try_wait().unwrap().is_none());
@@ -297,7 +297,7 @@ fn a_worker_of_the_original_is_none_of_a_copy() {
     };
     assert_eq!([workers("r"), workers("copy")], [1, 0]);
     let other = LONG_FIRST.replace("count = 4", "count = 1");
-    folder.write("other.toml", &other.replace("slips = 2", "slips = 50"));
+    folder.write("other.toml", &other.replace("slips = 2", "slips = 300"));
     // One that works at another sweep would be refused beside a worker.
     let beside = folder.ends(2, "run other.toml --no-reduce --out r");
     assert!(

@@ -206,7 +206,7 @@ fn figures_show_other_directories_as_hollow_marks_under_their_names() {
     for (name, before) in standing.iter().zip(before) {
         let with = figure(name);
         assert!(
-            with.contains(">slips<") && !before.contains(">slips<"),
+            with.contains(">mine<") && !before.contains(">mine<"),
             "{name}"
         );
         assert!(
@@ -222,7 +222,7 @@ fn figures_show_other_directories_as_hollow_marks_under_their_names() {
     assert!(custom.contains(">model<"), "{custom}");
     // What it was drawn from stands as it was.
     folder.ends(0, "plot model");
-    assert!(!figure("phi-eta").contains(">slips<"));
+    assert!(!figure("phi-eta").contains(">mine<"));
     folder.ends(2, "plot model --with nowhere");
     folder.ends(2, "plot model --with mine --of slips --x onset --y drop");
 }
