@@ -97,7 +97,9 @@ pub fn run(
         Some(directory) => Results::read(&Layout::new(&Disk, directory))
             .map_err(Error::from)?
             .sweep()
-            .clone(),
+            .clone()
+            .computed()
+            .map_err(Error::from)?,
         None => read_sweep(file.as_deref(), text, "sweep")?,
     };
     let root = out

@@ -48,7 +48,7 @@ pub fn read_sweep(file: Option<&Path>, text: &str, source: &str) -> Result<Sweep
         Some(file) => Sweep::from_file(file),
         None => Sweep::parse_made(text, source),
     };
-    Ok(sweep?)
+    Ok(sweep?.computed()?)
 }
 
 /// A row of the jobs table, the text of the sweep, warnings, and tables by name.

@@ -43,7 +43,8 @@ pub struct Arguments {
         value_parser = choice(&Style::ALL, Style::word, Style::description)
     )]
     style: Style,
-    /// Another results directory, computed or measured, drawn over the first as hollow marks. Repeatable
+    /// Another results directory, computed or measured, as hollow marks in phi-eta, tau-T, overview and custom figures
+    /// of sets. Repeatable
     #[arg(long = "with", value_name = "DIR")]
     others: Vec<PathBuf>,
     #[command(flatten)]

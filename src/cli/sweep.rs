@@ -160,14 +160,8 @@ pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
         (None, None) => return of_flags(&single_job::sweep_text(changes)),
-    }?;
-    if let Some(measured) = sweep.measured() {
-        let again = output::command(measured, "DIR");
-        let problem =
-            format!("its slips were measured; nothing is to be run, and {again} reads them again");
-        return Err(UsageError(format!("{}: {problem}", sweep.name())).into());
-    }
-    vary(sweep, changes)
+    };
+    vary(sweep?.computed()?, changes)
 }
 
 /// Warns of a folder in the path of a results directory whose name DuckDB takes for the value of a column in all rows.

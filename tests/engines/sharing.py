@@ -60,7 +60,7 @@ def logged(results: Path) -> list[list[dict]]:
 
 def claimed(results: Path, host: str) -> set[str]:
     """The parts that processes of a host have claimed, in a run that has not ended."""
-    claims = results.glob("run/claims/*")
+    claims = results.glob("run/claims/part-*")
     return {claim.stem for claim in claims if claim.read_text().startswith(f"worker-{host}-")}
 
 

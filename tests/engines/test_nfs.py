@@ -11,7 +11,7 @@ from hosts import wait_until
 from sharing import abandoned, assert_each_part_ran_once, assert_same, committed, write_sweep
 
 # System calls of the guest are some 20 times slower than this machine's: one block, and slips for some 15 s of CPU time.
-TRIVIAL, SLIPS = 1, 4000
+TRIVIAL, SLIPS = 1, 6000
 
 
 @pytest.fixture(scope="module")

@@ -58,6 +58,10 @@ def test_figures_in_python_have_other_directories_as_hollow_marks(tried, monkeyp
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels.count("experiment") == 2
     assert mine.slips(["onset", "size"]).to_pandas()["size"].isna().all()
+    (tried / "copy.toml").write_text(mine.sweep)
+    for sweep in ("copy.toml", mine.directory):
+        with pytest.raises(module.SweepError, match="its slips were measured"):
+            module.run(sweep)
 
 
 VELOCITY, ETA, PERIOD = 1e-6, 0.2, 7.0
