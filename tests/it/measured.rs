@@ -119,6 +119,7 @@ fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
     folder.write("slips.csv", &experiment(&folder, 8));
     let command = format!("measured slips.csv -o out {COLUMNS}");
     folder.ends(0, &command);
+    assert_eq!(folder.parts("out", "slips").len(), 1);
     let before = folder.tables("out");
     folder.ends(0, &command);
     assert_eq!(folder.tables("out"), before);
