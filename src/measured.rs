@@ -52,8 +52,6 @@ pub struct Request<'a> {
     pub columns: &'a [String],
     /// `KEY=VALUE:UNIT`, for all rows.
     pub settings: &'a [String],
-    /// The time of a maximum of the modulation where no column gives it, in s.
-    pub maximum: f64,
 }
 
 /// A sweep with a job for each series, and the rows of each, by their seeds.
@@ -61,7 +59,6 @@ pub struct Request<'a> {
 pub struct Experiment {
     pub sweep: Sweep,
     series: Vec<Vec<Row>>,
-    maximum: f64,
 }
 
 impl Experiment {
@@ -93,27 +90,19 @@ impl Experiment {
             begins.extend(lines.map(|line| format!("{file}:{line}")));
             series.extend(table.series);
         }
-        let maximum = request.maximum;
         let columns = request.columns.iter().map(|text| ("--column", text));
         let settings = request.settings.iter().map(|text| ("--set", text));
-        let mut options = vec![format!("--maximum {maximum}")];
-        options.extend(
-            columns
-                .chain(settings)
-                .map(|(flag, text)| format!("{flag} {text}")),
-        );
-        let options = Array::from_iter(options);
+        let options = columns.chain(settings);
+        let options: Array = options
+            .map(|(flag, text)| format!("{flag} {text}"))
+            .collect();
         let name = sweep_name(&request.files[0]);
         let rest = rest_of_sweep(&series)?;
         let text = format!(
             "name = \"{name}\"\n[measured]\nfiles = {files}\nseries = {begins}\noptions = {options}\n{rest}"
         );
         let sweep = Sweep::parse_made(&text, "files")?;
-        Ok(Self {
-            sweep,
-            series,
-            maximum,
-        })
+        Ok(Self { sweep, series })
     }
 
     /// What was measured of a job.
@@ -128,8 +117,7 @@ impl Experiment {
         let slip = |(number, row): (u64, &Row)| {
             let onset = row.slip.onset;
             let interval = last.replace(onset).map(|last| onset - last);
-            let time = onset - row.maximum.unwrap_or(self.maximum);
-            let phase_in = |period| phase(time, period, parameters.eta());
+            let phase_in = |period| phase(onset - row.maximum, period, parameters.eta());
             Slip {
                 number,
                 interval,
@@ -238,7 +226,7 @@ struct Row {
     /// Its onset, peak force and drop; NaN if they are not given.
     slip: Slip,
     /// The time of a maximum of the modulation, in s.
-    maximum: Option<f64>,
+    maximum: f64,
 }
 
 impl Table<'_> {
@@ -409,7 +397,7 @@ impl Row {
                 peak_force: number("peak_force")?.unwrap_or(f64::NAN),
                 ..Slip::default()
             },
-            maximum: number("maximum")?,
+            maximum: number("maximum")?.unwrap_or(0.0),
         })
     }
 }
@@ -489,4 +477,30 @@ fn rest_of_sweep(series: &[Vec<Row>]) -> Result<String> {
     Ok(format!(
         "columns = {columns}\n[axes.zip]\nseed = {{ count = {count} }}\n{axes}[record]\nslips = {most}\ndiscard = 0\n"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_have_prefixes_and_times_minutes_and_hours() {
+        let factors = [
+            ("ms", "s", 1e-3),
+            ("min", "s", 60.0),
+            ("h", "s", 3600.0),
+            ("µm/s", "m/s", 1e-6),
+            ("mm/min", "m/s", 1e-3 / 60.0),
+            ("N/um", "N/m", 1e6),
+            ("kHz", "Hz", 1e3),
+            ("", "", 1.0),
+        ];
+        for (unit, si, expected) in factors {
+            let found = factor(unit, si).unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-12, "{unit}: {found}");
+        }
+        for (unit, si) in [("N", "s"), ("m", "m/s"), ("m/s", "m"), ("furlong", "m")] {
+            assert_eq!(factor(unit, si), None, "{unit}");
+        }
+    }
 }

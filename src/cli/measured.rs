@@ -36,22 +36,19 @@ pub struct Arguments {
     /// The value of a key in all rows. Repeatable
     #[arg(long = "set", value_name = "KEY=VALUE:UNIT")]
     settings: Vec<String>,
-    /// A time at which the modulation has a maximum, in s
-    #[arg(long, value_name = "TIME", default_value = "0", value_parser = time, allow_hyphen_values = true)]
-    maximum: f64,
-}
-
-fn time(text: &str) -> Result<f64, &'static str> {
-    let time = text.parse().ok().filter(|time: &f64| time.is_finite());
-    time.ok_or("must be a number, in s")
+    /// A time at which the modulation has a maximum, in s unless a unit follows, as in 12.3:ms [default: 0]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    maximum: Option<String>,
 }
 
 pub fn measured(arguments: &Arguments) -> Result<Exit> {
+    let maximum = arguments.maximum.iter();
+    let maximum = maximum.map(|time| format!("maximum={time}"));
+    let settings: Vec<String> = arguments.settings.iter().cloned().chain(maximum).collect();
     let experiment = Experiment::read(Request {
         files: &arguments.files,
         columns: &arguments.columns,
-        settings: &arguments.settings,
-        maximum: arguments.maximum,
+        settings: &settings,
     });
     let refused = |error: anyhow::Error| UsageError(shown_text(&format!("{error:#}")).to_string());
     let experiment = experiment.map_err(refused)?;

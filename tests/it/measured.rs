@@ -1,6 +1,6 @@
 //! Measured slips in the built program: read in any form, reduced as the model's, refused where they make no sense.
 
-use crate::program::{Cell, Folder};
+use crate::program::{Cell, Folder, json};
 use std::fs;
 use stickslip::measured::{Experiment, Request};
 
@@ -154,7 +154,7 @@ fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
     fs::write(&part, "damaged").unwrap();
     let next = folder.ends(4, "verify moved").stdout;
     assert!(
-        next.contains("stickslip measured slips.csv --maximum 0 --column run=id"),
+        next.contains("stickslip measured slips.csv --column run=id"),
         "{next}"
     );
     folder.ends(0, "verify moved --repair");
@@ -185,6 +185,17 @@ fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
         seeds.contains("⟨τ⟩, B − A") && !seeds.contains("model.N"),
         "{seeds}"
     );
+    // The same slips on both sides, taken as independent: the errors of both add up.
+    let difference = &json(&folder.ends(0, "show model out --json").stdout)["sets"][0];
+    let mean = &json(&folder.ends(0, "show model --json").stdout)["sets"][0];
+    let errors = |set: &serde_json::Value, name: &str| {
+        let number = |end: &str| set[format!("{name}{end}")].as_f64().unwrap();
+        [number("") - number("_low"), number("_high") - number("")]
+    };
+    let [low, high] = errors(mean, "tau_mean");
+    for error in errors(difference, "tau_mean_difference") {
+        assert!((error / low.hypot(high) - 1.0).abs() < 1e-3, "{error}");
+    }
     let unknown = folder.ends(2, "plot out --of slips --x onset --y size");
     assert!(
         unknown.stderr.contains("--y size: was not measured"),
@@ -247,6 +258,12 @@ fn files_of_other_programs_just_work() {
         ("tabs.tsv", plain.replace(',', "\t")),
         ("german.csv", plain.replace(',', ";").replace('.', ",")),
         ("spaces.csv", plain.replace(',', " , ")),
+        (
+            "missing.csv",
+            plain
+                .replace("\n4.5,3", "\n4.5,NA")
+                .replace("\n9.5,3", "\n9.5,-"),
+        ),
         ("no-end.csv", plain.trim_end().to_owned()),
     ];
     let mut found = Vec::new();
@@ -334,7 +351,16 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
             "--set Delta=1e-6 --set T=1 --set frequency=1",
             "T and frequency are given",
         ),
-        (good.clone(), "--maximum nan", "must be a number"),
+        (
+            good.clone(),
+            "--maximum nan",
+            "maximum = nan: must be a number",
+        ),
+        (
+            good.clone(),
+            "--maximum 1 --set maximum=2",
+            "gives a key twice",
+        ),
         (
             good.clone(),
             "--set N=9",
@@ -414,7 +440,7 @@ fn series_are_refused_where_they_run_into_each_other_and_lines_are_counted_right
 fn a_missing_control_and_a_single_series_are_named() {
     let folder = Folder::new();
     folder.write("slips.csv", &lines("onset", |n| format!("{}", n * n)));
-    let options = "--set V0=2e-4 --set Kd=3e7 --set Delta=1e-6 --set T=0.03 --maximum 0.01";
+    let options = "--set V0=2e-4 --set Kd=3e7 --set Delta=1e-6 --set T=0.03 --maximum 10:ms";
     let read = folder.ends(0, &format!("measured slips.csv -o out {options}"));
     let expected = [
         "R without a control, slips at Δ = 0 and V₀ = 2·10⁻⁴ m/s, K_d = 3·10⁷ N/m",
@@ -479,7 +505,6 @@ fn no_cut_or_changed_file_makes_a_panic() {
                     files: &file,
                     columns: &[],
                     settings: &[],
-                    maximum: 0.0,
                 });
                 assert!(read.is_ok() || format!("{:#}", read.unwrap_err()).contains(name));
             }

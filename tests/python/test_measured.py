@@ -64,6 +64,14 @@ def test_figures_in_python_have_other_directories_as_hollow_marks(tried, monkeyp
             module.run(sweep)
 
 
+def test_parquet_as_pandas_writes_it_is_read_whatever_else_it_holds(stickslip, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    slips = pandas.DataFrame({"onset": [0.1, 0.3, 0.6], "V0": 1e-4, "n": pandas.array([1, 2, 3], dtype="int32")})
+    slips.assign(when=pandas.Timestamp("2026-01-01")).to_parquet(tmp_path / "slips.parquet")
+    stickslip("measured", tmp_path / "slips.parquet", "-o", tmp_path / "out")
+    assert module.open(tmp_path / "out").slips().to_pandas()["onset"].tolist() == [0.1, 0.3, 0.6]
+
+
 VELOCITY, ETA, PERIOD = 1e-6, 0.2, 7.0
 AMPLITUDE = ETA * VELOCITY * PERIOD / (2 * math.pi)
 
