@@ -52,6 +52,8 @@ pub struct Request<'a> {
     pub columns: &'a [String],
     /// `KEY=VALUE:UNIT`, for all rows.
     pub settings: &'a [String],
+    /// The command that asks for it, as far as the directory of the results.
+    pub command: &'a str,
 }
 
 /// A sweep with a job for each series, and the rows of each, by their seeds.
@@ -90,16 +92,11 @@ impl Experiment {
             begins.extend(lines.map(|line| format!("{file}:{line}")));
             series.extend(table.series);
         }
-        let columns = request.columns.iter().map(|text| ("--column", text));
-        let settings = request.settings.iter().map(|text| ("--set", text));
-        let options = columns.chain(settings);
-        let options: Array = options
-            .map(|(flag, text)| format!("{flag} {text}"))
-            .collect();
+        let command = Toml::from(request.command);
         let name = sweep_name(&request.files[0]);
         let rest = rest_of_sweep(&series)?;
         let text = format!(
-            "name = \"{name}\"\n[measured]\nfiles = {files}\nseries = {begins}\noptions = {options}\n{rest}"
+            "name = \"{name}\"\n[measured]\nfiles = {files}\nseries = {begins}\ncommand = {command}\n{rest}"
         );
         let sweep = Sweep::parse_made(&text, "files")?;
         Ok(Self { sweep, series })
@@ -152,7 +149,7 @@ pub fn compare_files(measured: &Measured) -> Vec<String> {
     compared.collect()
 }
 
-/// A key, what it gets its values from, and the factor of their unit.
+/// A key, the column or text of its values, and the factor of their unit.
 type Source<'a> = (&'static str, &'a str, f64);
 
 /// Reads the texts of a flag.
@@ -210,9 +207,6 @@ struct Table<'a> {
     settings: &'a [Source<'a>],
     series: Vec<Vec<Row>>,
 }
-
-/// The values of a row, by their keys, as texts and with the factors of their units.
-type Cells<'a> = [(&'static str, &'a str, f64)];
 
 /// Columns by their keys, with their places and the factors of their units.
 type Places = Vec<(&'static str, usize, f64)>;
@@ -365,7 +359,7 @@ fn text_of_parquet(bytes: Vec<u8>) -> Result<String> {
 }
 
 impl Row {
-    fn read(line: u64, cells: &Cells<'_>) -> Result<Self> {
+    fn read(line: u64, cells: &[Source<'_>]) -> Result<Self> {
         let cell = |key: &str| cells.iter().find(|cell| cell.0 == key);
         let is_given = |text: &str| !["", "-", "NA"].contains(&text);
         let number = |key: &str| {

@@ -45,10 +45,21 @@ pub fn measured(arguments: &Arguments) -> Result<Exit> {
     let maximum = arguments.maximum.iter();
     let maximum = maximum.map(|time| format!("maximum={time}"));
     let settings: Vec<String> = arguments.settings.iter().cloned().chain(maximum).collect();
+    let mut command = "stickslip measured".to_owned();
+    let files = arguments.files.iter().map(|file| output::quoted_path(file));
+    command.extend(files.map(|file| format!(" {file}")));
+    for (flag, texts) in [("--column", &arguments.columns), ("--set", &settings)] {
+        command.extend(
+            texts
+                .iter()
+                .map(|text| format!(" {flag} {}", output::quoted(text))),
+        );
+    }
     let experiment = Experiment::read(Request {
         files: &arguments.files,
         columns: &arguments.columns,
         settings: &settings,
+        command: &command,
     });
     let refused = |error: anyhow::Error| UsageError(shown_text(&format!("{error:#}")).to_string());
     let experiment = experiment.map_err(refused)?;

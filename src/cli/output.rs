@@ -5,7 +5,6 @@ use crate::results::Results;
 use crate::results::destination::Destination;
 use crate::results::next_round::RoundsSoFar;
 use crate::run::Reasons;
-use crate::sweep::Measured;
 use crate::table::shown::{is_plain, shown_text};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
@@ -139,28 +138,18 @@ pub fn missing(jobs_missing: u64, jobs_spilled: u64) -> String {
 pub fn unfinished(results: &Results<'_>) -> Result<Option<String>> {
     let overview = results.overview()?;
     let missing = missing(overview.jobs_missing, overview.jobs_spilled);
-    let root = quoted_path(results.layout().root());
-    let command = results.sweep().measured().map_or_else(
-        || format!("stickslip run {root}"),
-        |measured| command(measured, &root),
-    );
+    let command = command(results);
     let unfinished = format!("{missing}; {command} continues with them");
     Ok((overview.jobs_missing > 0).then_some(unfinished))
 }
 
-/// The command that reads measured slips into a directory.
-pub fn command(measured: &Measured, root: &str) -> String {
-    let path = |file: &String| quoted(file.split_once("  ").unwrap_or_default().1);
-    let files: Vec<String> = measured.files.iter().map(path).collect();
-    let option = |option: &String| {
-        let (flag, value) = option.split_once(' ').unwrap_or_default();
-        format!("{flag} {}", quoted(value))
-    };
-    let options: Vec<String> = measured.options.iter().map(option).collect();
-    format!(
-        "stickslip measured {} {} -o {root}",
-        files.join(" "),
-        options.join(" ")
+/// The command that continues with a directory.
+pub fn command(results: &Results<'_>) -> String {
+    let root = quoted_path(results.layout().root());
+    let measured = results.sweep().measured();
+    measured.map_or_else(
+        || format!("stickslip run {root}"),
+        |measured| format!("{} -o {root}", measured.command),
     )
 }
 

@@ -468,6 +468,10 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
     }
 }
 
+const SINGLE_SERIES: &str =
+    "with a single series: the error is from the correlation within the series";
+const BELOW_DRIVE: &str = "with less R than the drive alone makes: are all times counted from a maximum of the modulation?";
+
 /// Notes on jobs that ended early, each kind with a command that shows one, and on sets that left the sweep.
 fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     let sweep = results.sweep();
@@ -477,12 +481,23 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         let root = output::quoted_path(results.layout().root());
         format!("{jobs} failed: stickslip status {root} says why")
     });
+    let measured = if sweep.measured().is_some() {
+        rows
+    } else {
+        &[]
+    };
+    let is_below_drive = |row: &SetRow| {
+        let excess = row.resultant_excess_interval;
+        excess.is_some_and(|excess| excess.high < 0.0)
+    };
     let notes = [
         note_on_sliding(sweep, rows),
         note_on_cut_jobs(rows),
         note_on_few_cycles(rows),
-        note_on_drive(sweep, rows),
-        note_on_series(sweep, rows),
+        note_on_control(sweep, rows),
+        note_on_drive(rows),
+        note_on_sets(measured, |row| row.finished_jobs == 1, SINGLE_SERIES),
+        note_on_sets(measured, is_below_drive, BELOW_DRIVE),
         note_on_model(sweep, rows),
         failed,
         note_on_removed_sets(sweep, rows),
@@ -524,73 +539,50 @@ fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
     ))
 }
 
+/// How many sets something applies to, and what; `None` if there are none.
+fn note_on_sets(rows: &[SetRow], applies: impl Fn(&SetRow) -> bool, note: &str) -> Option<String> {
+    let sets = rows.iter().filter(|row| applies(row)).count() as u64;
+    (sets > 0).then(|| format!("{} {note}", output::count(sets, "set")))
+}
+
 fn note_on_few_cycles(rows: &[SetRow]) -> Option<String> {
-    let has_few_cycles = |row: &&SetRow| {
+    let has_few_cycles = |row: &SetRow| {
         let times = row.parameters.modulation_period.zip(row.tau_mean);
         row.phase_mean.is_none() && times.is_some_and(|(period, tau)| period >= tau)
     };
-    let sets = rows.iter().filter(has_few_cycles).count() as u64;
-    (sets > 0).then(|| {
-        let sets = output::count(sets, "set");
-        format!(
-            "{sets} without a phase: the jobs hold less than two cycles of the modulation; more slips give one"
-        )
-    })
+    let note = "without a phase: the jobs hold less than two cycles of the modulation; more slips give one";
+    note_on_sets(rows, has_few_cycles, note)
+}
+
+/// Where R needs a control to be judged.
+fn note_on_control(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
+    let lacks_control =
+        |row: &&SetRow| row.resultant_length.is_some() && row.resultant_drive.is_none();
+    let row = rows.iter().find(lacks_control)?;
+    let control = if sweep.measured().is_some() {
+        let setting = |symbol: Symbol| {
+            let value = row.parameters.get(symbol).number()?;
+            Some(label(symbol.key()).setting(value, Digits::THREE))
+        };
+        let settings = [Symbol::V0, Symbol::Kd].into_iter().filter_map(setting);
+        let settings: Vec<String> = settings.collect();
+        format!("a control, slips at Δ = 0 and {}", settings.join(", "))
+    } else {
+        "control = true".to_owned()
+    };
+    Some(format!(
+        "R without {control}: the drive alone makes some of it (docs/statistics.md)"
+    ))
 }
 
 /// How much of R the drive alone makes, where that is not seen at a glance.
-fn note_on_drive(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
-    let phased = rows.iter().filter(|row| row.resultant_length.is_some());
-    let without = phased.clone().filter(|row| row.resultant_drive.is_none());
-    if let Some(row) = without.clone().next() {
-        let control = if sweep.measured().is_some() {
-            let setting = |symbol: Symbol| {
-                let value = row.parameters.get(symbol).number()?;
-                Some(label(symbol.key()).setting(value, Digits::THREE))
-            };
-            let settings = [Symbol::V0, Symbol::Kd].into_iter().filter_map(setting);
-            let settings: Vec<String> = settings.collect();
-            format!("a control, slips at Δ = 0 and {}", settings.join(", "))
-        } else {
-            "control = true".to_owned()
-        };
-        return Some(format!(
-            "R without {control}: the drive alone makes some of it (docs/statistics.md)"
-        ));
-    }
-    let is_explained = |row: &&SetRow| {
+fn note_on_drive(rows: &[SetRow]) -> Option<String> {
+    let is_explained = |row: &SetRow| {
         let excess = row.resultant_excess_interval;
         excess.is_some_and(|excess| excess.low <= 0.0 && excess.high >= 0.0)
     };
-    let explained = phased.filter(is_explained).count() as u64;
-    let sets = output::count(explained, "set");
-    let note = "is what the drive alone makes, within its interval (docs/statistics.md)";
-    (explained > 0).then(|| format!("R of {sets} {note}"))
-}
-
-/// Of how many sets of measured slips something is to be said.
-fn note_on_series(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
-    sweep.measured()?;
-    let noted = |applies: &dyn Fn(&SetRow) -> bool, note: &str| {
-        let sets = rows.iter().filter(|row| applies(row)).count() as u64;
-        (sets > 0).then(|| format!("{} {note}", output::count(sets, "set")))
-    };
-    let is_below = |row: &SetRow| {
-        let excess = row.resultant_excess_interval;
-        excess.is_some_and(|ends| ends.high < 0.0)
-    };
-    let notes = [
-        noted(
-            &|row| row.finished_jobs == 1,
-            "with a single series: the error is from the correlation within the series",
-        ),
-        noted(
-            &is_below,
-            "with less R than the drive alone makes: are all times counted from a maximum of the modulation?",
-        ),
-    ];
-    let notes: Vec<String> = notes.into_iter().flatten().collect();
-    (!notes.is_empty()).then(|| notes.join("\n"))
+    let note = "with the R that the drive alone makes, within its interval (docs/statistics.md)";
+    note_on_sets(rows, is_explained, note)
 }
 
 /// What swept parameters change beside what their names say.

@@ -57,20 +57,21 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let is_damaged = !verification.whole && !arguments.repair;
     let root = output::quoted_path(layout.root());
     let results = Results::read(layout)?;
-    let measured = results.sweep().measured();
     let mut commands = Vec::new();
     if is_damaged {
         commands.push(format!("stickslip verify {root} --repair"));
     }
     if !verification.whole || !verification.missing.is_empty() {
-        let run = || format!("stickslip run {root}");
-        commands.push(measured.map_or_else(run, |measured| output::command(measured, &root)));
+        commands.push(output::command(&results));
     }
     let report = Report {
         verification: &verification,
         repaired: arguments.repair && !verification.whole,
         commands,
-        sources: measured.map_or_else(Vec::new, compare_files),
+        sources: results
+            .sweep()
+            .measured()
+            .map_or_else(Vec::new, compare_files),
     };
     if arguments.json {
         output::json(JSON_FORMAT, &report)?;

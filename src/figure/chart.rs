@@ -244,8 +244,6 @@ impl<'a> Chart<'a> {
         for &set in members {
             let place: Vec<Place> = self.place(y, set).into_iter().collect();
             if let Some(other) = self.other(set) {
-                let alone = self.drive_at(y, set).into_iter().collect();
-                all.push(Layer::Dots(alone, Dot::solid(GREY, SMALL_RADIUS)));
                 all.push(Layer::Hollow(place, other, self.ink(dots, set)));
                 continue;
             }
@@ -348,15 +346,6 @@ impl Chart<'_> {
         }
         let others = self.others.iter().enumerate();
         entries.extend(others.map(|(other, (name, _))| entry(Mark::Hollow(other), name)));
-        let has_drive = |y: &Quantity<'_>| {
-            inside
-                .iter()
-                .any(|&set| self.other(set).is_some() && self.drive_at(y, set).is_some())
-        };
-        if self.ys.iter().any(has_drive) {
-            let mark = Mark::Dot(Dot::solid(GREY, SMALL_RADIUS));
-            entries.push(entry(mark, "by their drive alone"));
-        }
         if !dots.free.is_empty() {
             entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
         }

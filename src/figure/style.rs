@@ -3,6 +3,7 @@
 
 use super::frame::Place;
 use crate::table::value::{floored, words};
+use std::f64::consts::TAU;
 use std::fmt;
 use std::sync::LazyLock;
 use ttf_parser::{Face, GlyphId};
@@ -254,30 +255,15 @@ pub(super) const STRIPE: Fill = Fill {
 /// Radius of the dots of statistics.
 pub(super) const RADIUS: f64 = 4.2;
 
-/// Corners of the hollow marks of other directories, in radii: a square, a diamond, a triangle.
-const CORNERS: [&[Place]; 3] = [
-    &[
-        (-0.9, -0.9),
-        (0.9, -0.9),
-        (0.9, 0.9),
-        (-0.9, 0.9),
-        (-0.9, -0.9),
-    ],
-    &[
-        (0.0, -1.3),
-        (1.3, 0.0),
-        (0.0, 1.3),
-        (-1.3, 0.0),
-        (0.0, -1.3),
-    ],
-    &[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8), (0.0, -1.2)],
-];
-
-/// The outline, at a place of a sheet, of the mark of another directory by its number.
+/// The outline, at a place of a sheet, of the mark of another directory by its number: a diamond, a triangle, a pentagon.
 pub(super) fn hollow(other: usize, (x, y): Place) -> Vec<Place> {
-    let corners = CORNERS[other % CORNERS.len()].iter();
-    let corner = |(right, down)| (x + RADIUS * right, y + RADIUS * down);
-    corners.copied().map(corner).collect()
+    let corners = [4, 3, 5][other % 3];
+    let corner = |number: u32| {
+        let turn = TAU * f64::from(number) / f64::from(corners);
+        let radius = 1.3 * RADIUS;
+        (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
+    };
+    (0..=corners).map(corner).collect()
 }
 
 /// The part of the drive alone of data in this ink.

@@ -1,15 +1,15 @@
 //! `[measured]`: the slips of a sweep were measured, not computed. `stickslip measured` writes it.
 
 use super::grid::Sweep;
-use super::source::{Refused, Section, SweepError, all};
+use super::source::{Entry, Refused, Section, SweepError, all};
 
 /// Where measured slips come from.
 #[derive(Clone, Debug)]
 pub struct Measured {
     /// Files, behind their SHA-256.
     pub files: Vec<String>,
-    /// The flags of `stickslip measured`.
-    pub options: Vec<String>,
+    /// The command that reads them again, without the directory of the results.
+    pub command: String,
     /// Columns of slips that the files have beside the onset.
     columns: Vec<String>,
 }
@@ -30,22 +30,23 @@ const KNOWN: &[&str] = &[
 
 impl Measured {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, Refused> {
-        section.only(&["files", "series", "options", "columns"])?;
+        section.only(&["files", "series", "command", "columns"])?;
+        let required = |key| section.required(key, "`stickslip measured` writes this section");
+        let text = |entry: &Entry<'_>| {
+            let text = entry.word().map(str::to_owned);
+            text.ok_or_else(|| entry.must_be("a text"))
+        };
         let texts = |key| {
-            let entry = section.required(key, "`stickslip measured` writes this section")?;
-            let list = entry
-                .list()
-                .ok_or_else(|| entry.must_be("a list of texts"))?;
-            all(list.iter().map(|entry| {
-                let text = entry.word().map(str::to_owned);
-                text.ok_or_else(|| entry.must_be("a text"))
-            }))
+            let entry = required(key)?;
+            let list = entry.list();
+            let list = list.ok_or_else(|| entry.must_be("a list of texts"))?;
+            all(list.iter().map(text))
         };
         // Where each series begins is for readers alone.
         texts("series")?;
         Ok(Self {
             files: texts("files")?,
-            options: texts("options")?,
+            command: text(&required("command")?)?,
             columns: texts("columns")?,
         })
     }

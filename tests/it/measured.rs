@@ -505,6 +505,7 @@ fn no_cut_or_changed_file_makes_a_panic() {
                     files: &file,
                     columns: &[],
                     settings: &[],
+                    command: "",
                 });
                 assert!(read.is_ok() || format!("{:#}", read.unwrap_err()).contains(name));
             }
