@@ -59,8 +59,8 @@ fn table(fields: &[(Description, Value)]) -> String {
     let mut text =
         format!("| key |{head} meaning | default | allowed |\n|---|{rule}---|---|---|\n");
     for (field, default) in fields {
-        let Description { key, column, .. } = field;
-        let meaning = column.meaning;
+        let key = &field.name;
+        let meaning = field.meaning;
         let symbol = symbol_cell(field.symbol);
         // Shorter than in messages: most values are finite numbers.
         let allowed = field

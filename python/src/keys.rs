@@ -52,7 +52,7 @@ pub fn keys(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let record = RecordingKey::ALL.map(|key| (key.description(), recording.get(key)));
     for (field, default) in model.into_iter().chain(record) {
         keys.set_item(
-            field.key,
+            &field.name,
             (field.meaning, field.requirement(), object(py, default)?),
         )?;
     }
@@ -61,7 +61,7 @@ pub fn keys(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     }
     for key in SolverKey::ALL {
         let field = key.description();
-        keys.set_item(field.key, (field.meaning, field.requirement(), py.None()))?;
+        keys.set_item(&field.name, (field.meaning, field.requirement(), py.None()))?;
     }
     Ok(keys)
 }

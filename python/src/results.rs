@@ -135,7 +135,7 @@ fn read_table(
     }
     let joined = JoinedTable::new(results, table, columns);
     let mut batches = Vec::new();
-    for part in joined.parts()? {
+    for part in results.parts_of(JOBS)? {
         if stop.load(Ordering::Relaxed) {
             return Err(Error::Results("interrupted".to_owned()));
         }

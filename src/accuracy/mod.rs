@@ -17,10 +17,10 @@ pub use study::Study;
 pub use verdict::{shows_bias, verdict};
 
 use self::comparison::{Bias, BreakErrors};
-use crate::model::{Description, Parameters, Selected, Selection, Symbol, Value};
+use crate::model::{Parameters, Selected, Selection, Symbol, Value};
 use crate::results::tables::DriveAndSeed;
 use crate::solver::{Method, Resolve, Solver};
-use crate::table::columns::columns;
+use crate::table::columns::{Column, columns};
 use std::fmt;
 
 columns! {
@@ -58,9 +58,8 @@ impl SolverColumns {
 impl fmt::Display for SolverColumns {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let method = Method::from_word(&self.method).unwrap_or(Method::EventDriven);
-        let Description { key, column, .. } = method.settings()[0].description();
-        let unit = column.unit;
-        let setting = format!("{}, {key} {:e} {unit}", self.name(), self.setting);
+        let Column { name, unit, .. } = method.settings()[0].description().column;
+        let setting = format!("{}, {name} {:e} {unit}", self.name(), self.setting);
         f.write_str(setting.trim_end())
     }
 }

@@ -129,9 +129,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
 /// Where a picture goes, and the format that the name ends in.
 pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
     let extension = file.extension().and_then(|extension| extension.to_str());
-    let format = Format::ALL
-        .into_iter()
-        .find(|format| extension == Some(format.word()));
+    let format = extension.and_then(Format::from_word);
     match format.zip(Kind::of_name(file)) {
         Some((format, kind)) => Ok((Destination::new(file, kind)?, format)),
         None => Err(UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into()),

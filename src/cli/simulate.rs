@@ -253,7 +253,7 @@ impl Tables<'_> {
     fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
         Destination::new(path, Kind::PARQUET)?.write(catch_signals, |file| {
-            let mut writer = TableWriter::new(self.gaps, file, self.footer)?;
+            let mut writer = TableWriter::new(self.gaps, path, file, self.footer)?;
             for row in rows {
                 writer.push(&row)?;
             }

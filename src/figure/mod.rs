@@ -372,8 +372,10 @@ mod tests {
     use std::fs;
 
     fn write_rows<R: Table>(layout: &Layout<'_>, rows: &[R]) {
-        let file = Disk.create(&layout.reduced_file(R::NAME)).unwrap();
-        let mut writer = TableWriter::new(&Gaps::default(), file, &Footer::default()).unwrap();
+        let path = layout.reduced_file(R::NAME);
+        let file = Disk.create(&path).unwrap();
+        let mut writer =
+            TableWriter::new(&Gaps::default(), &path, file, &Footer::default()).unwrap();
         for row in rows {
             writer.push(row).unwrap();
         }

@@ -166,7 +166,7 @@ impl Staged<'_, '_> {
     fn begin<R: Table>(&mut self, gaps: &Gaps) -> Result<TableWriter<R>, ResultsError> {
         let file = self.layout.reduced_file(R::NAME);
         let footer = self.footer.clone().at(&file);
-        TableWriter::new(gaps, self.commit.stage(&file)?, &footer)
+        TableWriter::new(gaps, &file, self.commit.stage(&file)?, &footer)
     }
 
     fn write<R: Table>(&mut self, rows: impl IntoIterator<Item = R>) -> Result<(), ResultsError> {
@@ -499,7 +499,7 @@ mod tests {
             let path = layout.table("slips").join(&name);
             let file = Disk.create(&path).unwrap();
             let mut slip_writer =
-                TableWriter::<SlipRow<'_>>::new(&Gaps::default(), file, &Footer::default())
+                TableWriter::<SlipRow<'_>>::new(&Gaps::default(), &path, file, &Footer::default())
                     .unwrap();
             let labels: Vec<JobLabel<DriveAndSeed>> = (0..3)
                 .map(|set| label(set, seed, [0.0, 1e-6, 2e-6][set as usize]))
@@ -519,7 +519,8 @@ mod tests {
                 let path = layout.table("jobs").join(&name);
                 let file = Disk.create(&path).unwrap();
                 let mut job_writer =
-                    TableWriter::<JobRow>::new(&Gaps::default(), file, &Footer::default()).unwrap();
+                    TableWriter::<JobRow>::new(&Gaps::default(), &path, file, &Footer::default())
+                        .unwrap();
                 for (job, result) in labels.iter().zip(&measured) {
                     job_writer
                         .push(&(relabel(job), JobRecord::new(Ok(result))))

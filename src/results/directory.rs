@@ -275,7 +275,7 @@ impl<'a> Results<'a> {
     }
 
     /// The parts that have a file in a table. Names that no part of this directory can have are damage.
-    pub(super) fn parts_of(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
+    pub fn parts_of(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
         let folder = self.layout.table(table);
         let mut parts = BTreeSet::new();
         let names = self.layout.names_in(&folder)?.into_iter();
@@ -374,10 +374,9 @@ impl<'a> Results<'a> {
 
     /// The same with reduced data in another folder, which is there as long as this.
     pub fn reduced_to(&self, elsewhere: TempDir) -> Self {
-        Self {
-            layout: self.layout.reduced_to(elsewhere),
-            ..self.clone()
-        }
+        let mut same = self.clone();
+        same.layout.elsewhere = Some(Arc::new(elsewhere));
+        same
     }
 
     pub const fn layout(&self) -> &Layout<'a> {

@@ -24,7 +24,7 @@ use arrow_schema::{ArrowError, FieldRef, SchemaRef};
 use arrow_select::concat::concat_batches;
 use arrow_select::take::take;
 use serde::Serialize;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::iter;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -52,20 +52,7 @@ impl Results<'_> {
     /// finished parts of tables, and of all.
     pub fn export(
         &self,
-        folder: NewFolder,
-        format: Format,
-        stop: &AtomicBool,
-        progress: &mut dyn FnMut(u64, u64),
-    ) -> Result<Exported, ResultsError> {
-        let exported = self.write_all(&folder, format, stop, progress)?;
-        refuse_stopped(stop, &folder.place)?;
-        folder.publish(self.layout().storage)?;
-        Ok(exported)
-    }
-
-    fn write_all(
-        &self,
-        to: &NewFolder,
+        to: NewFolder,
         format: Format,
         stop: &AtomicBool,
         progress: &mut dyn FnMut(u64, u64),
@@ -103,7 +90,8 @@ impl Results<'_> {
                 columns.push(format!("{table},{},{unit},\"{meaning}\"\n", field.name()));
             }
             let file = storage.create(&path)?;
-            let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
+            let mut writer =
+                RowWriter::new(path.clone(), file, format, &schema, &self.footer_of_all())?;
             let mut rows = 0;
             let mut write = |batch: RecordBatch| {
                 rows += batch.num_rows() as u64;
@@ -134,6 +122,8 @@ impl Results<'_> {
             file.sync()?;
         }
         progress(total, total);
+        refuse_stopped(stop, &to.place)?;
+        to.publish(storage)?;
         Ok(exported)
     }
 
@@ -208,11 +198,6 @@ impl<'a> JoinedTable<'a> {
             of_jobs,
             has_controls,
         }
-    }
-
-    /// The parts that count: those with jobs.
-    pub fn parts(&self) -> Result<BTreeSet<PartName>, ResultsError> {
-        self.results.parts_of(JOBS)
     }
 
     pub const fn schema(&self) -> &SchemaRef {

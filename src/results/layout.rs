@@ -31,7 +31,7 @@ pub struct Layout<'a> {
     pub storage: &'a dyn Storage,
     root: PathBuf,
     /// Where reduced data lie, if not in the directory.
-    elsewhere: Option<Arc<TempDir>>,
+    pub(super) elsewhere: Option<Arc<TempDir>>,
 }
 
 impl fmt::Debug for Layout<'_> {
@@ -48,14 +48,6 @@ impl<'a> Layout<'a> {
             storage,
             root: root.to_owned(),
             elsewhere: None,
-        }
-    }
-
-    /// The same with reduced data in another folder, which is there as long as this.
-    pub fn reduced_to(&self, elsewhere: TempDir) -> Self {
-        Self {
-            elsewhere: Some(Arc::new(elsewhere)),
-            ..self.clone()
         }
     }
 

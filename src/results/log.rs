@@ -39,7 +39,6 @@ pub enum RunEvent {
     },
     /// A job is done, though not yet committed.
     JobDone {
-        slips: usize,
         predicted_cost: f64,
     },
     JobTakesLong {
@@ -226,7 +225,6 @@ mod tests {
             log.write(event).unwrap();
         }
         log.write(&RunEvent::JobDone {
-            slips: 3,
             predicted_cost: 1.0,
         })
         .unwrap();

@@ -164,7 +164,7 @@ fn encoded<'j, R: Table, Rows: IntoIterator<Item = R>>(
     rows: impl Fn(&'j JobLabel<DriveAndSeed>, &'j Outcome) -> Rows,
 ) -> Result<(PathBuf, Vec<u8>), ResultsError> {
     let footer = Footer::default().and(&file.footer).at(&file.path);
-    let mut writer = TableWriter::in_memory(gaps, &file.path, &footer)?;
+    let mut writer = TableWriter::new(gaps, &file.path, Vec::new(), &footer)?;
     for (job, outcome) in jobs {
         match outcome {
             Some(outcome) => {

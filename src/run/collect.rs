@@ -377,10 +377,7 @@ impl Collector<'_, '_> {
         self.joined.member.count_job();
         let predicted_cost = job.cost;
         let event = match &outcome {
-            Ok(measured) => RunEvent::JobDone {
-                slips: measured.slips.len(),
-                predicted_cost,
-            },
+            Ok(_) => RunEvent::JobDone { predicted_cost },
             Err(reason) => RunEvent::JobFailed {
                 job_id: self.pending.results.job_id(part, of.position),
                 reason: reason.clone(),

@@ -148,7 +148,7 @@ fn with_unit(label: &str, unit: &str) -> String {
 pub fn symbol_of(symbol: Symbol) -> String {
     let description = symbol.description();
     let name = if description.symbol.is_empty() {
-        description.key
+        symbol.key()
     } else {
         description.symbol
     };

@@ -113,6 +113,7 @@ mod tests {
         let path = folder.path().join("a.parquet");
         let mut writer = TableWriter::<Reading>::new(
             &crate::table::arrow::Gaps::default(),
+            &path,
             Disk.create(&path).unwrap(),
             &Footer::default(),
         )

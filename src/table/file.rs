@@ -119,39 +119,20 @@ pub struct TableWriter<R, S = StoredFile> {
     hasher: Sha256,
 }
 
-impl<R: Row> TableWriter<R> {
-    /// Writes into this file, which is empty.
-    pub fn new(gaps: &Gaps, file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
-        let path = file.path().to_owned();
-        Self::into_sink(gaps, path, file, footer)
-    }
-}
-
-impl<R: Row> TableWriter<R, Vec<u8>> {
-    /// Makes the bytes of the file of this path.
-    pub fn in_memory(gaps: &Gaps, path: &Path, footer: &Footer) -> Result<Self, ResultsError> {
-        Self::into_sink(gaps, path.to_owned(), Vec::new(), footer)
-    }
-}
-
 impl<R: Row, S: Sink> TableWriter<R, S> {
-    fn into_sink(
-        gaps: &Gaps,
-        path: PathBuf,
-        file: S,
-        footer: &Footer,
-    ) -> Result<Self, ResultsError> {
+    /// Writes into the empty file of this path, or makes its bytes.
+    pub fn new(gaps: &Gaps, path: &Path, file: S, footer: &Footer) -> Result<Self, ResultsError> {
         let buffer = RowBuffer::new::<R>().with(gaps);
         let schema = buffer.schema();
         let writer = footer.properties(schema).and_then(|properties| {
             ArrowWriter::try_new(Vec::new(), Arc::clone(schema), Some(properties))
         });
-        let writer = writer.map_err(ResultsError::unwritten(&path))?;
+        let writer = writer.map_err(ResultsError::unwritten(path))?;
         Ok(Self {
             row: PhantomData,
             buffer,
             writer,
-            path,
+            path: path.to_owned(),
             file,
             hasher: Sha256::new(),
         })
@@ -318,11 +299,11 @@ impl<'a> Dataset<'a> {
     /// The same, row by row.
     pub fn rows<R: Row>(self) -> impl Iterator<Item = Result<R, ResultsError>> + use<'a, R> {
         self.read(R::names()).flat_map(|batch| {
-            let (rows, error) = match batch.and_then(|batch| batch.rows_of()) {
-                Ok(rows) => (rows, None),
-                Err(error) => (Vec::new(), Some(Err(error))),
-            };
-            rows.into_iter().map(Ok).chain(error)
+            let rows = batch.and_then(|batch| batch.rows_of());
+            rows.map_or_else(
+                |error| vec![Err(error)],
+                |rows| rows.into_iter().map(Ok).collect(),
+            )
         })
     }
 
@@ -422,7 +403,7 @@ mod tests {
     fn write(path: &Path, numbers: Range<u64>) {
         let footer = Footer::default().with("note", "test");
         let mut writer =
-            TableWriter::new(&Gaps::default(), Disk.create(path).unwrap(), &footer).unwrap();
+            TableWriter::new(&Gaps::default(), path, Disk.create(path).unwrap(), &footer).unwrap();
         numbers.for_each(|number| writer.push(&Number::of(number)).unwrap());
         writer.finish().unwrap();
     }
@@ -469,9 +450,13 @@ mod tests {
         let rows = GROUP_ROWS as u64 + 1000;
         write(&whole, 0..rows);
         let footer = Footer::default().with("note", "test");
-        let mut writer =
-            TableWriter::<Number>::new(&Gaps::default(), Disk.create(&copied).unwrap(), &footer)
-                .unwrap();
+        let mut writer = TableWriter::<Number>::new(
+            &Gaps::default(),
+            &copied,
+            Disk.create(&copied).unwrap(),
+            &footer,
+        )
+        .unwrap();
         for batch in Dataset::new(&Disk, vec![whole.clone()]).batches() {
             let batch = batch.unwrap();
             let middle = batch.rows.num_rows() / 3;
@@ -595,8 +580,13 @@ mod tests {
         }
         let expected = Footer::empty().with("sweep", "one");
         let written = Footer::default().and(&expected).at(&path);
-        let mut writer =
-            TableWriter::new(&Gaps::default(), Disk.create(&path).unwrap(), &written).unwrap();
+        let mut writer = TableWriter::new(
+            &Gaps::default(),
+            &path,
+            Disk.create(&path).unwrap(),
+            &written,
+        )
+        .unwrap();
         writer.push(&Number::of(1)).unwrap();
         writer.finish().unwrap();
         let check = |path: &Path, footer: &Footer| {

@@ -55,12 +55,12 @@ pub struct RowWriter {
 
 impl RowWriter {
     pub fn new(
+        path: PathBuf,
         file: StoredFile,
         format: Format,
         schema: &SchemaRef,
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
-        let path = file.path().to_owned();
         let encoder = || -> Result<Encoder, ParquetError> {
             Ok(match format {
                 Format::Parquet => {

@@ -34,10 +34,6 @@ impl StoredFile {
         }
     }
 
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError> {
         self.sink
             .write_all(bytes)
@@ -121,13 +117,8 @@ pub trait Storage: Sync {
     }
 
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
-        let failed = StorageError::at("read", file);
-        match self.open(file)?.metadata() {
-            Ok(metadata) if metadata.is_file() => Ok(metadata.len()),
-            // A folder has a length, too, which must not pass for that of the file.
-            Ok(_) => Err(failed(NoFile::Irregular.into())),
-            Err(error) => Err(failed(error)),
-        }
+        let metadata = self.open(file)?.metadata();
+        Ok(metadata.map_err(StorageError::at("read", file))?.len())
     }
 
     /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.

@@ -343,7 +343,8 @@ fn write_nonsense<R: Row>(path: &Path, column: Index, row: Index, value: Index) 
         ..Gaps::default()
     };
     Disk.remove(path).unwrap();
-    let mut writer = TableWriter::<R>::new(&gaps, Disk.create(path).unwrap(), &footer).unwrap();
+    let mut writer =
+        TableWriter::<R>::new(&gaps, path, Disk.create(path).unwrap(), &footer).unwrap();
     for Batch { path, rows } in batches
         .into_iter()
         .filter(|batch| batch.rows.num_rows() > 0)

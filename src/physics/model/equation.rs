@@ -91,8 +91,3 @@ pub fn largest_frequency(parameters: &Parameters) -> f64 {
         / parameters.block_mass())
     .sqrt()
 }
-
-/// Largest stable time step 2/ω_max of an explicit leapfrog scheme on the intact slider, in s.
-pub fn stability_limit(parameters: &Parameters) -> f64 {
-    2.0 / largest_frequency(parameters)
-}

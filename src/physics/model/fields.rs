@@ -37,8 +37,6 @@ use std::ops::Deref;
 
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// The name of the column.
-    pub key: &'static str,
     /// The field as a column of a table.
     pub column: Column,
     /// The values that the field can take by itself.
@@ -162,7 +160,6 @@ macro_rules! fields {
             pub const fn description(self) -> $crate::model::Description {
                 match self {$(
                     Self::$variant => $crate::model::Description {
-                        key: $key,
                         column: $crate::columns::Column {
                             name: std::borrow::Cow::Borrowed($key),
                             unit: $unit,

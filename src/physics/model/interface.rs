@@ -274,7 +274,7 @@ impl Interface {
     #[inline(always)]
     pub fn reattach_next(&mut self, displacement: f64) -> ContactChange {
         let change = self.reattach_running(Scalar512b, displacement);
-        self.sum(Scalar512b, change.block);
+        self.gather(Scalar512b, change.block);
         change
     }
 
@@ -320,7 +320,7 @@ impl Interface {
                 }
                 let (change, _) =
                     self.break_contact(Scalar512b, block, contact, time, displacement);
-                log(change, self.count(&change));
+                log(change, self.count(Change::Break, time));
                 reached &= reached - 1;
             }
         }
@@ -360,15 +360,13 @@ impl Interface {
                 }
             }
         }
-        if contacts.len() > 1 {
-            contacts.sort_by(|a, b| {
-                if falls {
-                    b.0.total_cmp(&a.0)
-                } else {
-                    a.0.total_cmp(&b.0)
-                }
-            });
-        }
+        contacts.sort_by(|a, b| {
+            if falls {
+                b.0.total_cmp(&a.0)
+            } else {
+                a.0.total_cmp(&b.0)
+            }
+        });
     }
 
     /// Breaks one contact, at a break position in m. Returns the change, and when the contact reattaches, in s. Leaves
@@ -383,21 +381,28 @@ impl Interface {
         displacement: f64,
     ) -> (ContactChange, f64) {
         let change = self.change(block, contact, time, displacement, Change::Break);
-        (change, self.detach(simd, block, contact, time))
+        let (row, lane) = self.place(block, contact);
+        let lives = &mut self.lives[row];
+        let row = &mut self.rows[row];
+        simd.set(&mut row.attached_stiffness, lane, 0.0);
+        simd.set(&mut row.upper, lane, f64::INFINITY);
+        simd.set(&mut row.lower, lane, f64::NEG_INFINITY);
+        lives.generation[lane] += 1;
+        lives.life[lane] = self.disorder.draw(
+            block * self.contacts_per_block + contact,
+            lives.generation[lane],
+        );
+        let due = time + lives.life[lane].delay;
+        self.reattachments.push(Due::new(due, block, contact));
+        (change, due)
     }
 
-    /// Counts a change, in the order of time. Returns how many contacts are attached after it, and the integral of that
-    /// number up to there, in s.
+    /// Counts a change at a time in s, in the order of time. Returns how many contacts are attached after it, and the
+    /// integral of that number up to there, in s.
     #[inline(always)]
-    pub(crate) fn count(&mut self, change: &ContactChange) -> (u64, f64) {
-        self.attached.change(change.change, change.time);
-        (self.attached.count, self.attached.integral(change.time))
-    }
-
-    /// Counts an attachment at a time in s, in the order of time.
-    #[inline(always)]
-    pub(crate) fn count_attachment(&mut self, time: f64) {
-        self.attached.change(Change::Attach, time);
+    pub(crate) fn count(&mut self, change: Change, time: f64) -> (u64, f64) {
+        self.attached.change(change, time);
+        (self.attached.count, self.attached.integral(time))
     }
 
     /// Moves the origin by `time` s and `displacement` m.
@@ -492,51 +497,24 @@ impl Interface {
         levels
     }
 
-    /// Ends the life of a contact and draws the next, which begins at the time returned, in s.
-    #[inline(always)]
-    fn detach<S: Simd>(&mut self, simd: S, block: usize, contact: usize, time: f64) -> f64 {
-        let (row, lane) = self.place(block, contact);
-        let lives = &mut self.lives[row];
-        let row = &mut self.rows[row];
-        simd.set(&mut row.attached_stiffness, lane, 0.0);
-        simd.set(&mut row.upper, lane, f64::INFINITY);
-        simd.set(&mut row.lower, lane, f64::NEG_INFINITY);
-        lives.generation[lane] += 1;
-        lives.life[lane] = self.disorder.draw(
-            block * self.contacts_per_block + contact,
-            lives.generation[lane],
-        );
-        let due = time + lives.life[lane].delay;
-        self.reattachments.push(Due::new(due, block, contact));
-        due
-    }
-
-    /// Computes the sums and nearest break positions of a block again.
+    /// Computes the sums, in fixed lanes, and nearest break positions of a block again.
     #[inline(always)]
     pub(crate) fn gather<S: Simd>(&mut self, simd: S, block: usize) {
-        self.sum(simd, block);
-        let mut upper = simd.splat(f64::INFINITY);
-        let mut lower = simd.splat(f64::NEG_INFINITY);
-        for row in self.rows_of(block) {
-            upper = upper.smaller(simd.load(&row.upper));
-            lower = lower.larger(simd.load(&row.lower));
-        }
-        self.block_upper[block] = upper.reduce(|a, b| if a < b { a } else { b });
-        self.block_lower[block] = lower.reduce(|a, b| if a > b { a } else { b });
-    }
-
-    /// Computes the sums of a block again, in fixed lanes.
-    #[inline(always)]
-    fn sum<S: Simd>(&mut self, simd: S, block: usize) {
         let mut stiffness = simd.splat(0.0);
         let mut pull = simd.splat(0.0);
+        let mut upper = simd.splat(f64::INFINITY);
+        let mut lower = simd.splat(f64::NEG_INFINITY);
         for row in self.rows_of(block) {
             let attached = simd.load(&row.attached_stiffness);
             stiffness = stiffness.plus(attached);
             pull = pull.plus(attached.times(simd.load(&row.anchor)));
+            upper = upper.smaller(simd.load(&row.upper));
+            lower = lower.larger(simd.load(&row.lower));
         }
         self.block_stiffness[block] = stiffness.reduce(|a, b| a + b);
         self.block_pull[block] = pull.reduce(|a, b| a + b);
+        self.block_upper[block] = upper.reduce(|a, b| if a < b { a } else { b });
+        self.block_lower[block] = lower.reduce(|a, b| if a > b { a } else { b });
     }
 }
 
@@ -579,7 +557,7 @@ mod tests {
                     .collect::<Vec<_>>()
             );
             while interface.next_reattachment().is_finite() {
-                let change = interface.reattach_next(0.3 * displacement);
+                let change = interface.reattach_running(Scalar512b, 0.3 * displacement);
                 let known = [
                     interface.block_upper[change.block],
                     interface.block_lower[change.block],

@@ -229,16 +229,15 @@ impl Parameters {
 
     /// These parameters without modulation, in canonical form: see [`Symbol::is_of_modulation`].
     pub fn without_modulation(&self) -> Self {
-        Self {
-            modulation_amplitude: 0.0,
-            modulation_period: None,
-            turning_period: None,
-            turning_amplitude: None,
-            ramp_time: 0.0,
-            pulse_start: None,
-            pulse_cycles: None,
-            ..self.clone()
+        let default = Self::default();
+        let mut same = self.clone();
+        for symbol in Symbol::ALL
+            .into_iter()
+            .filter(|symbol| symbol.is_of_modulation())
+        {
+            same.put(symbol, default.get(symbol));
         }
+        same
     }
 
     /// Wave crossing time `t_c = N sqrt(m/K_int)`, in s: no front spans a longer gap between breaks. For one block, its

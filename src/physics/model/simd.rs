@@ -7,19 +7,16 @@
 //! cannot run a loop that the processor lacks. Contract: every operation is rounded in each lane as IEEE 754 says,
 //! fused ones once, so all give the same bits.
 //!
-//! `pulp` takes 1.4 % fewer instructions than intrinsics in `unsafe` blocks of our own, and the same time within 1 %.
-//! On ARM the compiler makes NEON of the plain path; that of `pulp` takes 5 % fewer instructions for nine rows, 4 % more
-//! for others.
-//! `fearless_simd` needs no code here, but has AVX-512 from Ice Lake on only, and AVX2 takes 10 to 17 % more time.
+//! `fearless_simd` would need no code here, but has AVX-512 from Ice Lake on only, and its AVX2 is slower.
 
-use pulp::{Scalar512b as Baseline, WithSimd, bytemuck};
+use pulp::{Scalar512b as Baseline, bytemuck};
 use std::array;
 use std::ops::{Deref, DerefMut};
 
 pub(crate) const LANES: usize = 8;
 
 /// Eight doubles in one cache line.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub(crate) struct Row(pub [f64; LANES]);
 
@@ -27,13 +24,6 @@ impl Row {
     /// The same value in every lane.
     pub const fn filled(value: f64) -> Self {
         Self([value; LANES])
-    }
-
-    /// Combines all lanes into one value, in pairs.
-    #[inline(always)]
-    pub fn reduce(self, combine: impl Fn(f64, f64) -> f64) -> f64 {
-        let halves: [f64; LANES / 2] = array::from_fn(|i| combine(self[i], self[i + LANES / 2]));
-        combine(combine(halves[0], halves[2]), combine(halves[1], halves[3]))
     }
 }
 
@@ -75,24 +65,6 @@ pub(crate) trait Simd: pulp::Simd {
     fn set(self, row: &mut Row, lane: usize, value: f64) {
         self.load(row).with(lane, value).store(row);
     }
-
-    /// Runs a loop, compiled for these features where it is inlined.
-    #[inline(always)]
-    fn run<T>(self, hot_loop: impl FnOnce(Self) -> T) -> T {
-        self.vectorize(HotLoop(self, hot_loop))
-    }
-}
-
-/// A loop that is inlined into code compiled for the features of a token.
-struct HotLoop<S, F>(S, F);
-
-impl<S, T, F: FnOnce(S) -> T> WithSimd for HotLoop<S, F> {
-    type Output = T;
-
-    #[inline(always)]
-    fn with_simd<Same: pulp::Simd>(self, _: Same) -> T {
-        (self.1)(self.0)
-    }
 }
 
 pub(crate) trait Vector: Copy {
@@ -117,17 +89,14 @@ pub(crate) trait Vector: Copy {
     fn reduce(self, combine: impl Fn(f64, f64) -> f64) -> f64 {
         let mut row = Row::filled(0.0);
         self.store(&mut row);
-        row.reduce(combine)
+        let halves: [f64; LANES / 2] =
+            array::from_fn(|lane| combine(row[lane], row[lane + LANES / 2]));
+        combine(combine(halves[0], halves[2]), combine(halves[1], halves[3]))
     }
     /// The same with another value in one lane.
     fn with(self, lane: usize, value: f64) -> Self;
     /// One bit a lane: `self >= other`.
     fn reaches(self, other: Self) -> u8;
-    /// Whether no lane exceeds that of `bound` or is not a number.
-    #[inline(always)]
-    fn within(self, bound: Self) -> bool {
-        bound.reaches(self) == u8::MAX
-    }
     /// Every lane moved to the next one, 0 into the first.
     fn to_next_lane(self) -> Self;
     /// Every lane moved to the one before, 0 into the last.

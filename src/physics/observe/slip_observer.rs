@@ -105,7 +105,8 @@ impl SlipObserver {
     pub fn into_measurements(mut self, summary: Summary) -> Measurements {
         self.measured.summary = summary;
         self.measured.averages = self.averages();
-        self.measured.running_interval = self.running_interval();
+        let last_onset = self.last_onset.filter(|_| self.measured.has_given_up);
+        self.measured.running_interval = last_onset.map(|last| self.now.time - last);
         let Measurements {
             slips, precursors, ..
         } = &mut self.measured;
@@ -141,12 +142,6 @@ impl SlipObserver {
                 / (time * self.contacts as f64),
             slip_share: (end.slipping - start.slipping) / time,
         })
-    }
-
-    /// Time since the last onset, in s, of a job that gives up: what its interval is at least.
-    fn running_interval(&self) -> Option<f64> {
-        let last = self.last_onset.filter(|_| self.measured.has_given_up)?;
-        Some(self.now.time - last)
     }
 
     /// Whether the last slip that was asked for is recorded.

@@ -11,9 +11,8 @@ use super::ledger::Audit;
 use super::polynomial;
 use super::segment::{ForceAt, ForcePath, PolynomialPath, Segment};
 use super::{Limits, Observer, SimulationError, SolverKey, Summary};
-use crate::model::equation::stability_limit;
-use crate::model::{ContactChange, ContactEvent, Drive, Interface, Parameters};
-use pulp::Arch;
+use crate::model::equation::largest_frequency;
+use crate::model::{Change, ContactChange, ContactEvent, Drive, Interface, Parameters};
 use std::sync::atomic::Ordering;
 
 pub(super) const SETTINGS: &[SolverKey] = &[SolverKey::TimeStep];
@@ -91,7 +90,7 @@ impl Motion {
 
 /// Checks that a time step, in s, is stable.
 pub(super) fn check(time_step: f64, parameters: &Parameters) -> Result<(), SimulationError> {
-    let limit = stability_limit(parameters);
+    let limit = 2.0 / largest_frequency(parameters);
     if time_step > 0.0 && time_step < limit {
         Ok(())
     } else {
@@ -104,25 +103,10 @@ pub(super) fn check(time_step: f64, parameters: &Parameters) -> Result<(), Simul
     }
 }
 
-/// Runs the scheme with a stable `time_step`, in s, compiled for these features of the processor; see
+/// Runs the scheme with a stable `time_step`, in s, inlined into code compiled for the features of a processor; see
 /// [`super::simulate`].
-pub(super) fn run(
-    features: Arch,
-    parameters: &Parameters,
-    time_step: f64,
-    limits: Limits<'_>,
-    observer: &mut dyn Observer,
-    audit: Option<&Audit>,
-) -> Result<Summary, SimulationError> {
-    features.dispatch(
-        #[inline(always)]
-        || integrate(parameters, time_step, limits, observer, audit),
-    )
-}
-
-/// The scheme, inlined into code compiled for the features of a processor.
 #[inline(always)]
-fn integrate(
+pub(super) fn run(
     parameters: &Parameters,
     time_step: f64,
     limits: Limits<'_>,
@@ -162,10 +146,8 @@ fn integrate(
         if let Some(audit) = audit {
             // These velocities are those of the middle of the step.
             let squares = motion.velocity.iter().map(|v| v * v).sum::<f64>();
-            Audit::add(
-                &audit.damping,
-                mass * parameters.damping_rate * time_step * squares,
-            );
+            let loss = mass * parameters.damping_rate * time_step * squares;
+            audit.damping.update(|sum| sum + loss);
         }
         drive.advance_to(time);
         let (driven, drive_velocity) = drive.motion(time);
@@ -229,7 +211,7 @@ fn change_contacts(
     let mean_displacement = displacement.iter().sum::<f64>() / displacement.len() as f64;
     while let Some((_, block)) = interface.next_reattachment_by(time) {
         let change = interface.reattach_next(displacement[block]);
-        let count = interface.count(&change);
+        let count = interface.count(Change::Attach, change.time);
         summary.reattachments += 1;
         let change = ContactChange { time, ..change };
         observer.contact(&ContactEvent::new(change, count, 0.0));
@@ -254,9 +236,11 @@ fn report_force(
     rates: [f64; 2],
 ) {
     let [slope, next_slope] = rates.map(|rate| time_step * rate);
-    let coefficients = hermite(force, next_force, slope, next_slope);
-    let [constant, linear, square, cube] = coefficients;
-    let whole = constant + 0.5 * linear + square / 3.0 + 0.25 * cube;
+    let rise = next_force - force;
+    let square = 3.0 * rise - 2.0 * slope - next_slope;
+    let cube = slope + next_slope - 2.0 * rise;
+    let coefficients = [force, slope, square, cube];
+    let whole = force + 0.5 * slope + square / 3.0 + 0.25 * cube;
     let ends = [(force, 0.0), (next_force, whole)];
     let path = PolynomialPath {
         coefficients: &coefficients,
@@ -272,21 +256,11 @@ fn report_force(
     });
 }
 
-/// Coefficients in [0, 1] of the cubic with these values and slopes at its ends.
-fn hermite(start: f64, end: f64, start_slope: f64, end_slope: f64) -> [f64; 4] {
-    let rise = end - start;
-    [
-        start,
-        start_slope,
-        3.0 * rise - 2.0 * start_slope - end_slope,
-        start_slope + end_slope - 2.0 * rise,
-    ]
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::ledger;
     use super::*;
+    use pulp::Arch;
     #[cfg(target_arch = "x86_64")]
     use pulp::x86::{V3, V4};
 
@@ -342,7 +316,10 @@ mod tests {
                 };
                 let mut reported = Reported::default();
                 let audited = ledger::audited(&parameters, &mut reported, |observer, audit| {
-                    run(features, &parameters, 2e-6, limits, observer, Some(audit))
+                    features.dispatch(
+                        #[inline(always)]
+                        || run(&parameters, 2e-6, limits, observer, Some(audit)),
+                    )
                 });
                 (format!("{features:?}"), (reported, audited.unwrap()))
             });

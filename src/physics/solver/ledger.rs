@@ -101,11 +101,6 @@ impl Audit {
         let squares: f64 = velocity.iter().map(|v| v * v).sum();
         self.kinetic.set(0.5 * self.mass * squares);
     }
-
-    /// Adds to an entry, in J.
-    pub fn add(entry: &Cell<f64>, energy: f64) {
-        entry.set(entry.get() + energy);
-    }
 }
 
 /// An observer that keeps the work of the drive and the loss in breaks, and passes on all that it sees.

@@ -155,49 +155,29 @@ pub struct Summary {
     pub reattachments: u64,
 }
 
-/// Why a simulation could not continue.
+/// Why a simulation could not continue. Times and steps are in s.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulationError {
-    /// The main setting is out of range, or does not fit the parameters.
     #[error("{setting}: must be {allowed}")]
     BadSetting { setting: String, allowed: String },
-    /// A ledger is asked for along the grid.
     #[error(
         "resolve = \"grid\": an energy ledger is kept along Taylor steps only; leave resolve out or set it to \"taylor\""
     )]
     LedgerOnGrid,
-    /// The state is no longer finite.
     #[error("at t = {time} s: the state is not finite; a smaller dt or tolerance may help")]
-    NotFinite {
-        /// Model time, in s.
-        time: f64,
-    },
-    /// The steps that the motion needs are too short for the clock.
+    NotFinite { time: f64 },
     #[error(
         "at t = {time} s: a step of {step:e} s is lost in the resolution of the time; the shortest time scale of these \
          parameters, 1/omega_max, 1/gamma or T, is too short"
     )]
-    StepTooShort {
-        /// Model time, in s.
-        time: f64,
-        /// The step, in s.
-        step: f64,
-    },
-    /// More contact events than allowed.
+    StepTooShort { time: f64, step: f64 },
     #[error(
         "at t = {time} s: {events} contact events, the most allowed; raise the budget (record.max_events) if they are \
          wanted"
     )]
-    EventBudget {
-        /// Model time, in s.
-        time: f64,
-        events: u64,
-    },
+    EventBudget { time: f64, events: u64 },
     #[error("at t = {time} s: interrupted")]
-    Interrupted {
-        /// Model time, in s.
-        time: f64,
-    },
+    Interrupted { time: f64 },
 }
 
 /// Runs one realisation until the observer is satisfied or the end time is reached.
@@ -235,7 +215,10 @@ fn run(
         Method::EventDriven => event_driven::run(solver, parameters, limits, observer, audit),
         Method::FixedStep => {
             let time_step = solver.setting();
-            fixed_step::run(Arch::new(), parameters, time_step, limits, observer, audit)
+            Arch::new().dispatch(
+                #[inline(always)]
+                || fixed_step::run(parameters, time_step, limits, observer, audit),
+            )
         }
     }
 }

@@ -28,45 +28,25 @@ pub(crate) const INVERSE: [f64; MAX_COEFFICIENTS] = {
     inverse
 };
 
-/// p (p-1): factors of the second derivative.
-const SECOND_DERIVATIVE: [f64; MAX_COEFFICIENTS] = {
-    let mut factors = [0.0; MAX_COEFFICIENTS];
-    let mut p = 2;
-    while p < MAX_COEFFICIENTS {
-        factors[p] = (p * (p - 1)) as f64;
-        p += 1;
-    }
-    factors
-};
-
-/// `Σ c_p s^p`. Even and odd orders are summed side by side, since each sum waits for its last term.
+/// `Σ c_p s^p`.
+#[inline(always)]
 pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
-    let square = s * s;
-    let pairs = coefficients.chunks_exact(2);
-    let last = pairs.remainder().first().copied().unwrap_or(0.0);
-    let (even, odd) = pairs.rev().fold((last, 0.0), |(even, odd), pair| {
-        (even * square + pair[0], odd * square + pair[1])
-    });
-    even + s * odd
+    expanded(coefficients, s)[0]
 }
 
 /// `Σ p (p-1) |c_p|`: a bound on the second derivative on [0, 1]. Two sums side by side.
 pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
-    let (pairs, rest) = coefficients.as_chunks::<2>();
     let mut sums = [0.0; 2];
-    for (pair, factors) in pairs.iter().zip(SECOND_DERIVATIVE.as_chunks::<2>().0) {
-        for i in 0..2 {
-            sums[i] += factors[i] * pair[i].abs();
-        }
+    for (p, coefficient) in coefficients.iter().enumerate() {
+        let order = p as f64;
+        sums[p % 2] += order * (order - 1.0) * coefficient.abs();
     }
-    let last = rest
-        .first()
-        .map_or(0.0, |c| SECOND_DERIVATIVE[coefficients.len() - 1] * c.abs());
-    (sums[0] + last) + sums[1]
+    sums[0] + sums[1]
 }
 
-/// The first three coefficients in the variable s - `centre`: value, slope, and half the second derivative. As in
-/// [`value`], with the derivatives of both sums by s².
+/// The first three coefficients in the variable s - `centre`: value, slope, and half the second derivative. Even and odd
+/// orders are summed side by side, since each sum waits for its last term.
+#[inline(always)]
 pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
     let square = centre * centre;
     let (pairs, rest) = coefficients.as_chunks::<2>();
@@ -164,23 +144,18 @@ pub(crate) fn for_each_turn(
 /// The same polynomial in the variable r, which runs from -1 to 1 as s does from `low` to `high`.
 fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MAX_COEFFICIENTS] {
     let half = 0.5 * (high - low);
-    let mut about = shifted(coefficients, 0.5 * (low + high));
-    let mut power = 1.0;
-    for coefficient in &mut about[..coefficients.len()] {
-        *coefficient *= power;
-        power *= half;
-    }
-    about
-}
-
-/// The same polynomial in the variable s - `centre`.
-fn shifted(coefficients: &[f64], centre: f64) -> [f64; MAX_COEFFICIENTS] {
+    let centre = 0.5 * (low + high);
     let mut about = [0.0; MAX_COEFFICIENTS];
     about[..coefficients.len()].copy_from_slice(coefficients);
     for p in 0..coefficients.len() {
         for q in (p..coefficients.len() - 1).rev() {
             about[q] += centre * about[q + 1];
         }
+    }
+    let mut power = 1.0;
+    for coefficient in &mut about[..coefficients.len()] {
+        *coefficient *= power;
+        power *= half;
     }
     about
 }

@@ -55,12 +55,16 @@ pub struct Extremes {
     pub least: (f64, f64),
 }
 
-impl Extremes {
-    pub(super) const NONE: Self = Self {
-        largest: (0.0, f64::NEG_INFINITY),
-        least: (0.0, f64::INFINITY),
-    };
+impl Default for Extremes {
+    fn default() -> Self {
+        Self {
+            largest: (0.0, f64::NEG_INFINITY),
+            least: (0.0, f64::INFINITY),
+        }
+    }
+}
 
+impl Extremes {
     #[inline(always)]
     fn include(&mut self, at: f64, value: f64) {
         if value > self.largest.1 {
@@ -477,7 +481,7 @@ mod tests {
                 .collect();
             let last = (steps.len() - 1) as f64 + if steps.len() == 1 { first + (1.0 - first) * s } else { s };
             let spacing = 0.25;
-            let mut inner = Extremes::NONE;
+            let mut inner = Extremes::default();
             for (begin, step) in steps.iter().enumerate().take(steps.len() - 1).skip(1) {
                 inner.include_step(begin as f64, step);
             }

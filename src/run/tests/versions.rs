@@ -51,7 +51,7 @@ fn write_again<R: Row>(file: &Path, results: &Results<'_>) {
         .collect();
     fs::remove_file(file).unwrap();
     let created = Disk.create(file).unwrap();
-    let mut writer = TableWriter::<R>::new(&gaps, created, &Footer::default()).unwrap();
+    let mut writer = TableWriter::<R>::new(&gaps, file, created, &Footer::default()).unwrap();
     for batch in &batches {
         writer.copy(batch, 0..batch.rows.num_rows()).unwrap();
     }

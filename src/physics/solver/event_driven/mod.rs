@@ -27,7 +27,7 @@ use super::harmonic::Harmonic;
 use super::ledger::Audit;
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Solver, SolverKey, Summary};
-use crate::model::{ContactChange, ContactEvent, Drive, Parameters};
+use crate::model::{Change, ContactChange, ContactEvent, Drive, Parameters};
 use crate::value::{Field, words};
 use std::sync::atomic::Ordering;
 
@@ -64,8 +64,6 @@ pub const GRID_TOLERANCE: f64 = 1e-7;
 /// A leap is tried only if no reattachment is due within this many longest Taylor steps, or steps of the grid.
 const WORTHWHILE_LEAP: f64 = 6.0;
 const WORTHWHILE_GRID_LEAP: f64 = 80.0;
-/// Steps between two checks of the interrupt flag.
-const STEPS_PER_CHECK: u64 = 1024;
 
 /// Checks a tolerance.
 pub(super) fn check(tolerance: f64) -> Result<(), SimulationError> {
@@ -95,18 +93,8 @@ pub(super) fn run(
     }
     let is_possible = audit.is_none() && Grid::is_resolved(parameters, tolerance);
     let takes_grid = resolve.takes_grid(tolerance) && (is_possible || resolve == Resolve::Grid);
-    let integration = Integration::new(
-        parameters,
-        tolerance,
-        takes_grid,
-        limits,
-        kernels::fastest(rows),
-    );
-    Integration {
-        audit,
-        ..integration
-    }
-    .integrate(observer)
+    let kernels = kernels::fastest(rows);
+    Integration::new(parameters, tolerance, takes_grid, limits, kernels, audit).integrate(observer)
 }
 
 /// One simulation in progress. Times and displacements are those of the frame unless stated otherwise.
@@ -137,6 +125,7 @@ impl<'a> Integration<'a> {
         takes_grid: bool,
         limits: Limits<'a>,
         kernels: Box<dyn Kernels>,
+        audit: Option<&'a Audit>,
     ) -> Self {
         let tolerances = Tolerances::new(parameters, tolerance);
         let slider = Slider::new(parameters);
@@ -160,7 +149,7 @@ impl<'a> Integration<'a> {
             next_leap: 0.0,
             largest_force: 0.0,
             summary: Summary::default(),
-            audit: None,
+            audit,
         }
     }
 
@@ -169,7 +158,6 @@ impl<'a> Integration<'a> {
     #[inline(never)]
     fn integrate(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
         self.grid.set_observed(observer);
-        let mut next_check = STEPS_PER_CHECK;
         for event in self.slider.interface.initial_attachments() {
             observer.contact(&event);
         }
@@ -215,14 +203,8 @@ impl<'a> Integration<'a> {
             if self.frame.time > self.frame.span {
                 self.move_frame(observer);
             }
-            let is_check = self.summary.steps >= next_check;
-            next_check += if is_check { STEPS_PER_CHECK } else { 0 };
-            if is_check
-                && self
-                    .limits
-                    .interrupt
-                    .is_some_and(|flag| flag.load(Ordering::Relaxed))
-            {
+            let interrupt = self.limits.interrupt;
+            if interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                 return Err(SimulationError::Interrupted {
                     time: self.frame.now(),
                 });
@@ -252,21 +234,17 @@ impl<'a> Integration<'a> {
         observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
         if let Some(audit) = self.audit {
-            self.record_final_energy(audit);
+            let slider = &self.slider;
+            let blocks = 0..slider.chain.layout.blocks;
+            let velocity = blocks.map(|block| slider.chain.at(&slider.state.velocity, block));
+            audit.record_final_energy(
+                &slider.interface,
+                &slider.displacements().collect::<Vec<_>>(),
+                &velocity.collect::<Vec<_>>(),
+                self.frame.drive_motion().value(0.0),
+            );
         }
         Ok(self.summary)
-    }
-
-    fn record_final_energy(&self, audit: &Audit) {
-        let slider = &self.slider;
-        let blocks = 0..slider.chain.layout.blocks;
-        let velocity = blocks.map(|block| slider.chain.at(&slider.state.velocity, block));
-        audit.record_final_energy(
-            &slider.interface,
-            &slider.displacements().collect::<Vec<_>>(),
-            &velocity.collect::<Vec<_>>(),
-            self.frame.drive_motion().value(0.0),
-        );
     }
 
     /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next change of the drive or the
@@ -310,7 +288,10 @@ impl<'a> Integration<'a> {
         self.summary.steps += 1;
         self.summary.leaps += 1;
         self.next_leap = 0.0;
-        self.arrive(plan.duration, plan.is_whole);
+        let due = self.slider.interface.next_reattachment();
+        let reached = began + plan.duration;
+        let is_due = plan.is_whole && (due - reached).abs() <= 4.0 * f64::EPSILON * reached;
+        self.frame.set_time(if is_due { due } else { reached });
         match plan.reached {
             Some(block) => {
                 let x = self.slider.displacement(block);
@@ -365,14 +346,6 @@ impl<'a> Integration<'a> {
         report(leap.duration, observer);
     }
 
-    /// Advances time by `elapsed` s, exactly to the next reattachment if that ended the leap.
-    fn arrive(&mut self, elapsed: f64, at_horizon: bool) {
-        let due = self.slider.interface.next_reattachment();
-        let reached = self.frame.time + elapsed;
-        let is_due = at_horizon && (due - reached).abs() <= 4.0 * f64::EPSILON * reached;
-        self.frame.set_time(if is_due { due } else { reached });
-    }
-
     /// Breaks the contacts of a block that has reached a break position, at these displacements of it and of all blocks
     /// on average in m and shear force `force` N.
     fn break_block(
@@ -409,7 +382,7 @@ impl<'a> Integration<'a> {
     fn attach_next(&mut self, x: f64, observer: &mut dyn Observer) {
         let change = self.slider.attach_next(x);
         self.summary.reattachments += 1;
-        let count = self.slider.interface.count(&change);
+        let count = self.slider.interface.count(Change::Attach, change.time);
         if self.grid.wants_attachments() {
             observer.contact(&ContactEvent::new(self.frame.absolute(change), count, 0.0));
         }
@@ -467,7 +440,7 @@ mod tests {
                             interrupt: None,
                         };
                         let mut log = ContactLog::default();
-                        Integration::new(parameters, 1e-6, takes_grid, limits, kernels)
+                        Integration::new(parameters, 1e-6, takes_grid, limits, kernels, None)
                             .integrate(&mut log)
                             .unwrap();
                         (name, log.events)
@@ -572,7 +545,8 @@ mod tests {
                     ..Recording::default()
                 };
                 let mut observer = SlipObserver::new(&parameters, &recording);
-                let integration = Integration::new(&parameters, 1e-10, false, limits, kernels);
+                let integration =
+                    Integration::new(&parameters, 1e-10, false, limits, kernels, None);
                 let summary = Integration {
                     next_leap,
                     ..integration

@@ -3,6 +3,7 @@
 
 use super::taylor::DriveDerivatives;
 use crate::model::{ContactChange, Drive};
+use crate::solver::SimulationError;
 use crate::solver::harmonic::Harmonic;
 
 /// Time in the frame at which it moves where Taylor steps locate events to rounding, in s.
@@ -117,10 +118,15 @@ impl Frame {
         self.origin_time + self.time
     }
 
-    /// Whether the clock is fine enough to locate events within a step of `length` s.
-    #[inline]
-    pub fn resolves(&self, length: f64) -> bool {
-        length >= MIN_RESOLUTION * f64::EPSILON * self.time.max(self.span)
+    /// Checks that the clock is fine enough to locate events within a step of `length` s.
+    pub fn resolves(&self, length: f64) -> Result<(), SimulationError> {
+        if length >= MIN_RESOLUTION * f64::EPSILON * self.time.max(self.span) {
+            return Ok(());
+        }
+        Err(SimulationError::StepTooShort {
+            time: self.now(),
+            step: length,
+        })
     }
 
     /// Time since the start of the run, in s, for a time in the frame.
@@ -222,15 +228,11 @@ impl Frame {
 
     /// The drive for a grid of steps of `length` s, from the present on.
     pub fn grid_drive(&self, length: f64) -> GridDrive {
-        let angle = if self.drive.is_modulated() {
-            self.drive.angular_frequency * length
-        } else {
-            0.0
-        };
+        let DriveDerivatives { ramp, swing, angle } = self.drive_derivatives(length);
         let (sine, cosine) = libm::sincos(angle);
         GridDrive {
-            ramp: [self.ramp(), self.drive.velocity * length],
-            swing: self.swing,
+            ramp,
+            swing,
             turn: [sine, cosine],
             angle,
         }

@@ -10,11 +10,7 @@ use crate::model::{ContactChange, Interface, LANES, Parameters, Row};
 use pulp::Scalar512b;
 
 /// Block 1, at which the drive pulls, in the first row.
-pub(super) const FIRST_BLOCK: Row = {
-    let mut row = Row::filled(0.0);
-    row.0[0] = 1.0;
-    row
-};
+pub(super) const FIRST_BLOCK: Row = Row([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {

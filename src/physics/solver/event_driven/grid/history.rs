@@ -3,12 +3,12 @@
 use crate::solver::segment::{CubicStep, Extremes, ForcePath, GridPath, Segment};
 
 /// Steps of shear force, from somewhere in the first of them on.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct ForceHistory {
     /// Whether all steps are kept, or only the first and the last.
     pub keeps_all: bool,
     steps: Vec<CubicStep>,
-    count: usize,
+    pub count: usize,
     /// Whether the last step turns or lies beside one that does.
     turns: bool,
     /// Where in the first step it begins.
@@ -22,19 +22,6 @@ pub(super) struct ForceHistory {
 }
 
 impl ForceHistory {
-    pub fn new() -> Self {
-        Self {
-            keeps_all: true,
-            steps: Vec::new(),
-            count: 0,
-            turns: false,
-            first: 0.0,
-            start: 0.0,
-            inner: Extremes::NONE,
-            integral: 0.0,
-        }
-    }
-
     /// Restarts at a time in s, with the next step.
     pub fn restart(&mut self, start: f64) {
         self.steps.clear();
@@ -42,12 +29,8 @@ impl ForceHistory {
             keeps_all: self.keeps_all,
             steps: std::mem::take(&mut self.steps),
             start,
-            ..Self::new()
+            ..Self::default()
         };
-    }
-
-    pub fn len(&self) -> usize {
-        self.count
     }
 
     /// Adds a step. Slopes are continuous, so that the force turns at most in the two steps of which one rises.
@@ -77,11 +60,7 @@ impl ForceHistory {
         let first = self.steps.first()?;
         let last = self.steps.last()?;
         let steps = (self.count - 1) as f64 + s - self.first;
-        let before = if self.first > 0.0 {
-            first.integral_to(self.first)
-        } else {
-            0.0
-        };
+        let before = first.integral_to(self.first);
         let beyond = if s < 1.0 {
             last.integral() - last.integral_to(s)
         } else {

@@ -19,7 +19,7 @@ use super::taylor::StepInput;
 use super::{Integration, WORTHWHILE_GRID_LEAP};
 use crate::model::equation::largest_frequency;
 use crate::model::simd::Simd;
-use crate::model::{ContactEvent, Parameters};
+use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::segment::CubicStep;
 use crate::solver::{Observer, SimulationError};
 use crate::value::floored;
@@ -72,7 +72,7 @@ impl Grid {
             is_on: false,
             drive: GridDrive::default(),
             events: StepEvents::default(),
-            history: ForceHistory::new(),
+            history: ForceHistory::default(),
             force: 0.0,
             last_break: f64::NEG_INFINITY,
             pause: 0.5 * parameters.wave_crossing_time(),
@@ -122,7 +122,7 @@ impl Grid {
         [here, bend]
     }
 
-    /// Adds the last step to the history, once its events are known. The drive was `drive` at its start.
+    /// Adds the last step to the history, once its events are known.
     #[inline(always)]
     fn follow_last(
         &mut self,
@@ -133,16 +133,11 @@ impl Grid {
     ) {
         let step = &self.step;
         let drive = &self.drive;
-        let x = |block: usize| {
-            if block < chain.layout.blocks {
-                chain.at(&state.displacement, block)
-            } else {
-                0.0
-            }
-        };
-        let here = x(0);
+        let here = chain.at(&state.displacement, 0);
+        // Padding beside a single block is at rest and not coupled.
+        let beside = chain.at(&state.displacement, 1);
         let rise = step.increment[0][0];
-        let own = step.force_on(0, 0, x(1), here) + step.pulling * drive.displacement();
+        let own = step.force_on(0, 0, beside, here) + step.pulling * drive.displacement();
         // h² x'' at the start of the step and, from the law of motion, at its end.
         let first = start_bend - bend * step.inverse_stiffness;
         let last = (own - step.damping * (rise + first / 6.0)) * step.inverse_end;
@@ -203,12 +198,7 @@ impl Integration<'_> {
     /// Takes the motion on the grid, from the state.
     fn enter_grid(&mut self) -> Result<(), SimulationError> {
         let length = self.grid.step.length;
-        if !self.frame.resolves(length) {
-            return Err(SimulationError::StepTooShort {
-                time: self.frame.now(),
-                step: length,
-            });
-        }
+        self.frame.resolves(length)?;
         let drive = self.frame.drive_derivatives(length);
         let input = StepInput {
             length,
@@ -240,11 +230,8 @@ impl Integration<'_> {
                 increment[lane] = now[lane] - before[lane];
             }
         }
-        grid.step.update_all(chain);
-        grid.drive = self.frame.grid_drive(length);
+        grid.follow_frame(chain, &self.frame);
         grid.force = self.frame.shear_force(state.displacement[0][0]);
-        grid.history.restart(self.frame.time);
-        grid.last_break = f64::NEG_INFINITY;
         grid.is_on = true;
         Ok(())
     }
@@ -317,7 +304,7 @@ impl Integration<'_> {
         }
         self.report_changes(start, observer);
         self.largest_force = self.largest_force.max(self.grid.force);
-        if self.grid.history.len() > MAX_HISTORY {
+        if self.grid.history.count > MAX_HISTORY {
             self.report_force(1.0, observer);
         }
         Ok(true)
@@ -344,7 +331,7 @@ impl Integration<'_> {
     fn report_changes(&mut self, start: f64, observer: &mut dyn Observer) {
         if self.grid.events.changes.is_empty() {
             for due in &self.grid.events.attachments {
-                self.slider.interface.count_attachment(*due);
+                self.slider.interface.count(Change::Attach, *due);
             }
             return;
         }
@@ -373,10 +360,10 @@ impl Integration<'_> {
                 while let [due, later @ ..] = uncounted
                     && *due <= change.time
                 {
-                    self.slider.interface.count_attachment(*due);
+                    self.slider.interface.count(Change::Attach, *due);
                     uncounted = later;
                 }
-                let count = self.slider.interface.count(change);
+                let count = self.slider.interface.count(change.change, change.time);
                 let left = 1.0 - (change.time - start) * self.grid.step.inverse_length;
                 let mean = self.frame.absolute_displacement(mean - left * rise);
                 observer.contact(&ContactEvent::new(
@@ -388,7 +375,7 @@ impl Integration<'_> {
             rest = later;
         }
         for due in uncounted {
-            self.slider.interface.count_attachment(*due);
+            self.slider.interface.count(Change::Attach, *due);
         }
         if let Some(last) = changes.last() {
             self.grid.last_break = last.time;

@@ -32,21 +32,15 @@ pub(super) struct Place {
 
 impl Place {
     fn new(layout: Layout, block: usize) -> Self {
-        let slot = layout.slot(block);
-        let beside = |other: Option<usize>| {
-            other
-                .filter(|other| *other < layout.blocks)
-                .map(|other| layout.slot(other))
-        };
-        let before = beside(block.checked_sub(1));
-        let after = beside(Some(block + 1));
-        let share = |beside: Option<(usize, usize)>| if beside.is_some() { 1.0 } else { 0.0 };
-        let shares = [share(before), share(after)];
+        let before = block.checked_sub(1);
+        let after = Some(block + 1).filter(|after| *after < layout.blocks);
+        let slot = |beside: Option<usize>| layout.slot(beside.unwrap_or(block));
+        let share = |beside: Option<usize>| if beside.is_some() { 1.0 } else { 0.0 };
         Self {
-            slot,
-            before: before.unwrap_or(slot),
-            after: after.unwrap_or(slot),
-            shares,
+            slot: layout.slot(block),
+            before: slot(before),
+            after: slot(after),
+            shares: [share(before), share(after)],
         }
     }
 }

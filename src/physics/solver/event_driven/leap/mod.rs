@@ -253,9 +253,9 @@ pub(super) fn leap<S: Simd>(
     let plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
     if let Some(audit) = audit {
         let left_out = chain.mass * free_energy(chain, drive, split, state);
-        Audit::add(&audit.left_out, left_out);
+        audit.left_out.update(|sum| sum + left_out);
         let damping = damping_loss(chain, drive, split, plan.duration);
-        Audit::add(&audit.damping, damping);
+        audit.damping.update(|sum| sum + damping);
     }
     follow(simd, split, drive, plan.duration, state);
     Ok(plan)
@@ -407,11 +407,7 @@ fn first_reached<S: Simd>(
 /// Moves a state on along the driven solution, by `elapsed` s.
 #[inline(always)]
 fn follow<S: Simd>(simd: S, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State) {
-    let (sine, cosine) = if drive.amplitude > 0.0 {
-        libm::sincos(drive.turn(elapsed))
-    } else {
-        (0.0, 1.0)
-    };
+    let (sine, cosine) = libm::sincos(drive.turn(elapsed));
     let elapsed = simd.splat(elapsed);
     let frequency = simd.splat(drive.angular_frequency);
     for ((row, x), v) in split

@@ -33,7 +33,7 @@ pub struct BlockMotion {
 }
 
 /// The motion at the start of a leap, split: driven solution and free motion of a row of blocks.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SplitRow {
     /// p0 in m, p1 in m/s, q in m, and |q|.
     pub start: Row,
@@ -65,18 +65,9 @@ impl Split {
         for (row, lane) in (layout.blocks..LANES * layout.rows).map(|block| layout.slot(block)) {
             fixed[row][lane] = FIXED;
         }
-        let [start, swing, bound, compliance] = [Row::filled(0.0); 4];
-        let row = SplitRow {
-            start,
-            rate: [start],
-            wave: [start; 2],
-            swing,
-            bound,
-            compliance,
-        };
         let [stiffness, shifted] = [(); 2].map(|()| Elimination::new(layout.rows));
         Self {
-            rows: vec![row; layout.rows],
+            rows: vec![SplitRow::default(); layout.rows],
             decay_rate: f64::INFINITY,
             fixed,
             stiffness,

@@ -42,7 +42,7 @@ const MAX_MERGED: u32 = 16;
 const MIN_WINDOW: f64 = 0.5;
 
 /// What recent steps say about the next.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct StepControl {
     /// How far steps come, in s.
     typical_advance: f64,
@@ -57,9 +57,7 @@ impl StepControl {
     pub fn new(max_step: f64) -> Self {
         Self {
             typical_advance: max_step,
-            break_window: 0.0,
-            attach_window: 0.0,
-            min_orders: [0; MAX_HALVINGS + 1],
+            ..Self::default()
         }
     }
 
@@ -77,7 +75,7 @@ impl StepControl {
 }
 
 /// The step in progress: its series, and what may still happen in it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Step {
     /// Its first instant in the frame and its length, in s.
     start: f64,
@@ -100,15 +98,8 @@ pub(super) struct Step {
 impl Step {
     pub fn new(layout: Layout) -> Self {
         Self {
-            start: 0.0,
-            length: 0.0,
             series: Series::new(layout),
-            force: Vec::new(),
-            curvature_bound: 0.0,
-            candidates: Vec::new(),
-            breaks: Vec::new(),
-            amended: Vec::new(),
-            coefficients: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -180,12 +171,7 @@ impl Integration<'_> {
         self.expand(horizon.min(until_attach))?;
         let start = self.step.start;
         let length = self.step.length;
-        if !self.frame.resolves(length) {
-            return Err(SimulationError::StepTooShort {
-                time: self.frame.now(),
-                step: length,
-            });
-        }
+        self.frame.resolves(length)?;
         self.summary.steps += 1;
         let mut done = 0.0;
         let mut end = (horizon / length).min(1.0);
@@ -307,7 +293,7 @@ impl Integration<'_> {
             })
             .sum();
         let loss = chain.mass * chain.damping_rate * (last - first) * length * mean_square;
-        Audit::add(&audit.damping, loss);
+        audit.damping.update(|sum| sum + loss);
     }
 
     /// Breaks the contacts that a block has reached, or attaches the one that is due there, at s in the step. Returns

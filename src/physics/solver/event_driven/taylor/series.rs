@@ -52,7 +52,7 @@ impl DriveDerivatives {
 }
 
 /// The series of one step.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Series {
     pub rows: usize,
     /// Rows of Y_0, then of Y_1, and so on, in m.
@@ -279,27 +279,38 @@ pub fn expand<S: Simd, const R: usize>(
     for (rate, velocity) in second.iter_mut().zip(&state.velocity[..rows]) {
         simd.load(velocity).times(length).store(rate);
     }
-    let recurrence = Recurrence {
-        simd,
-        coupling,
-        diagonal,
-        pull: &chain.pull[..rows],
-        square,
-        damping: simd.splat(-chain.damping_rate * input.length),
-        pulling: input.length * input.length * (chain.drive_stiffness / chain.mass),
-        drive: input.drive,
-    };
-    let min_order =
-        input
-            .min_order
-            .max(order_of_drive(input.drive, recurrence.pulling, input.error));
-    let input = StepInput {
-        min_order,
-        ..*input
-    };
-    let order = converge(recurrence, &input, terms, rows);
-    series.order = order.unwrap_or(series.order);
-    order.is_some()
+    let damping = simd.splat(-chain.damping_rate * input.length);
+    let pulling = input.length * input.length * (chain.drive_stiffness / chain.mass);
+    let mut drive = input.drive;
+    let min_order = order_of_drive(drive, pulling, input.error).max(input.min_order);
+    for p in 0..MAX_ORDER - 1 {
+        let terms = &mut terms[p * rows..(p + 3) * rows];
+        sweep(simd, coupling, diagonal, damping, terms, rows);
+        let next = &mut terms[2 * rows..];
+        if p == 0 {
+            for (row, pull) in next.iter_mut().zip(&chain.pull[..rows]) {
+                let pull = simd.load(pull);
+                pull.mul_add(square, simd.load(row)).store(row);
+            }
+        }
+        let push = pulling * drive.next_order();
+        if push != 0.0 {
+            let first = simd.load(&FIRST_BLOCK);
+            first
+                .mul_add(simd.splat(push), simd.load(&next[0]))
+                .store(&mut next[0]);
+        }
+        // Two orders at a time: every second one may vanish by symmetry.
+        let order = p + 2;
+        if p % 2 == 1
+            && order >= min_order
+            && are_small(simd, &terms[rows..], rows, order, input.error)
+        {
+            series.order = order;
+            return true;
+        }
+    }
+    false
 }
 
 /// Least order from which on what a modulated drive adds to the orders left out, times their order, is within `error`
@@ -315,74 +326,6 @@ fn order_of_drive(drive: DriveDerivatives, pulling: f64, error: f64) -> usize {
         term *= drive.angle / order as f64;
     }
     order
-}
-
-/// The recurrence from the last two orders to the next.
-struct Recurrence<'a, S: Simd> {
-    simd: S,
-    /// h² times the coupling and minus the diagonal.
-    coupling: &'a [Row],
-    diagonal: &'a [Row],
-    /// The contact force at displacement zero, by mass, and h².
-    pull: &'a [Row],
-    square: S::Vector,
-    damping: S::Vector,
-    /// h² `K_d/m`, and the derivatives of the drive's displacement that are still to come.
-    pulling: f64,
-    drive: DriveDerivatives,
-}
-
-impl<S: Simd> Recurrence<'_, S> {
-    /// Adds pull and drive to Y_{p+2}; order after order.
-    #[inline(always)]
-    fn add_forces(&mut self, p: usize, next: &mut [Row]) {
-        if p == 0 {
-            for (row, pull) in next.iter_mut().zip(self.pull) {
-                self.simd
-                    .load(pull)
-                    .mul_add(self.square, self.simd.load(row))
-                    .store(row);
-            }
-        }
-        let push = self.pulling * self.drive.next_order();
-        if push != 0.0 {
-            self.simd
-                .load(&FIRST_BLOCK)
-                .mul_add(self.simd.splat(push), self.simd.load(&next[0]))
-                .store(&mut next[0]);
-        }
-    }
-}
-
-/// Adds orders to Y_0 and Y_1 until the series converges. Returns the last one, if it does.
-#[inline(always)]
-fn converge<S: Simd>(
-    mut recurrence: Recurrence<'_, S>,
-    input: &StepInput,
-    terms: &mut [Row],
-    rows: usize,
-) -> Option<usize> {
-    for p in 0..MAX_ORDER - 1 {
-        let terms = &mut terms[p * rows..(p + 3) * rows];
-        sweep(
-            recurrence.simd,
-            recurrence.coupling,
-            recurrence.diagonal,
-            recurrence.damping,
-            terms,
-            rows,
-        );
-        recurrence.add_forces(p, &mut terms[2 * rows..]);
-        // Two orders at a time: every second one may vanish by symmetry.
-        let order = p + 2;
-        if p % 2 == 1
-            && order >= input.min_order
-            && are_small(recurrence.simd, &terms[rows..], rows, order, input.error)
-        {
-            return Some(order);
-        }
-    }
-    None
 }
 
 /// Y_{p+2} without pull and drive: `terms` holds Y_p, Y_{p+1} and room for it.
@@ -434,8 +377,8 @@ fn are_small<S: Simd>(simd: S, terms: &[Row], rows: usize, order: usize, error: 
     }
     let [for_lower, for_higher] =
         [order - 1, order].map(|p| simd.splat(order as f64 * INVERSE_FACTORIAL[p]));
-    in_lower
+    let worst = in_lower
         .times(for_lower)
-        .larger(in_higher.times(for_higher))
-        .within(simd.splat(error))
+        .larger(in_higher.times(for_higher));
+    simd.splat(error).reaches(worst) == u8::MAX
 }
