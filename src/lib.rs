@@ -13,9 +13,8 @@
 //! `reduce` <- `figure`; `run`, `figure` <- `report`. `physics/` is a separate crate, on which other programs can
 //! depend: model, solvers and measurements, with the columns of their rows; it knows no file. `sets` describes the
 //! columns of a parameter set. `single_job` runs one job with all its records, `measured` reads slips of an experiment
-//! in place of jobs. `accuracy` compares the solvers, from
-//! the model to figures. `cli` is the command line, the only code that prints; `python/` makes a Python module of the
-//! library.
+//! in place of jobs. `accuracy` compares the solvers, from the model to figures. `cli` is the command line, the only
+//! code that prints; `python/` makes a Python module of the library.
 //!
 //! | word | meaning |
 //! |---|---|

@@ -11,7 +11,7 @@ use crate::model::theory::to_twelve_digits;
 use crate::model::{Symbol, Value};
 use crate::observe::{Measurements, Modulation, Slip, phase};
 use crate::solver::Summary;
-use crate::sweep::{Job, MAX_NAME, Measured, Sweep, nearest};
+use crate::sweep::{Job, MAX_NAME, Measured, Sweep, hint};
 use crate::table::arrow::texts;
 use crate::table::checksum::hexadecimal;
 use crate::table::shown::shown;
@@ -40,9 +40,6 @@ const KEYS: [(&str, &str); 10] = [
     ("maximum", "s"),
 ];
 const PARAMETERS: [Symbol; 4] = [Symbol::V0, Symbol::Kd, Symbol::Delta, Symbol::T];
-
-/// Most names in a message.
-const MAX_SHOWN: usize = 20;
 
 /// What is to be read.
 #[derive(Clone, Copy, Debug)]
@@ -168,21 +165,12 @@ fn parse_all<'a>(flag: &str, texts: &'a [String]) -> Result<Vec<Source<'a>>> {
 fn parse(text: &str) -> Result<Source<'_>> {
     let (key, from) = text.split_once('=').unwrap_or((text, ""));
     let known = KEYS.into_iter().find(|(known, _)| *known == key);
-    let (key, si) = known.with_context(|| guess(key, &KEYS.map(|(key, _)| key)))?;
+    let (key, si) = known.with_context(|| hint(key, &KEYS.map(|(key, _)| key)))?;
     let (from, unit) = from.rsplit_once(':').unwrap_or((from, si));
     ensure!(!from.is_empty(), "must be {key}=NAME or {key}=NAME:UNIT");
     let factor = factor(unit, si);
     let factor = factor.with_context(|| format!("{unit}: must be {si}, or with prefixes"))?;
     Ok((key, from, factor))
-}
-
-/// What is meant by an unknown word: the nearest of those known, or all.
-fn guess(word: &str, known: &[&str]) -> String {
-    let first = &known[..known.len().min(MAX_SHOWN)];
-    nearest(word, known).map_or_else(
-        || format!("there are {}", first.join(", ")),
-        |near| format!("did you mean {near}?"),
-    )
 }
 
 /// The factor from a unit to that of SI.
@@ -302,8 +290,8 @@ impl Table<'_> {
             places.extend(place.map(|place| (key, place, factor)));
             if place.is_none() && (asked.is_some() || key == "onset") {
                 let known: Vec<&str> = names.iter().map(String::as_str).collect();
-                let guess = guess(name, &known);
-                bail!("has no column {name}; {guess}, in --column {key}=NAME:UNIT");
+                let hint = hint(name, &known);
+                bail!("has no column {name}; {hint}, in --column {key}=NAME:UNIT");
             }
         }
         Ok(places)

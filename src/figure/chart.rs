@@ -247,11 +247,8 @@ impl<'a> Chart<'a> {
                 all.push(Layer::Hollow(place, other, self.ink(dots, set)));
                 continue;
             }
-            let dot = Dot {
-                opacity: 0.9,
-                ..Dot::solid(self.ink(dots, set), dots.radius)
-            };
-            all.push(Layer::Dots(place.clone(), dot));
+            let dot = Dot::solid(self.ink(dots, set), dots.radius);
+            all.push(Layer::Dots(place.clone(), dot.with_opacity(0.9)));
             if self.slides(set) {
                 all.push(Layer::Dots(place, Dot::solid(WHITE, dots.radius - HOLE)));
             }

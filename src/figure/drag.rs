@@ -89,12 +89,8 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let line = |n: f64| [low, high].map(|at| (at, n * factor * period_at(at)));
     // Slip by slip, so that neither stage covers the other.
     let dots = slips.iter().map(|slip| {
-        let dot = Dot {
-            ink: STAGES[slip.stage].2,
-            radius: 2.0,
-            opacity: 0.45,
-        };
-        Layer::Dots(vec![(slip.x, slip.tau)], dot)
+        let dot = Dot::solid(STAGES[slip.stage].2, 2.0);
+        Layer::Dots(vec![(slip.x, slip.tau)], dot.with_opacity(0.45))
     });
     // Where lines leave the frame: at its right, or through its top.
     let end = |n: f64| {

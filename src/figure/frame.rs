@@ -10,6 +10,12 @@ use super::style::{
 
 /// A point of data.
 pub(super) type Place = (f64, f64);
+
+/// The outline of a rectangle between two corners.
+pub(super) fn outline((left, top): Place, (right, bottom): Place) -> Vec<Place> {
+    let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+    [&corners[..], &corners[..1]].concat()
+}
 /// Lower and upper end.
 pub(super) type Ends = (f64, f64);
 /// A rectangle of data: its ends along x and along y.
@@ -104,13 +110,8 @@ impl Layout {
         };
         let rows = natural_heights.len() as f64;
         let above_notes = top + rows * self.heading + (rows - 1.0) * self.row_gap + UNDER;
-        let around = above_notes
-            + notes.len() as f64 * NOTE_ROW
-            + if notes.is_empty() {
-                0.0
-            } else {
-                0.5 * NOTE_ROW
-            };
+        let below_last = if notes.is_empty() { 0.0 } else { 0.5 };
+        let around = above_notes + (notes.len() as f64 + below_last) * NOTE_ROW;
         let natural: f64 = natural_heights.clone().sum();
         let scale = match asked {
             Some((_, height)) => (height - around) / natural,
@@ -263,14 +264,8 @@ impl Frame {
             sheet.line(vec![(self.left, y), (self.left + length, y)], AXIS);
             sheet.line(vec![(right, y), (right - length, y)], AXIS);
         }
-        let corners = [
-            (self.left, self.top),
-            (right, self.top),
-            (right, bottom),
-            (self.left, bottom),
-        ];
-        for corner in 0..4 {
-            sheet.line(vec![corners[corner], corners[(corner + 1) % 4]], AXIS);
+        for side in outline((self.left, self.top), (right, bottom)).windows(2) {
+            sheet.line(side.to_vec(), AXIS);
         }
         self.numbers(sheet);
         self.labels(sheet);

@@ -2,7 +2,7 @@
 //! colour bar beside the frame.
 
 use super::axis::Axis;
-use super::frame::{Frame, OVERLAP, fitting};
+use super::frame::{Frame, OVERLAP, fitting, outline};
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Anchor, Picture};
 use super::style::{AXIS, BLACK, Dot, INKS, Ink, LEGEND_TEXT, NOTE_TEXT, SCALE, TICK_TEXT, shade};
@@ -128,16 +128,7 @@ impl ColourBar {
             sheet.rectangles(boxes);
         });
         let right = left + BAR_WIDTH;
-        sheet.line(
-            vec![
-                (left, top),
-                (right, top),
-                (right, bottom),
-                (left, bottom),
-                (left, top),
-            ],
-            AXIS,
-        );
+        sheet.line(outline((left, top), (right, bottom)), AXIS);
         let mut free = f64::INFINITY;
         for (place, number) in &self.ticks {
             let y = bottom - place * frame.height;

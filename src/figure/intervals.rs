@@ -15,18 +15,13 @@ use crate::sets::{Digits, label};
 pub(super) const NAME: &str = "tau-T";
 
 const RADIUS: f64 = 1.8;
-const OTHER: Dot = Dot {
-    ink: LIGHT_GREY,
-    radius: RADIUS,
-    opacity: 0.6,
-};
+const OTHER: Dot = Dot::solid(LIGHT_GREY, RADIUS).with_opacity(0.6);
 /// Whole numbers whose lines can be distinguished.
 const LINES: u32 = 12;
 
 /// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
 /// τ = nT; `None` without intervals at two periods or more. Slips of sets with a phase have the colour of their V0, or
 /// of their Δ at a common V0.
-/// Means of other directories are hollow marks.
 pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
         let period = point.period?;
@@ -100,12 +95,8 @@ pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Opti
         let places = unphased.iter().map(|slip| slip.1);
         layers.push(Layer::Dots(places.collect(), OTHER));
         layers.extend(phased.iter().map(|&&(point, place)| {
-            let dot = Dot {
-                ink: hues.ink(value(point)),
-                radius: RADIUS,
-                opacity: 0.8,
-            };
-            Layer::Dots(vec![place], dot)
+            let dot = Dot::solid(hues.ink(value(point)), RADIUS);
+            Layer::Dots(vec![place], dot.with_opacity(0.8))
         }));
         layers.extend(panel::hollow_marks(&means));
         Panel {

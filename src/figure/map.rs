@@ -219,22 +219,17 @@ struct Map {
 impl Map {
     /// `None` for fewer values of either quantity than `min_values`, or if less than half of their grid is filled.
     fn of(x: &Quantity<'_>, y: &Quantity<'_>, min_values: usize) -> Option<Self> {
-        let [columns, rows] = [x, y].map(|asked| Grid::of(asked.distinct().collect()));
-        let position = |set| {
-            Some((
-                columns.index_of(x.number(set)?),
-                rows.index_of(y.number(set)?),
-            ))
-        };
-        let sets: Vec<(usize, Position)> = (0..x.column.numbers.len())
-            .filter_map(|set| Some((set, position(set)?)))
-            .collect();
-        let counts = [columns.count(), rows.count()];
+        let places = x.column.places().into_iter().zip(y.column.places());
+        let position =
+            |(set, (column, row)): (usize, (Option<_>, Option<_>))| Some((set, (column?, row?)));
+        let sets: Vec<(usize, Position)> = places.enumerate().filter_map(position).collect();
+        let counts = [x, y].map(|asked| asked.column.distinct.len());
         let is_grid = counts.iter().all(|count| *count >= min_values)
             && 2 * sets.len() >= counts[0] * counts[1];
-        is_grid.then_some(Self {
-            columns,
-            rows,
+        let grid = |asked: &Quantity<'_>| Grid::of(asked.distinct().collect());
+        is_grid.then(|| Self {
+            columns: grid(x),
+            rows: grid(y),
             sets,
         })
     }

@@ -323,14 +323,6 @@ fn write(
     Ok(files)
 }
 
-/// A parameter and its value, in symbols.
-fn setting(parameters: &Parameters, symbol: Symbol) -> String {
-    match parameters.get(symbol) {
-        Value::Real(real) => label(symbol.key()).setting(real, Digits::THREE),
-        value => format!("{} = {value}", symbol_of(symbol)),
-    }
-}
-
 /// What some parameters have in common, in symbols.
 pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
     let all: Vec<&Parameters> = all.collect();
@@ -349,15 +341,16 @@ pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
                 .iter()
                 .all(|parameters| parameters.get(*symbol) == value)
     };
-    let settings = Symbol::ALL
-        .into_iter()
-        .filter(is_shown)
-        .map(|symbol| setting(first, symbol));
-    // Lines are not broken within one.
-    settings
-        .map(|setting| setting.replace(' ', "\u{a0}"))
-        .collect::<Vec<_>>()
-        .join(", ")
+    let setting = |symbol: Symbol| {
+        let setting = match first.get(symbol) {
+            Value::Real(real) => label(symbol.key()).setting(real, Digits::THREE),
+            value => format!("{} = {value}", symbol_of(symbol)),
+        };
+        // Lines are not broken within one.
+        setting.replace(' ', "\u{a0}")
+    };
+    let shown = Symbol::ALL.into_iter().filter(is_shown);
+    shown.map(setting).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

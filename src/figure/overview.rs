@@ -19,7 +19,6 @@ const QUANTITIES: [&str; 5] = [
 
 /// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third
 /// panels. A single set is a dot over its velocity. `None` if nothing was found.
-/// Sets of other directories are hollow marks.
 pub(super) fn overview(own: &[SetRow], others: &[Other], look: &Look) -> Option<Picture> {
     let swept = swept(own);
     let (rows, others) = with_others(own.to_vec(), others);

@@ -231,17 +231,13 @@ impl Page {
     }
 
     fn write(mut self, width: f32, height: f32) -> Vec<u8> {
-        let mut last = 0;
-        let mut id = || {
-            last += 1;
-            Ref::new(last)
-        };
-        let catalog = id();
-        let pages = id();
-        let page = id();
-        let content = id();
-        let font = id();
-        let states: Vec<Ref> = self.opacities.iter().map(|_| id()).collect();
+        let mut next = Ref::new(1);
+        let catalog = next.bump();
+        let pages = next.bump();
+        let page = next.bump();
+        let content = next.bump();
+        let font = next.bump();
+        let states: Vec<Ref> = self.opacities.iter().map(|_| next.bump()).collect();
         let mut pdf = Pdf::new();
         pdf.catalog(catalog).pages(pages);
         pdf.pages(pages).kids([page]).count(1);
@@ -267,16 +263,16 @@ impl Page {
         let drawn = std::mem::replace(&mut self.content, Content::new());
         pdf.stream(content, &compressed(&drawn.finish()))
             .filter(Filter::FlateDecode);
-        self.write_font(&mut pdf, font, id);
+        self.write_font(&mut pdf, font, next);
         pdf.finish()
     }
 
     /// Writes the letters in use: their shapes, their widths, and the text that they stand for.
-    fn write_font(&self, pdf: &mut Pdf, font: Ref, mut id: impl FnMut() -> Ref) {
-        let descendant = id();
-        let descriptor = id();
-        let file = id();
-        let to_unicode = id();
+    fn write_font(&self, pdf: &mut Pdf, font: Ref, mut next: Ref) {
+        let descendant = next.bump();
+        let descriptor = next.bump();
+        let file = next.bump();
+        let to_unicode = next.bump();
         let mut whole = pdf.type0_font(font);
         whole
             .base_font(FONT_NAME)
@@ -306,12 +302,9 @@ impl Page {
             .italic_angle(0.0)
             .stem_v(80.0)
             .font_file2(file);
-        described.bbox(Rect::new(
-            ems(bounds.x_min),
-            ems(bounds.y_min),
-            ems(bounds.x_max),
-            ems(bounds.y_max),
-        ));
+        let sides = [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max];
+        let [left, bottom, right, top] = sides.map(ems);
+        described.bbox(Rect::new(left, bottom, right, top));
         described
             .ascent(ems(FACE.ascender()))
             .descent(ems(FACE.descender()));

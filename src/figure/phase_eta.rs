@@ -46,7 +46,6 @@ struct Column {
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
-/// Means of other directories are hollow marks.
 pub(super) fn phase_eta(
     points: &[Point],
     bins: &[BackboneBin],

@@ -28,8 +28,6 @@ pub struct Picture {
     pub(super) style: Style,
     note: String,
     pub(super) scene: Scene,
-    /// Frames that cut what is drawn in them.
-    clips: usize,
 }
 
 words! {
@@ -55,7 +53,7 @@ impl Format {
 }
 
 impl Picture {
-    /// Its name; its files have the same.
+    /// Its files have the same.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -66,7 +64,6 @@ impl Picture {
         self.note.replace('\u{a0}', " ")
     }
 
-    /// Width and height in mm.
     pub fn size(&self) -> Size {
         let [width, height] =
             [self.scene.width, self.scene.height].map(|side| self.style.millimetres(side));
@@ -128,7 +125,6 @@ impl Picture {
             style: look.style,
             note: look.note.clone(),
             scene,
-            clips: 0,
         }
     }
 
@@ -275,8 +271,7 @@ impl Picture {
         [x, y, width, height]: [f64; 4],
         draw: impl FnOnce(&mut Self),
     ) {
-        let id = format!("frame-{}", self.clips);
-        self.clips += 1;
+        let id = format!("frame-{}", self.scene.defs.len());
         let inside = format!(r#"x="{x}" y="{y}" width="{width}" height="{height}""#);
         let clip = format!(r#"<clipPath id="{id}"><rect {inside}/></clipPath>"#);
         self.scene.defs.push(clip);

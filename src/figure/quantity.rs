@@ -257,10 +257,9 @@ impl Quantity<'_> {
         if self.column.distinct.is_empty() {
             return Err(self.refuse("no set has a value of it"));
         }
-        let known = values.numbers.iter().flatten();
-        let known = known.map(|value| self.factor * value);
         let word = |value: f64| values.setting(value / self.factor);
-        Ok(Hues::of(&self.column.label().short(self.unit), known, word))
+        let label = self.column.label().short(self.unit);
+        Ok(Hues::of(&label, self.distinct(), word))
     }
 }
 
@@ -307,7 +306,7 @@ pub(super) fn axis_of(column: &str, values: impl Iterator<Item = f64>) -> (Strin
     (label.axis(unit), factor)
 }
 
-/// Values of a swept quantity and how they are spaced.
+/// At least two values of a swept quantity, and how they are spaced.
 pub(super) struct Grid {
     /// Ascending.
     values: Vec<f64>,
@@ -337,18 +336,9 @@ impl Grid {
                 libm::log(self.values[index])
             }
         };
-        let last = self.values.len() - 1;
-        let alone = if last == 0 { 1.0 } else { 0.0 };
-        let below = if index > 0 {
-            at(index) - at(index - 1)
-        } else {
-            at(1.min(last)) - at(0) + alone
-        };
-        let above = if index < last {
-            at(index + 1) - at(index)
-        } else {
-            below
-        };
+        let step = |index: usize| at(index + 1) - at(index);
+        let below = step(index.saturating_sub(1));
+        let above = step(index.min(self.values.len() - 2));
         let low = at(index) - 0.5 * below;
         let high = at(index) + 0.5 * above;
         if self.is_linear {
@@ -356,17 +346,6 @@ impl Grid {
         } else {
             (libm::exp(low), libm::exp(high))
         }
-    }
-
-    pub(super) fn count(&self) -> usize {
-        self.values.len()
-    }
-
-    /// The index of a value of the grid.
-    pub(super) fn index_of(&self, value: f64) -> usize {
-        self.values
-            .partition_point(|&other| other < value)
-            .min(self.values.len() - 1)
     }
 }
 
@@ -476,7 +455,6 @@ pub(super) mod tests {
             for index in 0..values.len() {
                 let (low, high) = grid.cell(index);
                 assert!(low < values[index] && values[index] < high, "{values:?}");
-                assert_eq!(grid.index_of(values[index]), index);
                 if index > 0 {
                     assert!(
                         (grid.cell(index - 1).1 / low - 1.0).abs() < 1e-12,
@@ -485,9 +463,5 @@ pub(super) mod tests {
                 }
             }
         }
-        assert!(
-            Grid::of(vec![7.0]).axis("").ticks.len() < 9,
-            "a single value"
-        );
     }
 }

@@ -68,11 +68,10 @@ impl Style {
     }
 }
 
+/// In mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
-    /// Width in mm.
     pub width: f64,
-    /// Height in mm.
     pub height: f64,
 }
 
@@ -113,9 +112,7 @@ impl Look {
     }
 }
 
-/// Size of numbers at ticks.
 pub(super) const TICK_TEXT: u32 = 16;
-/// Size of the labels of axes.
 pub(super) const LABEL_TEXT: u32 = 18;
 /// Size of legends, and of labels in frames.
 pub(super) const LEGEND_TEXT: u32 = 15;
@@ -201,6 +198,10 @@ impl Dot {
             opacity: 1.0,
         }
     }
+
+    pub(super) const fn with_opacity(self, opacity: f64) -> Self {
+        Self { opacity, ..self }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -233,12 +234,7 @@ pub static SCALE: LazyLock<[Ink; 10]> =
     LazyLock::new(|| std::array::from_fn(|step| ink(mixed(&HUES, step as f64 / 9.0))));
 
 /// Of viridis (matplotlib), from its end, without the yellow that is not seen on white.
-const HUES: [[f64; 3]; 4] = [
-    [160.0, 218.0, 57.0],
-    [31.0, 161.0, 135.0],
-    [54.0, 92.0, 141.0],
-    [68.0, 1.0, 84.0],
-];
+const HUES: [u32; 4] = [0xa0_da_39, 0x1f_a1_87, 0x36_5c_8d, 0x44_01_54];
 
 /// Border and ticks of a frame.
 pub(super) const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
@@ -272,23 +268,12 @@ pub(super) const fn drive_alone(ink: Ink) -> Stroke {
 }
 
 /// From pale, where nothing happens, to dark, in even steps of lightness: also for the colour-blind and in grey.
-const SHADES: [[f64; 3]; 8] = [
-    [250.0, 249.0, 244.0],
-    [220.0, 233.0, 221.0],
-    [176.0, 214.0, 207.0],
-    [125.0, 190.0, 195.0],
-    [78.0, 161.0, 183.0],
-    [47.0, 128.0, 165.0],
-    [33.0, 94.0, 140.0],
-    [27.0, 58.0, 104.0],
+const SHADES: [u32; 8] = [
+    0xfa_f9_f4, 0xdc_e9_dd, 0xb0_d6_cf, 0x7d_be_c3, 0x4e_a1_b7, 0x2f_80_a5, 0x21_5e_8c, 0x1b_3a_68,
 ];
 
 /// From blue, below, by nearly white to red, above: also for the colour-blind (ends of RdBu, ColorBrewer).
-const DIVERGING: [[f64; 3]; 3] = [
-    [33.0, 102.0, 172.0],
-    [247.0, 247.0, 247.0],
-    [178.0, 24.0, 43.0],
-];
+const DIVERGING: [u32; 3] = [0x21_66_ac, 0xf7_f7_f7, 0xb2_18_2b];
 
 /// A share from 0 to 1 as a colour on a light ground, pale at 0.
 pub(super) fn shade(share: f64) -> Ink {
@@ -315,13 +300,12 @@ fn ink([red, green, blue]: [f64; 3]) -> Ink {
     Ink([part(red), part(green), part(blue)])
 }
 
-fn mixed(colours: &[[f64; 3]], share: f64) -> [f64; 3] {
+fn mixed(colours: &[u32], share: f64) -> [f64; 3] {
     let place = share.clamp(0.0, 1.0) * (colours.len() - 1) as f64;
     let index = floored(place).min(colours.len() - 2);
     let part = place - index as f64;
-    std::array::from_fn(|channel| {
-        (1.0 - part) * colours[index][channel] + part * colours[index + 1][channel]
-    })
+    let [from, to] = [index, index + 1].map(|index| Ink::new(colours[index]).0.map(f64::from));
+    std::array::from_fn(|channel| (1.0 - part) * from[channel] + part * to[channel])
 }
 
 #[cfg(test)]

@@ -17,9 +17,7 @@
 //! "key"` is for a field whose name differs from that of its column. After the meaning may stand the symbol of a
 //! quantity in figures, and a few words for its axis. A field without unit and meaning holds the columns of another row
 //! type, or is a projection: it reads a column that another row type describes. Rows side by side are tuples. Nothing
-//! here knows Arrow, files or JSON. No existing derive fits: serde_arrow 0.15 has no place for units and meanings
-//! beside a field, typed-arrow 0.8 ends at Arrow 59 and would bind the physics to it, parquet_derive 60 writes no Arrow
-//! schema.
+//! here knows Arrow, files or JSON, and no derive of theirs has a place for units and meanings.
 
 pub use super::value::{Field, Kind, Value};
 use std::borrow::Cow;

@@ -10,8 +10,6 @@
 //! ```
 //!
 //! Imports run one way: `value` <- `columns` <- `model` <- `solver` <- `observe`.
-//!
-//! A separate crate: other programs can depend on it alone, and it compiles beside what tables and figures need.
 
 pub mod columns;
 pub mod model;

@@ -115,13 +115,8 @@ fn bin_of(eta: f64) -> i32 {
     )]
     let bin = (libm::log10(eta) * f64::from(BINS_PER_DECADE)).floor() as i32;
     // The logarithm rounds; the edges decide.
-    if eta < edge(bin) {
-        bin - 1
-    } else if eta >= edge(bin + 1) {
-        bin + 1
-    } else {
-        bin
-    }
+    let mut near = bin - 1..=bin + 1;
+    near.rfind(|bin| edge(*bin) <= eta).unwrap_or(bin)
 }
 
 impl Backbone {

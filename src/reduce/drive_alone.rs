@@ -80,7 +80,6 @@ impl Controls {
     }
 }
 
-/// What the drive alone explains of a set.
 #[derive(Debug, Default)]
 pub(super) struct Explained {
     is_control: bool,
@@ -297,7 +296,9 @@ mod tests {
             seeds: seeds.to_vec(),
             phases: vectors(),
             locking: vectors(),
-            ..FinishedSet::default()
+            intervals: Vec::new(),
+            tongue: None,
+            cycles: None,
         };
         explained.add_to(&mut set);
         set.row

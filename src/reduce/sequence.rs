@@ -93,12 +93,6 @@ pub(super) struct Centred<const D: usize> {
     pub(super) mean: Estimate<D>,
 }
 
-impl<const D: usize> Default for Centred<D> {
-    fn default() -> Self {
-        Sequences::default().centred()
-    }
-}
-
 fn sum<'a, const D: usize>(values: impl IntoIterator<Item = &'a [f64; D]>) -> [f64; D] {
     values.into_iter().fold([0.0; D], |mut sum, value| {
         add(&mut sum, value);
@@ -138,12 +132,6 @@ pub(super) struct Estimate<const D: usize> {
     freedom: f64,
     /// What a rare event adds to the sum, if rare events make its variance: the third moment over the second.
     pub(super) rare: [f64; D],
-}
-
-impl<const D: usize> Default for Estimate<D> {
-    fn default() -> Self {
-        Sequences::default().estimate()
-    }
 }
 
 impl Estimate<1> {

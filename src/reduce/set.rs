@@ -229,7 +229,7 @@ impl<'a> Intervals<'a> {
     /// The mean of a value over them; unknown if a job gave up.
     fn estimate(&self, value: impl Fn(f64) -> [f64; 1]) -> Estimate<1> {
         if !self.running.is_empty() {
-            return Estimate::default();
+            return Sequences::default().estimate();
         }
         sequences(self.jobs, |slip| non_nan((self.length)(slip)).map(&value)).estimate()
     }
@@ -281,8 +281,7 @@ impl<'a> Intervals<'a> {
     }
 }
 
-/// A set with its statistics.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct FinishedSet {
     pub(super) row: SetRow,
     /// Its intervals in s, sorted.

@@ -6,7 +6,7 @@
 use super::dimension::unit_of_formula;
 use crate::model::Symbol;
 use crate::sets::{Digits, FREQUENCY, Label, SetRow, label};
-use crate::sweep::{Expression, MAX_NAMES, nearest, synonym};
+use crate::sweep::{Expression, nearest, synonym};
 use crate::table::columns::{Column, Kind, Row, Value};
 use crate::table::value::{Shortest, floored};
 use std::borrow::Cow;
@@ -115,12 +115,8 @@ impl Values {
     ) -> Self {
         let column = Column {
             name: name.to_owned().into(),
-            unit: "",
-            meaning: "",
-            symbol: "",
-            words: "",
             kind,
-            nullable: true,
+            ..Column::default()
         };
         let (numbers, intervals) = found.unzip();
         Self::new(column, numbers, intervals, Vec::new())
@@ -192,7 +188,7 @@ impl Condition {
     /// Reads one on these columns.
     pub fn read(text: &str, columns: &[Column]) -> Result<Self, String> {
         let expression = Expression::condition(text, &|name| number_column(name, columns));
-        expression.map(Self).map_err(|error| error.to_string())
+        expression.map(Self)
     }
 
     pub fn holds(&self, row: &impl Row) -> bool {
@@ -225,8 +221,7 @@ pub(super) fn formula(text: &str, columns: &[Column]) -> Result<Expression<usize
     if is_name && place(text, columns).is_none() {
         return Err(unknown(text, columns));
     }
-    let formula = Expression::formula(text, &|name| number_column(name, columns));
-    formula.map_err(|error| error.to_string())
+    Expression::formula(text, &|name| number_column(name, columns))
 }
 
 /// The value of an expression for a row; NaN stands for a missing value.
@@ -254,6 +249,7 @@ fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
 }
 
 fn unknown(name: &str, columns: &[Column]) -> String {
+    const MAX_NAMES: usize = 8;
     let names: Vec<&str> = columns.iter().map(|column| &*column.name).collect();
     let is_longer = |known: &str| {
         let is_part = known.starts_with(name) || known.ends_with(&format!("_{name}"));
@@ -464,7 +460,7 @@ mod tests {
                 .contains("did you mean resultant_length, resultant_drive, resultant_excess?")
         );
         assert!(error("tau").contains("did you mean tau_mean?"));
-        assert_eq!(error("tau_").matches("tau_").count(), MAX_NAMES);
+        assert_eq!(error("tau_").matches("tau_").count(), 8);
         assert!(
             error("colour").contains("plot --list` shows all"),
             "{}",

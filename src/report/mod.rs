@@ -14,14 +14,14 @@ mod page_columns;
 use self::page_columns::{Census, Sets, Slips, backbone};
 use crate::figure::{INKS, SCALE, STANDING};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::model::{MODEL_VERSION, RNG_SCHEME, Symbol};
+use crate::model::{MODEL_VERSION, RNG_SCHEME, Selection as _, Symbol};
 use crate::reduce::{WRITER, advise, renew};
 use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::log::now;
 use crate::run::{RunEvent, status};
-use crate::sets::FOUND;
+use crate::sets::{AllButSeed, FOUND};
 use crate::sweep::{PLAN_VERSION, Rounds, SYNONYMS, Sweep};
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
@@ -81,10 +81,7 @@ fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<Json> {
     let slips =
         Slips::read(results, &sets.places, census.slips.div_ceil(sets_every)).map_err(&damaged)?;
     let written = now();
-    let parameters = Symbol::ALL
-        .into_iter()
-        .filter(|&symbol| symbol != Symbol::Seed)
-        .map(Symbol::key);
+    let parameters = AllButSeed::SYMBOLS.iter().copied().map(Symbol::key);
     Ok(json!({
         "program": PROGRAM,
         "model_version": MODEL_VERSION,
@@ -210,17 +207,10 @@ fn html(content: &Json) -> Result<String> {
         digest(&script),
         digest(STYLE)
     );
-    let parts = [
-        ("policy", policy.as_str()),
-        ("style", STYLE),
-        ("script", &script),
-        ("data", &data),
-    ];
-    Ok(parts
-        .into_iter()
-        .fold(PAGE.to_owned(), |page, (name, text)| {
-            page.replacen(&format!("{{{{{name}}}}}"), text, 1)
-        }))
+    let page = PAGE.replacen("{{policy}}", &policy, 1);
+    let page = page.replacen("{{style}}", STYLE, 1);
+    let page = page.replacen("{{script}}", &script, 1);
+    Ok(page.replacen("{{data}}", &data, 1))
 }
 
 /// The content, compressed, in characters that mean nothing in HTML.

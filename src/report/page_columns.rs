@@ -8,7 +8,7 @@ use crate::results::{Results, ResultsError};
 use crate::sets::{Label, label};
 use crate::sweep::Sweep;
 use crate::table::Table;
-use crate::table::columns::{Column, Row, Value, columns};
+use crate::table::columns::{Column, Row, Value};
 use crate::table::file::Dataset;
 use crate::table::value::floored;
 use serde::Serialize;
@@ -20,7 +20,7 @@ const MAX_SETS: u64 = 5_000;
 /// Decimals of a mantissa: five digits are more than any interval of confidence leaves.
 const DECIMALS: usize = 4;
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct Columns {
     #[serde(rename = "columns")]
     described: Vec<Json>,
@@ -33,25 +33,33 @@ pub(super) struct Columns {
 impl Columns {
     /// The columns of a row type with these names.
     fn of<R: Row>(is_shown: impl Fn(&str) -> bool) -> Self {
-        let mut columns = Self {
-            described: Vec::new(),
-            values: Vec::new(),
-            all: Vec::new(),
+        let all: Vec<(Column, bool)> = R::columns()
+            .into_iter()
+            .map(|column| {
+                let is_shown = is_shown(&column.name);
+                (column, is_shown)
+            })
+            .collect();
+        let described = |(column, _): &(Column, bool)| {
+            let Column {
+                name,
+                unit,
+                meaning,
+                ..
+            } = column;
+            let kind = column.kind.word();
+            json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind })
         };
-        for column in R::columns() {
-            let is_shown = is_shown(&column.name);
-            if is_shown {
-                let Column { name, unit, .. } = &column;
-                let meaning = column.meaning;
-                let kind = column.kind.word();
-                columns
-                    .described
-                    .push(json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind }));
-                columns.values.push(Vec::new());
-            }
-            columns.all.push((column, is_shown));
+        let described: Vec<Json> = all
+            .iter()
+            .filter(|column| column.1)
+            .map(described)
+            .collect();
+        Self {
+            values: vec![Vec::new(); described.len()],
+            described,
+            all,
         }
-        columns
     }
 
     /// Gives each column its label in the unit in which its values are read best, and the factor to that; no unit to one
@@ -83,15 +91,10 @@ impl Columns {
     }
 }
 
-/// With all digits, so that a condition holds for the same sets as on the command line. What is not finite becomes null.
-fn exact(cell: Value<'_>) -> Json {
-    json!(cell)
-}
-
 fn rounded(cell: Value<'_>) -> Json {
     match cell {
         Value::Real(real) => json!(format!("{real:.DECIMALS$e}").parse().unwrap_or(real)),
-        other => exact(other),
+        other => json!(other),
     }
 }
 
@@ -107,16 +110,6 @@ pub(super) struct Census {
     tau_off: Option<f64>,
 }
 
-columns! {
-    struct Counted {
-        regime: Option<Regime>;
-        slips: u64;
-        jobs_cut: Option<u64>;
-        tau_off as "tau_mean_off": Option<f64>;
-        is_control as "control": bool;
-    }
-}
-
 impl Census {
     pub(super) fn read(layout: &Layout<'_>) -> Result<Self, ResultsError> {
         let regimes = Regime::ALL.map(|regime| (regime.word(), 0)).into();
@@ -124,18 +117,15 @@ impl Census {
             regimes,
             ..Self::default()
         };
-        let file = layout.reduced_file(SetRow::NAME);
-        for set in Dataset::new(layout.storage, vec![file]).rows::<Counted>() {
+        for set in read_sets(layout) {
             let set = set?;
-            if !set.is_control {
-                census.sets += 1;
-                census.slips += set.slips;
-                census.jobs_cut += set.jobs_cut.unwrap_or(0);
-                let off = census.tau_off.into_iter().chain(set.tau_off);
-                census.tau_off = off.reduce(f64::min);
-                let regime = set.regime.map_or("", Regime::word);
-                *census.regimes.entry(regime).or_default() += 1;
-            }
+            census.sets += 1;
+            census.slips += set.slips;
+            census.jobs_cut += set.jobs_cut.unwrap_or(0);
+            let off = census.tau_off.into_iter().chain(set.tau_off);
+            census.tau_off = off.reduce(f64::min);
+            let regime = set.regime.map_or("", Regime::word);
+            *census.regimes.entry(regime).or_default() += 1;
         }
         Ok(census)
     }
@@ -147,7 +137,7 @@ impl Census {
 }
 
 /// The sets that are shown.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct Sets {
     #[serde(flatten)]
     columns: Columns,
@@ -173,11 +163,8 @@ impl Sets {
     ) -> Result<Self, ResultsError> {
         let mut sets = Self {
             columns: Columns::of::<SetRow>(|_| true),
-            commands: Vec::new(),
             command_end: sweep.command_end(),
-            histograms: Vec::new(),
-            swept: Vec::new(),
-            places: HashMap::new(),
+            ..Self::default()
         };
         let mut shown = Vec::new();
         for (row, number) in read_sets(layout).zip(0_u64..) {
@@ -187,7 +174,8 @@ impl Sets {
                 let is_computed = sweep.measured().is_none();
                 sets.commands.extend(is_computed.then(command));
                 sets.histograms.push(Vec::new());
-                sets.columns.push(&row, exact);
+                // With all digits, so that a condition holds for the same sets as on the command line.
+                sets.columns.push(&row, |cell| json!(cell));
                 sets.places.insert(row.set_id.clone(), shown.len());
                 shown.push(row);
             }
@@ -301,11 +289,9 @@ mod tests {
 
     #[test]
     fn a_rounded_number_has_five_digits_and_a_value_that_is_none_is_null() {
-        assert_eq!(exact(Value::Real(0.000_123_456_789)), 0.000_123_456_789);
         assert_eq!(rounded(Value::Real(0.000_123_456_789)), 0.000_123_46);
         assert_eq!(rounded(Value::Real(1e-300)), 1e-300);
         assert_eq!(rounded(Value::Real(f64::INFINITY)), Json::Null);
-        assert_eq!(exact(Value::Real(f64::NAN)), Json::Null);
     }
 
     #[test]

@@ -9,7 +9,7 @@
 
 use super::axes::Axis;
 use super::grid::Sweep;
-use super::quantity::{Point, Quantity};
+use super::quantity::{DERIVABLE, Point, Quantity};
 use super::rounds::{Goal, MAX_SETS, Rounds};
 use super::source::{Refused, Section, Source};
 use crate::model::theory::typical_interval;
@@ -277,10 +277,12 @@ fn without_controls(rounds: &Rounds, file: &Section<'_>) -> Result<(), Refused> 
 
 /// What is wrong with a canonical point, and the quantity to blame.
 fn invalid(point: &Point) -> Option<(Quantity, String)> {
-    if !point.period_is_derivable() {
-        let period = Shortest(point.number(Quantity::Parameter(Symbol::T)));
-        let problem =
-            format!("eta: gives T = {period} s; T, Delta and V0 must lie between 1e-100 and 1e100");
+    let period = point.parameters.modulation_period;
+    if let (Some((Quantity::Eta, _)), Some(period)) = (point.fixes_period, period)
+        && !DERIVABLE.contains(&period)
+    {
+        let period = Shortest(period);
+        let problem = format!("eta: gives T = {period} s, which must lie between 1e-100 and 1e100");
         return Some((Quantity::Eta, problem));
     }
     let error = point.parameters.check_rules().err()?;

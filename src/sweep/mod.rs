@@ -36,14 +36,14 @@ mod tests;
 mod variation;
 
 pub use cost::{LARGE, certain_memory, predicted_cost, predicted_memory};
-pub use expression::{Expression, ExpressionError};
+pub use expression::Expression;
 pub use grid::Sweep;
 pub use job::{Identity, Job};
 pub use measured::Measured;
 pub use plan::{
     Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, PartName, Plan, Totals,
 };
-pub use quantity::{MAX_NAMES, SYNONYMS, hint, nearest, synonym};
+pub use quantity::{SYNONYMS, hint, nearest, synonym};
 pub use read::MAX_NAME;
 pub use rounds::{
     Bounds, Goal, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,

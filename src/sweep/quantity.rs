@@ -141,19 +141,6 @@ impl Point {
         self
     }
 
-    /// Whether every quantity behind a derived period, and the period, is far from the ends of the doubles.
-    pub fn period_is_derivable(&self) -> bool {
-        let parameters = &self.parameters;
-        match (self.fixes_period, parameters.modulation_period) {
-            (Some((Quantity::Eta, _)), Some(period)) => {
-                DERIVABLE.contains(&period)
-                    && DERIVABLE.contains(&parameters.modulation_amplitude)
-                    && DERIVABLE.contains(&parameters.drive_velocity)
-            }
-            _ => true,
-        }
-    }
-
     /// A quantity of a canonical point as a number; NaN for a word. Without modulation η and the frequency are 0 and T
     /// is infinite. What an axis has set is returned unchanged.
     pub fn number(&self, quantity: Quantity) -> f64 {
@@ -188,24 +175,12 @@ pub const SYNONYMS: &[(&str, &str)] = &[
     ("stress drop", "drop_mean"),
 ];
 
-/// Most names in a message.
-pub const MAX_NAMES: usize = 8;
-
-/// The hint for an unknown word: the known one that was probably meant, or the nearest ones; of a word without letters,
-/// which is no guess, all.
+/// The hint for an unknown word: the known one that was probably meant, else all.
 pub fn hint(word: &str, known: &[&str]) -> String {
-    if let Some(candidate) = nearest(word, known) {
-        return format!("did you mean {candidate}?");
-    }
-    let is_guess = word.contains(char::is_alphabetic);
-    if known.len() <= MAX_NAMES || !is_guess {
-        return format!("allowed are {}", known.join(", "));
-    }
-    let mut sorted = known.to_vec();
-    sorted.sort_by_key(|candidate| distance(word, candidate));
-    let more = known.len() - MAX_NAMES;
-    let names = sorted[..MAX_NAMES].join(", ");
-    format!("allowed are {names} and {more} more (docs/sweeps.md)")
+    nearest(word, known).map_or_else(
+        || format!("allowed are {}", known.join(", ")),
+        |meant| format!("did you mean {meant}?"),
+    )
 }
 
 fn distance(word: &str, candidate: &str) -> usize {

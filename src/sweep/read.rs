@@ -222,7 +222,7 @@ fn read_conditions(
     all(entries.iter().map(|entry| {
         let text = entry.word().ok_or_else(|| entry.must_be(form))?;
         let condition = Expression::condition(text, &quantity);
-        condition.map_err(|error| entry.refuse(error.to_string()))
+        condition.map_err(|error| entry.refuse(error))
     }))
 }
 

@@ -1,7 +1,7 @@
 //! The `[axes]` of a sweep file: lists, ranges, counts, zips and samples become axes. `docs/sweeps.md` has their forms.
 //! An axis reports its first mistake, a zip or a sample that of each column.
 
-use super::axes::{Axis, Column, MAX_ROWS, MAX_SAMPLE, Range, Repeated, sobol};
+use super::axes::{Axis, Column, MAX_ROWS, MAX_SAMPLE, Range, Repeated};
 use super::checks::Places;
 use super::quantity::Quantity;
 use super::source::{Entry, Refused, Section, all};
@@ -9,7 +9,7 @@ use crate::model::Value;
 
 const RANGE_FORMS: &str =
     "{ linear = [low, high], points = n } or { log = [low, high], points = n }";
-const AXIS_FORMS: &str = "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
+const AXIS_FORMS: &str = "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }; a single value belongs in [model]";
 const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in a sample";
 
 type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
@@ -102,14 +102,8 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<Value>, Refu
 
 /// Reads a range of an axis, and the number of its values.
 pub(super) fn read_spaced(entry: &Entry<'_>, quantity: Quantity) -> Result<(Range, u64), Refused> {
-    let Some(table) = entry.section("an axis") else {
-        let setting = if matches!(quantity, Quantity::Parameter(_)) {
-            "; a single value belongs in [model]"
-        } else {
-            ""
-        };
-        return Err(entry.must_be(&format!("{AXIS_FORMS}{setting}")));
-    };
+    let table = entry.section("an axis");
+    let table = table.ok_or_else(|| entry.must_be(AXIS_FORMS))?;
     let range = read_range(&table, quantity)?.ok_or_else(|| entry.must_be(AXIS_FORMS))?;
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.
@@ -182,9 +176,6 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
     let [low, high] = ends.as_slice() else {
         return Err(entry.must_be("two numbers [low, high]"));
     };
-    if quantity == Quantity::BREAK_ON {
-        return Err(entry.refuse("break_on is a word and has no range; list its values"));
-    }
     let end = |entry: &Entry<'_>| {
         let allowed = quantity.allowed();
         let problem = format!("must be {allowed} ({} of {})", entry.key, quantity.key());
@@ -276,8 +267,8 @@ fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Ref
     let points = number(points?);
     let seed = number(seed?);
     let columns = (0..).zip(ranges).map(|(dimension, (quantity, range))| {
-        let coordinates = sobol(dimension, points, seed);
-        let values = coordinates.map(|x| ranged(quantity, range.at(x)));
+        let coordinates = (0..points).map(|point| sobol_burley::sample(point, dimension, seed));
+        let values = coordinates.map(|x| ranged(quantity, range.at(f64::from(x))));
         Column {
             quantity,
             values: values.collect(),

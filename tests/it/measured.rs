@@ -364,7 +364,7 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
         (
             good.clone(),
             "--set N=9",
-            "there are onset, drop, peak_force, run, V0, Kd",
+            "allowed are onset, drop, peak_force, run, V0, Kd",
         ),
         (String::new(), "", "has no column onset"),
         ("onset,drop\n".to_owned(), "", "has no slips"),

@@ -62,7 +62,6 @@ struct Draw {
 }
 
 impl Disorder {
-    /// The disorder of a set of parameters.
     pub fn new(parameters: &Parameters) -> Self {
         let contacts = parameters.blocks * parameters.contacts_per_block;
         Self {

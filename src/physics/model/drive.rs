@@ -243,7 +243,6 @@ impl Drive {
         }
     }
 
-    /// Whether the modulation is on.
     pub fn is_modulated(&self) -> bool {
         self.amplitude > 0.0
     }

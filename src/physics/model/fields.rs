@@ -181,7 +181,6 @@ macro_rules! fields {
                 self.word()
             }
 
-            /// The field with this key.
             pub fn from_key(key: &str) -> Option<Self> {
                 Self::from_word(key)
             }
@@ -203,7 +202,6 @@ macro_rules! fields {
         }
 
         impl $Struct {
-            /// The value of a field.
             pub fn get(&self, field: $Key) -> $crate::model::Value {
                 $(if self.$unknown.contains(&field) {
                     return $crate::value::Value::Null;

@@ -267,7 +267,6 @@ pub struct Selected<S> {
 }
 
 impl<S> Selected<S> {
-    /// The columns of these parameters.
     pub const fn new(parameters: Parameters) -> Self {
         Self {
             parameters,

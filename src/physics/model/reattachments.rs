@@ -67,7 +67,6 @@ pub(super) struct Reattachments {
 }
 
 impl Reattachments {
-    /// None yet.
     pub fn new(parameters: &Parameters) -> Self {
         let contacts = parameters.blocks * parameters.contacts_per_block;
         Self {
@@ -183,7 +182,6 @@ impl Reattachments {
         }
     }
 
-    /// Number of the bin of a time.
     fn bin(&self, due: Due) -> u64 {
         floored(due.time() * self.bins_per_second) as u64
     }
@@ -238,7 +236,6 @@ impl Reattachments {
     }
 }
 
-/// Place of a bin in the calendar.
 #[expect(clippy::cast_possible_truncation, reason = "under the number of bins")]
 fn place_of(bin: u64) -> usize {
     (bin % BINS as u64) as usize

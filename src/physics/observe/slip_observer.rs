@@ -42,7 +42,6 @@ struct Span {
     settled: Option<Instant>,
 }
 
-/// An observer that finds slips and precursors.
 #[derive(Clone, Debug)]
 pub struct SlipObserver {
     parameters: Parameters,

@@ -90,11 +90,7 @@ fn unknown_and_missing_keys_are_refused_with_the_nearest_known() {
         (
             "name = \"a\"\n[model]\nhumidity = 3",
             3,
-            &[
-                "humidity = 3",
-                "allowed are ",
-                "and 16 more (docs/sweeps.md)",
-            ],
+            &["humidity = 3", "allowed are ", "N, Ns, M, K, "],
         ),
         (
             "name = \"a\"\n[model]\netta = 3",
@@ -628,7 +624,7 @@ fn ten_errors_are_shown_and_the_others_counted() {
     );
     assert!(lines[10].starts_with("  bad.toml:12: x9 = 1: "), "{shown}");
     assert_eq!(lines[11], "  and 2 more");
-    assert!(bad(10).ends_with("3 more (docs/sweeps.md)"), "{}", bad(10));
+    assert!(bad(10).contains("allowed are "), "{}", bad(10));
     assert!(!bad(1).contains('\n'), "{}", bad(1));
 }
 

@@ -65,7 +65,6 @@ pub const GRID_TOLERANCE: f64 = 1e-7;
 const WORTHWHILE_LEAP: f64 = 6.0;
 const WORTHWHILE_GRID_LEAP: f64 = 80.0;
 
-/// Checks a tolerance.
 pub(super) fn check(tolerance: f64) -> Result<(), SimulationError> {
     match SolverKey::Tolerance.checked(tolerance.value()) {
         Some(_) => Ok(()),

@@ -64,7 +64,6 @@ impl GridDrive {
         -self.angle * self.angle * self.swing[0]
     }
 
-    /// Moves on by a step.
     #[inline(always)]
     pub fn advance(&mut self) {
         self.ramp[0] += self.ramp[1];

@@ -108,7 +108,6 @@ impl Chain {
         self.lower[row][lane] = interface.block_lower[block];
     }
 
-    /// The entry of a block.
     #[inline]
     pub fn at(&self, rows: &[Row], block: usize) -> f64 {
         let (row, lane) = self.layout.slot(block);

@@ -92,7 +92,6 @@ pub struct GridStep {
     pub trail: [f64; MAX_RUN],
     /// Row and lane of every block that reached a break position in the last step.
     pub reached: Vec<(usize, usize)>,
-    /// Where each block lies.
     pub(super) places: Vec<Place>,
     saved_displacement: Vec<Row>,
     saved_increment: Vec<Row>,

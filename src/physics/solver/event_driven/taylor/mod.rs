@@ -61,7 +61,6 @@ impl StepControl {
         }
     }
 
-    /// Notes the order at which a series converged.
     fn note_order(&mut self, halvings: usize, order: usize) {
         if let Some(min_order) = self.min_orders.get_mut(halvings) {
             // Reached at the first check: check earlier next time.

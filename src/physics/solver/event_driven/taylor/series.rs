@@ -62,7 +62,6 @@ pub struct Series {
     /// h² times the coupling and minus the diagonal.
     pub coupling: Vec<Row>,
     pub diagonal: Vec<Row>,
-    /// Order of the last step.
     pub order: usize,
 }
 
