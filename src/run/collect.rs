@@ -113,7 +113,6 @@ impl Out {
 pub(super) struct OpenPart {
     of: Arc<Taken>,
     outcomes: Outcomes,
-    failed_before: u64,
     predicted_cost: f64,
     measured: JobTime,
 }
@@ -390,12 +389,10 @@ impl Collector<'_, '_> {
         let open = self.open.entry(key).or_insert_with(|| OpenPart {
             of: Arc::clone(&of.of),
             outcomes: Outcomes::new(),
-            failed_before: 0,
             predicted_cost: 0.0,
             measured: JobTime::default(),
         });
         open.outcomes.insert(of.position, outcome);
-        open.failed_before += u64::from(of.failed_before);
         open.predicted_cost += predicted_cost;
         open.measured.cpu += time.cpu;
         open.measured.wall += time.wall;
@@ -436,8 +433,7 @@ impl Collector<'_, '_> {
         report.parts_committed += 1;
         report.jobs_run += jobs as u64;
         report.jobs_left = report.jobs_left.saturating_sub(jobs as u64);
-        report.jobs_failed =
-            (report.jobs_failed + failed as u64).saturating_sub(whole.failed_before);
+        report.jobs_failed += failed as u64;
         report.predicted_cost += whole.predicted_cost;
         report.measured_cost += whole.measured.cpu;
         Ok(self.events.send(&RunEvent::PartCommitted {

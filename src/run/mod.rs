@@ -205,7 +205,6 @@ impl Joined<'_> {
                 cost_again += job.cost;
             }
         })?;
-        report.jobs_failed += jobs_again;
         report.jobs_left = overview.jobs_missing + jobs_again;
         if jobs_again > 0 {
             // What another worker reduces meanwhile, or has reduced, lacks these jobs.

@@ -14,7 +14,7 @@
 use crate::results::claims::{ClaimState, Claims};
 use crate::results::commit::own_number;
 use crate::results::layout::shorter_in_tests;
-use crate::results::pending::{Again, Pending};
+use crate::results::pending::Pending;
 use crate::results::workers::{Living, Member};
 use crate::results::{ResultsError, tables};
 use crate::run::Joined;
@@ -54,7 +54,6 @@ pub(super) struct Taken {
 pub(super) struct PartJob {
     pub of: Arc<Taken>,
     pub position: usize,
-    pub failed_before: bool,
     /// Memory that it is predicted to take, in bytes; infinite if it must run alone.
     pub memory: f64,
 }
@@ -275,7 +274,7 @@ impl<'a> Work<'a> {
         if !self.pending.done.contains(&outline.name) {
             let spilled = self.pending.spilled(outline)?;
             let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
-            let jobs = left.map(|position| (position, false)).collect();
+            let jobs = left.collect();
             return self.take(self.pending.part(outline), spilled, jobs, generation);
         }
         let again = self.pending.results.again(outline)?;
@@ -285,17 +284,16 @@ impl<'a> Work<'a> {
         let part = self.pending.part(outline);
         let runs = |position: usize, why| self.pending.runs_again(&part.jobs[position], why);
         let again = again.iter().filter(|(position, why)| runs(**position, why));
-        let again = again.map(|(&position, why)| (position, *why != Again::CutOff));
-        let jobs: Vec<_> = again.collect();
+        let jobs: Vec<usize> = again.map(|(position, _)| *position).collect();
         Ok(!jobs.is_empty() && self.take(part, BTreeSet::new(), jobs, generation)?)
     }
 
-    /// Claims a part, if there is time for it. `jobs` are those to be run, each with whether it has failed before.
+    /// Claims a part, if there is time for it. `jobs` are those to be run.
     fn take(
         &mut self,
         part: Part,
         spilled: BTreeSet<usize>,
-        jobs: Vec<(usize, bool)>,
+        jobs: Vec<usize>,
         generation: u64,
     ) -> Result<bool, ResultsError> {
         if !self.joined.walltime.admits_part() {
@@ -321,7 +319,7 @@ impl<'a> Work<'a> {
             begin: Instant::now(),
         });
         let recording = self.pending.results.sweep().recording();
-        for (position, failed_before) in jobs {
+        for position in jobs {
             let mut memory = predicted_memory(&taken.part.jobs[position].parameters, recording);
             if is_alone {
                 memory = f64::INFINITY;
@@ -329,7 +327,6 @@ impl<'a> Work<'a> {
             self.jobs.push_back(PartJob {
                 of: Arc::clone(&taken),
                 position,
-                failed_before,
                 memory,
             });
         }

@@ -176,6 +176,9 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
     let [low, high] = ends.as_slice() else {
         return Err(entry.must_be("two numbers [low, high]"));
     };
+    if quantity == Quantity::BREAK_ON {
+        return Err(entry.refuse("break_on is a word and has no range; list its values"));
+    }
     let end = |entry: &Entry<'_>| {
         let allowed = quantity.allowed();
         let problem = format!("must be {allowed} ({} of {})", entry.key, quantity.key());

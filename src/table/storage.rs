@@ -117,8 +117,13 @@ pub trait Storage: Sync {
     }
 
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
-        let metadata = self.open(file)?.metadata();
-        Ok(metadata.map_err(StorageError::at("read", file))?.len())
+        let failed = StorageError::at("read", file);
+        match self.open(file)?.metadata() {
+            Ok(metadata) if metadata.is_file() => Ok(metadata.len()),
+            // A folder has a length, too, which must not pass for that of the file.
+            Ok(_) => Err(failed(NoFile::Irregular.into())),
+            Err(error) => Err(failed(error)),
+        }
     }
 
     /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.
