@@ -8,7 +8,7 @@
 //! known-answer tests; changing it changes [`RNG_SCHEME`].
 
 use super::Parameters;
-use pulp::{Arch, bytemuck};
+use pulp::{Arch, Simd, WithSimd, bytemuck};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -103,10 +103,7 @@ impl Disorder {
         let mut words = [[0; 2]; DRAWS_PER_REFILL as usize];
         self.generator
             .fill_bytes(bytemuck::bytes_of_mut(&mut words));
-        self.buffered[contact] = self.features.dispatch(
-            #[inline(always)]
-            || self.side_by_side(&words),
-        );
+        self.buffered[contact] = self.features.dispatch(SideBySide(self, &words));
         self.buffered_from[contact] = first;
     }
 
@@ -125,20 +122,6 @@ impl Disorder {
         }
     }
 
-    /// Draws from the words of both deviates of each. A threshold that is not positive, or not a number, is not final.
-    #[inline(always)]
-    fn side_by_side(&self, words: &[[u64; 2]; DRAWS_PER_REFILL as usize]) -> Draws {
-        let mut draws = Draws::default();
-        for i in 0..draws.len() {
-            let [for_threshold, for_delay] = words[i].map(|word| uniform(u64::from_le(word)));
-            draws[i] = Draw {
-                threshold: self.threshold(quantile_outside_tails(for_threshold)),
-                delay: -self.reattachment_time * logarithm(for_delay),
-            };
-        }
-        draws
-    }
-
     #[inline(always)]
     fn threshold(&self, quantile: f64) -> f64 {
         self.mean_threshold + self.threshold_deviation * quantile
@@ -150,6 +133,27 @@ impl Disorder {
         self.generator.set_stream(contact as u64);
         self.generator
             .set_word_pos(u128::from(generation) * WORDS_PER_DRAW + redraw * REDRAW_STRIDE);
+    }
+}
+
+/// Draws from the words of both deviates of each. A threshold that is not positive, or not a number, is not final.
+struct SideBySide<'a>(&'a Disorder, &'a [[u64; 2]; DRAWS_PER_REFILL as usize]);
+
+impl WithSimd for SideBySide<'_> {
+    type Output = Draws;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Draws {
+        let Self(disorder, words) = self;
+        let mut draws = Draws::default();
+        for i in 0..draws.len() {
+            let [for_threshold, for_delay] = words[i].map(|word| uniform(u64::from_le(word)));
+            draws[i] = Draw {
+                threshold: disorder.threshold(quantile_outside_tails(for_threshold)),
+                delay: -disorder.reattachment_time * logarithm(for_delay),
+            };
+        }
+        draws
     }
 }
 
@@ -463,10 +467,8 @@ mod tests {
             let words: [u64; 16] =
                 std::array::from_fn(|i| if i < 8 { words[i] } else { !words[i - 8] });
             let disorder = Disorder::new(&Parameters::default());
-            let draws = features.dispatch(
-                #[inline(always)]
-                || disorder.side_by_side(&words.map(|word| [word.to_le(); 2])),
-            );
+            let draws =
+                features.dispatch(SideBySide(&disorder, &words.map(|word| [word.to_le(); 2])));
             for (word, Draw { threshold, delay }) in words.into_iter().zip(draws) {
                 let alone = disorder.threshold(standard_normal_quantile(uniform(word)));
                 let in_tail = depth(uniform(word)) > 5.0;

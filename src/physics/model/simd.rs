@@ -9,7 +9,7 @@
 //!
 //! `fearless_simd` would need no code here, but has AVX-512 from Ice Lake on only, and its AVX2 is slower.
 
-use pulp::{Scalar512b as Baseline, bytemuck};
+use pulp::{Scalar512b as Baseline, WithSimd, bytemuck};
 use std::array;
 use std::ops::{Deref, DerefMut};
 
@@ -64,6 +64,24 @@ pub(crate) trait Simd: pulp::Simd {
     #[inline(always)]
     fn set(self, row: &mut Row, lane: usize, value: f64) {
         self.load(row).with(lane, value).store(row);
+    }
+
+    /// Runs a loop, compiled for these features where it is inlined.
+    #[inline(always)]
+    fn run<T>(self, hot_loop: impl FnOnce(Self) -> T) -> T {
+        self.vectorize(HotLoop(self, hot_loop))
+    }
+}
+
+/// A loop that is inlined into code compiled for the features of a token, as a closure without arguments is not.
+struct HotLoop<S, F>(S, F);
+
+impl<S, T, F: FnOnce(S) -> T> WithSimd for HotLoop<S, F> {
+    type Output = T;
+
+    #[inline(always)]
+    fn with_simd<Same: pulp::Simd>(self, _: Same) -> T {
+        (self.1)(self.0)
     }
 }
 

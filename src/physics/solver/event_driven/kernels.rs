@@ -25,7 +25,7 @@ macro_rules! kernels {
 
         impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
             $(fn $name(&self, $($argument: $type),*) -> $result {
-                self.0.vectorize(#[inline(always)] || $function(self.0, $($argument),*))
+                self.0.run(#[inline(always)] |simd| $function(simd, $($argument),*))
             })*
         }
     };
