@@ -84,7 +84,8 @@ pub(crate) fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> Str
             .is_some_and(|symbol| symbol.description().meaning == column.meaning)
     };
     let earlier_table = |column: &Column| {
-        let has_it = |(_, columns): &&(_, Vec<Column>)| columns.contains(column);
+        let is_same = |known: &Column| known.name == column.name && known.meaning == column.meaning;
+        let has_it = |(_, columns): &&(_, Vec<Column>)| columns.iter().any(is_same);
         let table = earlier.iter().find(has_it).map(|(name, _)| *name);
         table.filter(|_| !is_parameter(column))
     };

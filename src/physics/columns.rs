@@ -42,12 +42,10 @@ pub trait Row: Sized {
     /// The columns of a field that is described so; its type says of which kind they are. Rows describe their own.
     fn columns_as(described: Column) -> Vec<Column>;
 
-    /// The columns of a row, in order.
     fn columns() -> Vec<Column> {
         Self::columns_as(Column::default())
     }
 
-    /// The names of these columns.
     fn names() -> Vec<Cow<'static, str>> {
         let columns = Self::columns().into_iter();
         columns.map(|column| column.name).collect()

@@ -27,34 +27,21 @@ pub(super) struct Columns {
     values: Vec<Vec<Json>>,
     /// All columns of the rows, and whether the page has them.
     #[serde(skip)]
-    all: Vec<(Column, bool)>,
+    all: Vec<(bool, Column)>,
 }
 
 impl Columns {
-    /// The columns of a row type with these names.
-    fn of<R: Row>(is_shown: impl Fn(&str) -> bool) -> Self {
-        let all: Vec<(Column, bool)> = R::columns()
-            .into_iter()
-            .map(|column| {
-                let is_shown = is_shown(&column.name);
-                (column, is_shown)
-            })
-            .collect();
-        let described = |(column, _): &(Column, bool)| {
-            let Column {
-                name,
-                unit,
-                meaning,
-                ..
-            } = column;
+    fn of<R: Row>(is_shown: impl Fn(&Column) -> bool) -> Self {
+        let columns = R::columns().into_iter();
+        let all: Vec<(bool, Column)> = columns.map(|column| (is_shown(&column), column)).collect();
+        let described = |(_, column): &(bool, Column)| {
+            let Column { name, unit, .. } = column;
+            let meaning = column.meaning;
             let kind = column.kind.word();
             json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind })
         };
-        let described: Vec<Json> = all
-            .iter()
-            .filter(|column| column.1)
-            .map(described)
-            .collect();
+        let shown = all.iter().filter(|column| column.0);
+        let described: Vec<Json> = shown.map(described).collect();
         Self {
             values: vec![Vec::new(); described.len()],
             described,
@@ -65,8 +52,8 @@ impl Columns {
     /// Gives each column its label in the unit in which its values are read best, and the factor to that; no unit to one
     /// without values.
     fn label(&mut self, label: impl Fn(&Column) -> Label) {
-        let shown = self.all.iter().filter(|column| column.1);
-        let labels = shown.map(|column| label(&column.0));
+        let shown = self.all.iter().filter(|column| column.0);
+        let labels = shown.map(|column| label(&column.1));
         for ((column, values), label) in self.described.iter_mut().zip(&self.values).zip(labels) {
             let sizes = values.iter().filter_map(Json::as_f64).map(f64::abs);
             let largest = sizes.reduce(f64::max);
@@ -82,7 +69,7 @@ impl Columns {
         let mut all = self.all.iter();
         let mut values = self.values.iter_mut();
         row.cells(&mut |cell| {
-            if all.next().is_some_and(|column| column.1)
+            if all.next().is_some_and(|column| column.0)
                 && let Some(column) = values.next()
             {
                 column.push(json(cell));
@@ -207,24 +194,6 @@ pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
 
 /// Slips up to which all are shown; of more, every k-th in table order. Each takes some 30 bytes of the page.
 const MAX_SLIPS: u64 = 100_000;
-/// Their columns that are shown, with their symbols and words. All of them would be twice as many bytes.
-const SLIP_COLUMNS: [(&str, &str, &str); 14] = [
-    ("slip", "slip", "Number of the slip within its job"),
-    ("onset", "t", "Time of the onset"),
-    ("interval", "τ", "Interval"),
-    ("T_onset", "T", "Period at the onset"),
-    ("Delta_onset", "Δ", "Amplitude at the onset"),
-    ("periods", "n", "Interval in periods"),
-    ("phase", "φ", "Phase of the onset"),
-    ("peak_force", "F", "Shear force at the onset"),
-    ("drop", "ΔF", "Stress drop"),
-    ("duration", "duration", "Duration of the slip"),
-    ("size", "size", "Breaks in the slip"),
-    ("slip_distance", "distance", "Slip distance"),
-    ("front_speed", "speed", "Speed of the rupture front"),
-    ("precursors", "precursors", "Precursors before the slip"),
-];
-
 /// What the page says of its slips.
 #[derive(Debug, Serialize)]
 pub(super) struct Slips {
@@ -245,10 +214,10 @@ impl Slips {
         places: &HashMap<String, usize>,
         total: u64,
     ) -> Result<Self, ResultsError> {
-        let shown = |name: &str| SLIP_COLUMNS.iter().find(|column| column.0 == name);
         let mut slips = Self {
             every: total.div_ceil(MAX_SLIPS).max(1),
-            columns: Columns::of::<Slip>(|name| shown(name).is_some()),
+            // All columns would be twice as many bytes.
+            columns: Columns::of::<Slip>(|column| !column.symbol.is_empty()),
             job: Vec::new(),
             jobs: Vec::new(),
         };
@@ -271,13 +240,10 @@ impl Slips {
             slips.job.push(slips.jobs.len() - 1);
             slips.columns.push(&slip, rounded);
         }
-        slips.columns.label(|column| {
-            let (_, symbol, what) = shown(&column.name).copied().unwrap_or_default();
-            Label {
-                symbol: symbol.to_owned(),
-                what: what.to_owned(),
-                unit: column.unit,
-            }
+        slips.columns.label(|column| Label {
+            symbol: column.symbol.to_owned(),
+            what: column.words.to_owned(),
+            unit: column.unit,
         });
         Ok(slips)
     }
@@ -303,15 +269,5 @@ mod tests {
             };
             assert!(sets.div_ceil(census.spacing()) <= MAX_SETS, "{sets}");
         }
-    }
-
-    #[test]
-    fn the_columns_that_are_shown_are_there() {
-        let described = Slip::columns();
-        assert!(
-            SLIP_COLUMNS
-                .iter()
-                .all(|(name, ..)| described.iter().any(|column| column.name == *name))
-        );
     }
 }

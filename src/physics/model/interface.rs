@@ -360,13 +360,15 @@ impl Interface {
                 }
             }
         }
-        contacts.sort_by(|a, b| {
-            if falls {
-                b.0.total_cmp(&a.0)
-            } else {
-                a.0.total_cmp(&b.0)
-            }
-        });
+        if contacts.len() > 1 {
+            contacts.sort_by(|a, b| {
+                if falls {
+                    b.0.total_cmp(&a.0)
+                } else {
+                    a.0.total_cmp(&b.0)
+                }
+            });
+        }
     }
 
     /// Breaks one contact, at a break position in m. Returns the change, and when the contact reattaches, in s. Leaves

@@ -13,9 +13,11 @@ columns! {
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Modulation {
         period as "T_onset": Option<f64> = "s",
-            "period of the modulation at the onset, T unless ramped; null without modulation, and with a pulse";
+            "period of the modulation at the onset, T unless ramped; null without modulation, and with a pulse",
+            "T" "Period at the onset";
         amplitude as "Delta_onset": f64 = "m",
-            "amplitude of the modulation at the onset, Delta unless ramped; 0 without modulation, or outside its pulse";
+            "amplitude of the modulation at the onset, Delta unless ramped; 0 without modulation, or outside its pulse",
+            "Δ" "Amplitude at the onset";
     }
 }
 
@@ -67,25 +69,26 @@ columns! {
     /// tenth of all.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Slip {
-        number as "slip": u64 = "", "number of the slip within its job, from 0 past start-up";
-        onset: f64 = "s", "time of the largest shear force since the previous slip's end";
-        interval: Option<f64> = "s", "time since the previous onset";
+        number as "slip": u64 = "", "number of the slip within its job, from 0 past start-up", "slip" "Number of the slip within its job";
+        onset: f64 = "s", "time of the largest shear force since the previous slip's end", "t" "Time of the onset";
+        interval: Option<f64> = "s", "time since the previous onset", "τ" "Interval";
         modulation: Modulation;
-        periods: Option<u64> = "", "interval in periods T_onset, rounded; null without modulation";
-        phase: Option<f64> = "rad", "phase of the onset against the modulation";
-        peak_force: f64 = "N", "shear force at the onset";
-        drop: f64 = "N", "peak force minus the least shear force during the slip";
+        periods: Option<u64> = "", "interval in periods T_onset, rounded; null without modulation", "n" "Interval in periods";
+        phase: Option<f64> = "rad", "phase of the onset against the modulation", "φ" "Phase of the onset";
+        peak_force: f64 = "N", "shear force at the onset", "F" "Shear force at the onset";
+        drop: f64 = "N", "peak force minus the least shear force during the slip", "ΔF" "Stress drop";
         nucleation: f64 = "s", "time of the first break";
         nucleation_block: u64 = "", "block of the first break, from 1 at the trailing edge";
-        duration: f64 = "s", "from the first to the last break";
-        size: u64 = "", "breaks in the rupture";
+        duration: f64 = "s", "from the first to the last break", "duration" "Duration of the slip";
+        size: u64 = "", "breaks in the rupture", "size" "Breaks in the slip";
         attached_before: f64 = "", "fraction of the contacts that are attached before the first break";
         least_attached: f64 = "", "least fraction of the contacts that are attached during the rupture";
-        distance as "slip_distance": f64 = "m", "mean distance that the blocks move, from the first to the last break";
+        distance as "slip_distance": f64 = "m", "mean distance that the blocks move, from the first to the last break",
+            "distance" "Slip distance";
         edge_distance: f64 = "m", "distance that the driven edge moves in that time";
         onset_cut: bool = "", "whether the shear force still rose when the rupture reached the leading edge";
-        front_speed: Option<f64> = "m/s", "speed of the rupture front";
-        precursors: u64 = "", "precursors since the previous slip";
+        front_speed: Option<f64> = "m/s", "speed of the rupture front", "speed" "Speed of the rupture front";
+        precursors: u64 = "", "precursors since the previous slip", "precursors" "Precursors before the slip";
         largest_precursor: u64 = "", "breaks in the largest of them; 0 if there is none";
         slow_front_speed: Option<f64> = "m/s",
             "advance of the reach through these precursors; null for fewer than two";

@@ -8,7 +8,6 @@
 //! or reassociated, so all give the same bits.
 
 use super::ledger::Audit;
-use super::polynomial;
 use super::segment::{ForceAt, ForcePath, PolynomialPath, Segment};
 use super::{Limits, Observer, SimulationError, SolverKey, Summary};
 use crate::model::equation::largest_frequency;
@@ -244,7 +243,7 @@ fn report_force(
     let ends = [(force, 0.0), (next_force, whole)];
     let path = PolynomialPath {
         coefficients: &coefficients,
-        curvature_bound: polynomial::second_derivative_bound(&coefficients),
+        curvature_bound: 2.0 * square.abs() + 6.0 * cube.abs(),
         first: 0.0,
         scale: time_step,
         ends: ends.map(|(force, integral)| ForceAt { force, integral }),

@@ -28,10 +28,15 @@ pub(crate) const INVERSE: [f64; MAX_COEFFICIENTS] = {
     inverse
 };
 
-/// `Σ c_p s^p`.
-#[inline(always)]
+/// `Σ c_p s^p`. Even and odd orders are summed side by side, since each sum waits for its last term.
 pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
-    expanded(coefficients, s)[0]
+    let square = s * s;
+    let pairs = coefficients.chunks_exact(2);
+    let last = pairs.remainder().first().copied().unwrap_or(0.0);
+    let (even, odd) = pairs.rev().fold((last, 0.0), |(even, odd), pair| {
+        (even * square + pair[0], odd * square + pair[1])
+    });
+    even + s * odd
 }
 
 /// `Σ p (p-1) |c_p|`: a bound on the second derivative on [0, 1]. Two sums side by side.
@@ -44,9 +49,8 @@ pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
     sums[0] + sums[1]
 }
 
-/// The first three coefficients in the variable s - `centre`: value, slope, and half the second derivative. Even and odd
-/// orders are summed side by side, since each sum waits for its last term.
-#[inline(always)]
+/// The first three coefficients in the variable s - `centre`: value, slope, and half the second derivative. As in
+/// [`value`], with the derivatives of both sums by s².
 pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
     let square = centre * centre;
     let (pairs, rest) = coefficients.as_chunks::<2>();

@@ -60,7 +60,11 @@ impl ForceHistory {
         let first = self.steps.first()?;
         let last = self.steps.last()?;
         let steps = (self.count - 1) as f64 + s - self.first;
-        let before = first.integral_to(self.first);
+        let before = if self.first > 0.0 {
+            first.integral_to(self.first)
+        } else {
+            0.0
+        };
         let beyond = if s < 1.0 {
             last.integral() - last.integral_to(s)
         } else {
