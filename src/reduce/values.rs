@@ -308,9 +308,11 @@ impl Values {
 
     /// The place of the value of each set among all.
     pub fn places(&self) -> Vec<Option<usize>> {
+        let lies_below = |value: f64, number: f64| value < number && !is_same(value, number);
         let place = |number: f64| {
-            let mut distinct = self.distinct.iter();
-            distinct.position(|&value| is_same(value, number))
+            let distinct = &self.distinct;
+            let place = distinct.partition_point(|&value| lies_below(value, number));
+            (place < distinct.len()).then_some(place)
         };
         let numbers = self.numbers.iter();
         numbers.map(|number| place((*number)?)).collect()

@@ -69,7 +69,8 @@ columns! {
     /// tenth of all.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Slip {
-        number as "slip": u64 = "", "number of the slip within its job, from 0 past start-up", "slip" "Number of the slip within its job";
+        number as "slip": u64 = "", "number of the slip within its job, from 0 past start-up",
+            "slip" "Number of the slip within its job";
         onset: f64 = "s", "time of the largest shear force since the previous slip's end", "t" "Time of the onset";
         interval: Option<f64> = "s", "time since the previous onset", "τ" "Interval";
         modulation: Modulation;
