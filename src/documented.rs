@@ -84,7 +84,12 @@ pub(crate) fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> Str
             .is_some_and(|symbol| symbol.description().meaning == column.meaning)
     };
     let earlier_table = |column: &Column| {
-        let is_same = |known: &Column| known.name == column.name && known.meaning == column.meaning;
+        let without_symbol = |column: &Column| Column {
+            symbol: "",
+            words: "",
+            ..column.clone()
+        };
+        let is_same = |known: &Column| without_symbol(known) == without_symbol(column);
         let has_it = |(_, columns): &&(_, Vec<Column>)| columns.iter().any(is_same);
         let table = earlier.iter().find(has_it).map(|(name, _)| *name);
         table.filter(|_| !is_parameter(column))

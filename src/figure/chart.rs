@@ -37,6 +37,8 @@ pub(super) const LINE_WIDTH: f64 = 1.0;
 /// Sets up to which dots and bars have their full size.
 const FEW_SETS: usize = 200;
 const SMALL_RADIUS: f64 = 2.5;
+/// What the drive alone explains of a set that is on no line.
+const ALONE: Dot = Dot::solid(GREY, SMALL_RADIUS);
 /// By how much the hole in the dot of a set that slides is smaller.
 const HOLE: f64 = 1.6;
 
@@ -232,11 +234,9 @@ impl<'a> Chart<'a> {
             line.retain(|set| members.contains(set));
             self.add_line(&mut layers, y, dots, &line);
         }
-        if dots.lines.is_empty() {
-            let alone = members.iter().filter_map(|&set| self.drive_at(y, set));
-            let dot = Dot::solid(GREY, SMALL_RADIUS);
-            layers.push(Layer::Dots(alone.collect(), dot));
-        }
+        let dotted = members.iter().filter(|set| self.is_dotted(dots, **set));
+        let alone = dotted.filter_map(|&set| self.drive_at(y, set));
+        layers.push(Layer::Dots(alone.collect(), ALONE));
         for &set in members {
             self.add_bars(&mut layers, y, dots, set);
         }
@@ -264,6 +264,11 @@ impl<'a> Chart<'a> {
 
     fn place(&self, y: &Quantity<'_>, set: usize) -> Option<Place> {
         self.x.number(set).zip(y.number(set))
+    }
+
+    /// Whether what the drive alone explains of a set is a dot, and not on a line.
+    fn is_dotted(&self, dots: &Dots, set: usize) -> bool {
+        dots.lines.is_empty() || self.other(set).is_some()
     }
 
     /// The place of what the drive alone explains.
@@ -355,13 +360,20 @@ impl Chart<'_> {
             let text = format!("mixed above {mixed}, sliding above {sliding}");
             entries.push(entry(Mark::Line(REFERENCE), text));
         }
-        if self.ys.iter().any(|y| y.drive.is_some()) {
-            let mark = if dots.lines.is_empty() {
-                Mark::Dot(Dot::solid(GREY, SMALL_RADIUS))
+        let has_drive = |set: &&usize| self.ys.iter().any(|y| self.drive_at(y, **set).is_some());
+        let explained = inside.iter().filter(has_drive);
+        let (dotted, joined): (Vec<usize>, Vec<usize>) =
+            explained.partition(|set| self.is_dotted(dots, **set));
+        if !joined.is_empty() {
+            entries.push(entry(Mark::Line(drive_alone(BLACK)), "by the drive alone"));
+        }
+        if !dotted.is_empty() {
+            let of = if joined.is_empty() {
+                ""
             } else {
-                Mark::Line(drive_alone(BLACK))
+                ", hollow marks"
             };
-            entries.push(entry(mark, "by the drive alone"));
+            entries.push(entry(Mark::Dot(ALONE), format!("by the drive alone{of}")));
         }
         if self.ys.iter().any(|y| self.reduction(y).is_some()) {
             let text = "K_d Δ = 0.2 to 0.3 of the peak force: friction falls, says the paper";

@@ -7,8 +7,9 @@ use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{axis_of, distinct};
 use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, REFERENCE, Stroke};
-use crate::model::Symbol;
+use crate::model::{Selection as _, Symbol};
 use crate::reduce::{EdgeRow, FREQUENCY, Interval, ascending};
+use crate::sets::{AllButSeed, column_of};
 
 pub(super) const NAME: &str = "edges";
 
@@ -26,10 +27,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let is_refined =
         |key: &str| key == refined || (key == FREQUENCY && ["T", "eta"].contains(&refined));
     let differs = |key: &str| ascending(edges.iter().filter_map(|edge| value(key, edge))).len() > 1;
-    let parameters = Symbol::ALL
-        .into_iter()
-        .filter(|symbol| !matches!(symbol, Symbol::T | Symbol::Seed));
-    let keys = parameters.map(Symbol::key).chain([FREQUENCY]);
+    let keys = AllButSeed::SYMBOLS.iter().copied().map(column_of);
     let [key] = keys
         .filter(|key| !is_refined(key) && differs(key))
         .collect::<Vec<_>>()[..]

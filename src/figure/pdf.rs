@@ -1,7 +1,7 @@
 //! A scene as a PDF of one page: vectors, and text in the letters of one embedded font, so that it can be searched and
 //! looks the same everywhere. The same scene gives the same bytes on every machine.
 
-use super::style::{FACE, font_file};
+use super::style::FACE;
 use kuva::render::color::Color;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 use pdf_writer::types::{
@@ -315,7 +315,7 @@ impl Page {
             cmap.pair(code, letter);
         }
         pdf.cmap(to_unicode, &cmap.finish());
-        let letters = subsetter::subset(font_file(), 0, &self.glyphs);
+        let letters = subsetter::subset(FACE.raw_face().data, 0, &self.glyphs);
         let letters = letters.expect("the font of the program has its letters");
         pdf.stream(file, &compressed(&letters))
             .filter(Filter::FlateDecode);

@@ -66,7 +66,7 @@ pub fn simulation(
     let instants = instants.chain(map.into_iter().flatten().map(|cell| cell.time));
     let (first, last) = bounds(instants)
         .filter(|(first, last)| last > first)
-        .ok_or_else(|| anyhow!("figure {NAME}: there are no instants to draw"))?;
+        .ok_or_else(|| anyhow!("figure {NAME}: there are fewer than two instants to draw"))?;
     let (factor, unit) = label("tau_mean").scale(last);
     let time = Axis::linear(&format!("Time t ({unit})"), factor * first, factor * last);
     // A ramped modulation is not drawn, nor one that is too fast.
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_of_the_wrong_size_is_refused() {
+    fn fewer_than_two_instants_are_refused() {
         assert!(drawn(Some(FORCE), Some(&map()), None).is_some());
         assert!(
             drawn(Some(&FORCE[..1]), None, None).is_none() && drawn(None, None, None).is_none()

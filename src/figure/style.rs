@@ -121,12 +121,10 @@ pub(super) const NOTE_TEXT: u32 = 12;
 pub(super) const HALF_DIGIT: f64 = 0.36;
 
 /// The font of all figures.
-pub(super) fn font_file() -> &'static [u8] {
-    dejavu::sans::regular()
-}
-
-pub(super) static FACE: LazyLock<Face<'static>> =
-    LazyLock::new(|| Face::parse(font_file(), 0).expect("the font of the program can be read"));
+pub(super) static FACE: LazyLock<Face<'static>> = LazyLock::new(|| {
+    let file = dejavu::sans::regular();
+    Face::parse(file, 0).expect("the font of the program can be read")
+});
 
 /// Width of a text of this size.
 pub(super) fn text_width(text: &str, size: u32) -> f64 {

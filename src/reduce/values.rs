@@ -171,6 +171,38 @@ impl Values {
             |word| format!("{}: {word}", label.symbol),
         )
     }
+
+    pub fn is_logarithmic(&self) -> bool {
+        let [least, .., largest] = self.distinct[..] else {
+            return false;
+        };
+        let is_even =
+            has_even_steps(&self.distinct) && (self.distinct.len() > 2 || largest < WIDE * least);
+        !self.is_worded() && is_spread(&self.distinct) && !is_even
+    }
+
+    /// Whether each of its values goes with one of another: both have few values, or both ascend.
+    fn fixes(&self, other: &Self) -> bool {
+        let places = self.places();
+        let others = other.places();
+        let mut pairs: Vec<_> = places.iter().zip(others).collect();
+        pairs.sort();
+        pairs.dedup();
+        let is_one = pairs.windows(2).all(|pair| pair[0].0 != pair[1].0);
+        is_one && (2 * self.distinct.len() <= places.len() || pairs.is_sorted_by_key(|pair| pair.1))
+    }
+
+    /// The place of the value of each set among all.
+    pub fn places(&self) -> Vec<Option<usize>> {
+        let lies_below = |value: f64, number: f64| value < number && !is_same(value, number);
+        let place = |number: f64| {
+            let distinct = &self.distinct;
+            let place = distinct.partition_point(|&value| lies_below(value, number));
+            (place < distinct.len()).then_some(place)
+        };
+        let numbers = self.numbers.iter();
+        numbers.map(|number| place((*number)?)).collect()
+    }
 }
 
 fn word(cell: Value<'_>) -> Option<String> {
@@ -283,41 +315,6 @@ const EVEN: f64 = 0.02;
 const WIDE: f64 = 9.0;
 /// Ratio of the ends up to which no axis is logarithmic: values would fall on one place.
 const NARROW: f64 = 1.1;
-
-/// As one of the parameters in which sets differ.
-impl Values {
-    pub fn is_logarithmic(&self) -> bool {
-        let [least, .., largest] = self.distinct[..] else {
-            return false;
-        };
-        let is_even =
-            has_even_steps(&self.distinct) && (self.distinct.len() > 2 || largest < WIDE * least);
-        !self.is_worded() && is_spread(&self.distinct) && !is_even
-    }
-
-    /// Whether each of its values goes with one of another: both have few values, or both ascend.
-    fn fixes(&self, other: &Self) -> bool {
-        let places = self.places();
-        let others = other.places();
-        let mut pairs: Vec<_> = places.iter().zip(others).collect();
-        pairs.sort();
-        pairs.dedup();
-        let is_one = pairs.windows(2).all(|pair| pair[0].0 != pair[1].0);
-        is_one && (2 * self.distinct.len() <= places.len() || pairs.is_sorted_by_key(|pair| pair.1))
-    }
-
-    /// The place of the value of each set among all.
-    pub fn places(&self) -> Vec<Option<usize>> {
-        let lies_below = |value: f64, number: f64| value < number && !is_same(value, number);
-        let place = |number: f64| {
-            let distinct = &self.distinct;
-            let place = distinct.partition_point(|&value| lies_below(value, number));
-            (place < distinct.len()).then_some(place)
-        };
-        let numbers = self.numbers.iter();
-        numbers.map(|number| place((*number)?)).collect()
-    }
-}
 
 /// The parameters in which sets differ, the seed left out.
 pub fn differing<'a>(rows: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<Symbol> {

@@ -261,6 +261,12 @@ mod tests {
     }
 
     #[test]
+    fn slips_are_shown_by_few_columns() {
+        let slips = Columns::of::<Slip>(|column| !column.symbol.is_empty());
+        assert_eq!(slips.values.len(), 14);
+    }
+
+    #[test]
     fn no_more_sets_are_shown_than_a_page_bears() {
         for sets in [0, 1, MAX_SETS, MAX_SETS + 1, 1_000_003] {
             let census = Census {

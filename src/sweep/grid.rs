@@ -182,9 +182,9 @@ impl Sweep {
 
     /// This sweep with the ids that a program of other versions gave.
     pub fn with_ids_of(mut self, model_version: u32, rng_scheme: &str) -> Self {
-        let identity =
-            Identity::of_versions(model_version, rng_scheme, self.solver, &self.recording);
-        self.identity = identity.of(self.measured.as_ref());
+        let versions = (model_version, rng_scheme);
+        let measured = self.measured.as_ref();
+        self.identity = Identity::new(versions, self.solver, &self.recording, measured);
         self
     }
 

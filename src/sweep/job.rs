@@ -56,6 +56,9 @@ pub(super) fn settings(
     solver.chain(record)
 }
 
+/// Of the model, and of its random numbers, as ids have them.
+pub const VERSIONS: (u32, &str) = (MODEL_VERSION, RNG_SCHEME);
+
 /// Gives jobs their ids, of 32 hexadecimal characters: all that they share is hashed once.
 #[derive(Clone, Debug)]
 pub struct Identity {
@@ -63,16 +66,12 @@ pub struct Identity {
 }
 
 impl Identity {
-    pub fn new(solver: Solver, recording: &Recording) -> Self {
-        Self::of_versions(MODEL_VERSION, RNG_SCHEME, solver, recording)
-    }
-
-    /// The same of a program with another version of the model or scheme of random numbers.
-    pub fn of_versions(
-        model_version: u32,
-        rng_scheme: &str,
+    /// Of jobs of this version of the model and scheme of random numbers; if they were measured, of what files hold.
+    pub fn new(
+        (model_version, rng_scheme): (u32, &str),
         solver: Solver,
         recording: &Recording,
+        measured: Option<&Measured>,
     ) -> Self {
         let mut shared = Sha256::new();
         shared.update(format!("model={model_version}\nrng={rng_scheme}\n"));
@@ -81,15 +80,10 @@ impl Identity {
         for (key, value) in others {
             shared.update(format!("{key}={value}\n"));
         }
-        Self { shared }
-    }
-
-    /// The same of what these files hold, if jobs were measured.
-    pub fn of(mut self, measured: Option<&Measured>) -> Self {
         for file in measured.iter().flat_map(|measured| &measured.files) {
-            self.shared.update(format!("measured={file}\n"));
+            shared.update(format!("measured={file}\n"));
         }
-        self
+        Self { shared }
     }
 
     /// The id of a job, or of a set, by these of its canonical parameters.
@@ -120,8 +114,12 @@ mod tests {
     use crate::sets::AllButSeed;
     use std::collections::HashSet;
 
+    fn of(solver: Solver, recording: &Recording) -> Identity {
+        Identity::new(VERSIONS, solver, recording, None)
+    }
+
     fn identity() -> Identity {
-        Identity::new(Solver::fixed_step(1e-6), &Recording::default())
+        of(Solver::fixed_step(1e-6), &Recording::default())
     }
 
     #[test]
@@ -134,7 +132,7 @@ mod tests {
             seed: 3,
             ..Parameters::default()
         };
-        let default = Identity::new(Solver::default(), &Recording::default());
+        let default = of(Solver::default(), &Recording::default());
         assert_eq!(
             default.id(&Parameters::default(), &Symbol::ALL),
             "e9a963559e0ee48b531cae83da795678"
@@ -215,8 +213,7 @@ mod tests {
             ..Recording::default()
         };
         let solver = Solver::fixed_step(1e-6);
-        let id =
-            |recording| Identity::new(solver, recording).id(&Parameters::default(), &Symbol::ALL);
+        let id = |recording| of(solver, recording).id(&Parameters::default(), &Symbol::ALL);
         assert_eq!(id(&bounded), id(&Recording::default()));
         for key in RecordingKey::ALL.into_iter().filter(|key| {
             !matches!(
@@ -238,7 +235,7 @@ mod tests {
         let mut ids = HashSet::new();
         for time_step in [1e-6, 1e-6_f64.next_up()] {
             for recording in &recordings {
-                let identity = Identity::new(Solver::fixed_step(time_step), recording);
+                let identity = of(Solver::fixed_step(time_step), recording);
                 assert!(ids.insert(identity.id(&Parameters::default(), &Symbol::ALL)));
             }
         }

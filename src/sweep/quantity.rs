@@ -18,7 +18,7 @@ pub(super) enum Quantity {
     Frequency,
 }
 
-/// Range of η, f, Δ, V0 and T where one is derived from the others: their products keep all digits.
+/// Range of η and f, and of a T that is derived from η.
 pub(super) const DERIVABLE: RangeInclusive<f64> = 1e-100..=1e100;
 
 impl Quantity {
@@ -175,12 +175,17 @@ pub const SYNONYMS: &[(&str, &str)] = &[
     ("stress drop", "drop_mean"),
 ];
 
+/// More than any section has keys; a table of measured slips may have more columns.
+const MAX_NAMES: usize = 40;
+
 /// The hint for an unknown word: the known one that was probably meant, else all.
 pub fn hint(word: &str, known: &[&str]) -> String {
-    nearest(word, known).map_or_else(
-        || format!("allowed are {}", known.join(", ")),
-        |meant| format!("did you mean {meant}?"),
-    )
+    if let Some(meant) = nearest(word, known) {
+        return format!("did you mean {meant}?");
+    }
+    let more = if known.len() > MAX_NAMES { ", .." } else { "" };
+    let names = &known[..known.len().min(MAX_NAMES)];
+    format!("allowed are {}{more}", names.join(", "))
 }
 
 fn distance(word: &str, candidate: &str) -> usize {

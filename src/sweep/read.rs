@@ -8,7 +8,7 @@ use super::axes::{Axis, Column};
 use super::checks::{self, Places};
 use super::expression::Expression;
 use super::grid::Sweep;
-use super::job::Identity;
+use super::job::{Identity, VERSIONS};
 use super::measured::Measured;
 use super::plan::PLAN_VERSION;
 use super::quantity::{Point, Quantity};
@@ -98,7 +98,7 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         conditions: conditions?,
         recording,
         solver,
-        identity: Identity::new(solver, &recording).of(measured.as_ref()),
+        identity: Identity::new(VERSIONS, solver, &recording, measured.as_ref()),
         measured,
         rounds: rounds?,
         controls: None,

@@ -9,7 +9,7 @@ use crate::model::Value;
 
 const RANGE_FORMS: &str =
     "{ linear = [low, high], points = n } or { log = [low, high], points = n }";
-const AXIS_FORMS: &str = "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }; a single value belongs in [model]";
+const AXIS_FORMS: &str = "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
 const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in a sample";
 
 type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
@@ -103,7 +103,9 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<Value>, Refu
 /// Reads a range of an axis, and the number of its values.
 pub(super) fn read_spaced(entry: &Entry<'_>, quantity: Quantity) -> Result<(Range, u64), Refused> {
     let table = entry.section("an axis");
-    let table = table.ok_or_else(|| entry.must_be(AXIS_FORMS))?;
+    let table = table.ok_or_else(|| {
+        entry.must_be(&format!("{AXIS_FORMS}; a single value belongs in [model]"))
+    })?;
     let range = read_range(&table, quantity)?.ok_or_else(|| entry.must_be(AXIS_FORMS))?;
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.

@@ -1,5 +1,6 @@
 //! Properties of random sweeps: what is printed is read, every job is found, parts cover the jobs once and in order.
 
+use super::super::job::VERSIONS;
 use super::super::{Extension, Identity, Job, PART_JOBS, Plan, Sweep};
 use super::{extensions, sweep};
 use crate::model::{Parameters, Symbol, Value};
@@ -158,7 +159,7 @@ proptest! {
     #[test]
     fn parts_cover_the_jobs_of_all_extensions_once_and_in_order(texts in prop::collection::vec(texts(), 1..4)) {
         let sweeps: Vec<Sweep> = texts.iter().map(|text| sweep(text)).collect();
-        let identity = Identity::new(sweeps[0].solver(), sweeps[0].recording());
+        let identity = Identity::new(VERSIONS, sweeps[0].solver(), sweeps[0].recording(), None);
         let mut seen = HashSet::new();
         let mut expected = Vec::new();
         for (extension, sweep) in sweeps.iter().enumerate() {
@@ -186,7 +187,7 @@ proptest! {
         texts in prop::collection::vec(texts(), 2..4), is_done in prop::collection::vec(any::<bool>(), 64)
     ) {
         let sweeps: Vec<Sweep> = texts.iter().map(|text| sweep(text)).collect();
-        let identity = Identity::new(sweeps[0].solver(), sweeps[0].recording());
+        let identity = Identity::new(VERSIONS, sweeps[0].solver(), sweeps[0].recording(), None);
         let (mut extensions, mut done): (Vec<Extension>, Vec<_>) = (Vec::new(), Vec::new());
         for sweep in &sweeps {
             if let Some(last) = extensions.len().checked_sub(1) {
