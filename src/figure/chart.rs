@@ -371,7 +371,7 @@ impl Chart<'_> {
             let of = if joined.is_empty() {
                 ""
             } else {
-                ", hollow marks"
+                ", for hollow marks"
             };
             entries.push(entry(Mark::Dot(ALONE), format!("by the drive alone{of}")));
         }

@@ -232,6 +232,15 @@ fn figures_show_other_directories_as_hollow_marks_under_their_names() {
     );
     let custom = fs::read_to_string(folder.path("custom.svg")).unwrap();
     assert!(custom.contains(">model<"), "{custom}");
+    // The experiment has a control, and so a drive alone; this model has neither.
+    folder.ends(
+        0,
+        "plot model --with mine --x frequency --y resultant_length -o drive.svg",
+    );
+    let drive = fs::read_to_string(folder.path("drive.svg")).unwrap();
+    let dots = drive.matches(r##"r="2.5" fill="#8c8c8c""##).count();
+    let entries = drive.matches(">by the drive alone").count();
+    assert_eq!((dots, entries), (2, 1), "{drive}");
     // What it was drawn from stands as it was.
     folder.ends(0, "plot model");
     assert!(!figure("phi-eta").contains(">mine<"));
