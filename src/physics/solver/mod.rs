@@ -213,12 +213,12 @@ fn run(
     solver.check(parameters)?;
     match solver.method {
         Method::EventDriven => event_driven::run(solver, parameters, limits, observer, audit),
-        Method::FixedStep => {
-            let time_step = solver.setting();
-            Arch::new().dispatch(
-                #[inline(always)]
-                || fixed_step::run(parameters, time_step, limits, observer, audit),
-            )
-        }
+        Method::FixedStep => Arch::new().dispatch(fixed_step::Run {
+            parameters,
+            time_step: solver.setting(),
+            limits,
+            observer,
+            audit,
+        }),
     }
 }
