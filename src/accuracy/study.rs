@@ -67,7 +67,7 @@ impl Study {
                 &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
                 &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10],
             ),
-            own: grid(1e-3),
+            own: event_driven(Resolve::Grid, 1e-3),
             slips_of_sets: Vec::new(),
             first_seed: 0,
             seeds: 8,
@@ -103,10 +103,10 @@ impl Study {
             solver
         } else if solver.resolve.takes_grid(tolerance) {
             on_the_grid.push(tolerance);
-            grid(tolerance)
+            event_driven(Resolve::Grid, tolerance)
         } else {
             in_taylor_steps.push(tolerance);
-            taylor(tolerance)
+            event_driven(Resolve::Taylor, tolerance)
         };
         for tolerances in [&mut on_the_grid, &mut in_taylor_steps] {
             tolerances.sort_by(|a, b| b.total_cmp(a));
@@ -139,21 +139,15 @@ fn plain_and_modulated(drive_velocity: f64) -> [Parameters; 2] {
 
 fn solvers(in_fixed_steps: &[Solver], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> Vec<Solver> {
     let fixed = in_fixed_steps.iter().copied();
-    let grid = on_the_grid.iter().map(|&tolerance| grid(tolerance));
-    let taylor = in_taylor_steps.iter().map(|&tolerance| taylor(tolerance));
+    let resolved = |resolve| move |&tolerance: &f64| event_driven(resolve, tolerance);
+    let grid = on_the_grid.iter().map(resolved(Resolve::Grid));
+    let taylor = in_taylor_steps.iter().map(resolved(Resolve::Taylor));
     fixed.chain(grid).chain(taylor).collect()
 }
 
-const fn grid(tolerance: f64) -> Solver {
+const fn event_driven(resolve: Resolve, tolerance: f64) -> Solver {
     Solver {
-        resolve: Resolve::Grid,
-        ..Solver::event_driven(tolerance)
-    }
-}
-
-const fn taylor(tolerance: f64) -> Solver {
-    Solver {
-        resolve: Resolve::Taylor,
+        resolve,
         ..Solver::event_driven(tolerance)
     }
 }
@@ -224,7 +218,7 @@ impl Study {
             let first = self.first_seed;
             let of_first = parameters.with_seed(first);
             let mut first_breaks = Reference::new(&of_first, self.breaks);
-            let tightest = taylor(TIGHTEST_TOLERANCE);
+            let tightest = event_driven(Resolve::Taylor, TIGHTEST_TOLERANCE);
             simulated(&of_first, tightest, &mut first_breaks)?;
             let mut errors = Vec::new();
             for &solver in &self.solvers {
@@ -234,7 +228,7 @@ impl Study {
             let ensembles = self.ensembles(parameters)?;
             let seeds = self.seeds * if set == 0 { self.first_set_multiple } else { 1 };
             report("reference ensemble, and realisations that are not timed");
-            let reference = taylor(ENSEMBLE_TOLERANCE);
+            let reference = event_driven(Resolve::Taylor, ENSEMBLE_TOLERANCE);
             let others = first + REFERENCE_SEEDS;
             let others = others..others + REFERENCE_SHARE * seeds;
             let reference = self.slips_of(parameters, reference, others)?;

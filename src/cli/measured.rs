@@ -49,11 +49,8 @@ pub fn measured(arguments: &Arguments) -> Result<Exit> {
     let files = arguments.files.iter().map(|file| output::quoted_path(file));
     command.extend(files.map(|file| format!(" {file}")));
     for (flag, texts) in [("--column", &arguments.columns), ("--set", &settings)] {
-        command.extend(
-            texts
-                .iter()
-                .map(|text| format!(" {flag} {}", output::quoted(text))),
-        );
+        let options = texts.iter().map(|text| output::quoted(text));
+        command.extend(options.map(|text| format!(" {flag} {text}")));
     }
     let experiment = Experiment::read(Request {
         files: &arguments.files,

@@ -481,11 +481,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         let root = output::quoted_path(results.layout().root());
         format!("{jobs} failed: stickslip status {root} says why")
     });
-    let measured = if sweep.measured().is_some() {
-        rows
-    } else {
-        &[]
-    };
+    let measured = sweep.measured().map_or(&[][..], |_| rows);
     let is_below_drive = |row: &SetRow| {
         let excess = row.resultant_excess_interval;
         excess.is_some_and(|excess| excess.high < 0.0)

@@ -57,6 +57,7 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let is_damaged = !verification.whole && !arguments.repair;
     let root = output::quoted_path(layout.root());
     let results = Results::read(layout)?;
+    let measured = results.sweep().measured();
     let mut commands = Vec::new();
     if is_damaged {
         commands.push(format!("stickslip verify {root} --repair"));
@@ -68,10 +69,7 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
         verification: &verification,
         repaired: arguments.repair && !verification.whole,
         commands,
-        sources: results
-            .sweep()
-            .measured()
-            .map_or_else(Vec::new, compare_files),
+        sources: measured.map_or_else(Vec::new, compare_files),
     };
     if arguments.json {
         output::json(JSON_FORMAT, &report)?;

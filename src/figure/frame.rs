@@ -10,16 +10,16 @@ use super::style::{
 
 /// A point of data.
 pub(super) type Place = (f64, f64);
+/// Lower and upper end.
+pub(super) type Ends = (f64, f64);
+/// A rectangle of data: its ends along x and along y.
+pub(super) type Cell = (Ends, Ends);
 
 /// The outline of a rectangle between two corners.
 pub(super) fn outline((left, top): Place, (right, bottom): Place) -> Vec<Place> {
     let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
     [&corners[..], &corners[..1]].concat()
 }
-/// Lower and upper end.
-pub(super) type Ends = (f64, f64);
-/// A rectangle of data: its ends along x and along y.
-pub(super) type Cell = (Ends, Ends);
 
 const TICK_LENGTH: f64 = 7.0;
 const MINOR_TICK_LENGTH: f64 = 4.0;

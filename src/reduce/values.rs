@@ -451,6 +451,13 @@ mod tests {
     }
 
     #[test]
+    fn values_that_agree_in_ten_digits_have_one_place() {
+        let found = [2.0, 1.0, 1.0 + 5e-11, 1.0 + 2e-10].map(|number| (Some(number), None));
+        let values = Values::computed("x", Kind::Real, found.into_iter());
+        assert_eq!(values.places(), [2, 0, 0, 1].map(Some));
+    }
+
+    #[test]
     fn an_unknown_column_is_named_with_the_nearest() {
         let error = |name: &str| Values::of::<SetRow>(&[], name).unwrap_err();
         assert!(error("tau_men").contains("did you mean tau_mean?"));

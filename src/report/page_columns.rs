@@ -194,6 +194,7 @@ pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
 
 /// Slips up to which all are shown; of more, every k-th in table order. Each takes some 30 bytes of the page.
 const MAX_SLIPS: u64 = 100_000;
+
 /// What the page says of its slips.
 #[derive(Debug, Serialize)]
 pub(super) struct Slips {

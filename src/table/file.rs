@@ -299,11 +299,11 @@ impl<'a> Dataset<'a> {
     /// The same, row by row.
     pub fn rows<R: Row>(self) -> impl Iterator<Item = Result<R, ResultsError>> + use<'a, R> {
         self.read(R::names()).flat_map(|batch| {
-            let rows = batch.and_then(|batch| batch.rows_of());
-            rows.map_or_else(
-                |error| vec![Err(error)],
-                |rows| rows.into_iter().map(Ok).collect(),
-            )
+            let (rows, error) = match batch.and_then(|batch| batch.rows_of()) {
+                Ok(rows) => (rows, None),
+                Err(error) => (Vec::new(), Some(Err(error))),
+            };
+            rows.into_iter().map(Ok).chain(error)
         })
     }
 

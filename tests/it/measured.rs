@@ -376,6 +376,14 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
             "allowed are onset, drop, peak_force, run, V0, Kd",
         ),
         (String::new(), "", "has no column onset"),
+        (
+            (0..50)
+                .map(|n| format!("c{n:02}"))
+                .collect::<Vec<_>>()
+                .join(","),
+            "",
+            "c38, c39, .., in --column onset",
+        ),
         ("onset,drop\n".to_owned(), "", "has no slips"),
         ("\u{0}\u{1}PAR".to_owned(), "", "has no column onset"),
         ("PAR1".to_owned(), "", "slips.csv: "),

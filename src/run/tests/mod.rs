@@ -476,6 +476,16 @@ fn a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others() 
         .jobs_run,
         0
     );
+    // A run that does not come to them counts none as failed.
+    let stopped = run(
+        &Layout::new(&Disk, root.path()),
+        &bounded(""),
+        options(&AtomicBool::new(true), 2),
+        &fine,
+        &mut |_| (),
+    );
+    let stopped = stopped.unwrap();
+    assert_eq!((stopped.jobs_failed, stopped.jobs_left), (0, cut));
     let longer = run_all(root.path(), &bounded(""), &fine);
     assert_eq!((longer.jobs_run, longer.jobs_left), (cut, 0));
     assert!(!texts(root.path(), "jobs", "outcome").contains(&"time limit".to_owned()));

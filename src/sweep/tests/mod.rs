@@ -47,6 +47,15 @@ fn a_file_with_a_name_alone_is_one_job_of_the_defaults() {
 }
 
 #[test]
+fn samples_are_pinned() {
+    // Known answers: points of a sample are parameters of jobs, and so part of every id.
+    let sample = "points = 3\nseed = 7\nK = { linear = [1e7, 2e7] }\nKd = { linear = [1, 2] }";
+    let found = values(&sweep(&format!("[axes.sobol]\n{sample}")), Symbol::Kd);
+    let known = [1.592_596_173_29, 1.194_618_463_52, 1.365_000_367_16];
+    assert_eq!(found, known.map(Value::Real));
+}
+
+#[test]
 fn a_time_alone_leaves_the_number_of_slips_open() {
     let ends = |record: &str| {
         let recording = *sweep(&format!("[record]\n{record}")).recording();

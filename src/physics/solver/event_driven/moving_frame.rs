@@ -23,7 +23,7 @@ pub(super) struct GridDrive {
     pub swing: [f64; 2],
     /// Sine and cosine of the turn ωh of a step.
     pub turn: [f64; 2],
-    /// ωh, in rad; 0 without modulation.
+    /// ωh, in rad; 0 if the drive is never modulated.
     pub angle: f64,
 }
 
@@ -118,7 +118,7 @@ impl Frame {
     }
 
     /// Checks that the clock is fine enough to locate events within a step of `length` s.
-    pub fn resolves(&self, length: f64) -> Result<(), SimulationError> {
+    pub fn check_resolution(&self, length: f64) -> Result<(), SimulationError> {
         if length >= MIN_RESOLUTION * f64::EPSILON * self.time.max(self.span) {
             return Ok(());
         }

@@ -198,7 +198,7 @@ impl Integration<'_> {
     /// Takes the motion on the grid, from the state.
     fn enter_grid(&mut self) -> Result<(), SimulationError> {
         let length = self.grid.step.length;
-        self.frame.resolves(length)?;
+        self.frame.check_resolution(length)?;
         let drive = self.frame.drive_derivatives(length);
         let input = StepInput {
             length,

@@ -170,7 +170,7 @@ impl Integration<'_> {
         self.expand(horizon.min(until_attach))?;
         let start = self.step.start;
         let length = self.step.length;
-        self.frame.resolves(length)?;
+        self.frame.check_resolution(length)?;
         self.summary.steps += 1;
         let mut done = 0.0;
         let mut end = (horizon / length).min(1.0);
