@@ -90,8 +90,8 @@ pub enum RunEvent {
 pub struct RunReport {
     /// Jobs run, failed ones included.
     pub jobs_run: u64,
-    /// Jobs that count as failed: all that are asked for if no other worker was there at the end, else those of this
-    /// run.
+    /// Jobs that count as failed: all that are asked for if all are done and no other worker is there, else those of
+    /// this run.
     pub jobs_failed: u64,
     /// Jobs that are missing; other workers run them if this run was not stopped.
     pub jobs_left: u64,

@@ -354,6 +354,16 @@ fn failing_and_panicking_jobs_become_rows_others_continue_and_a_retry_mends_them
     );
     assert!(tables_of(root.path()) == before);
 
+    // A retry that comes to none of them leaves them to others, and counts none.
+    let stop = AtomicBool::new(true);
+    let options = Options {
+        retry_failed: true,
+        ..options(&stop, 2)
+    };
+    let layout = Layout::new(&Disk, root.path());
+    let stopped = run(&layout, &sweep(SEEDS, ""), options, &fine, &mut |_| ()).unwrap();
+    assert_eq!((stopped.jobs_failed, stopped.jobs_left), (0, 4));
+
     let mended = retry(root.path(), &sweep(SEEDS, ""), &fine);
     assert_eq!((mended.jobs_run, mended.jobs_failed), (4, 0));
     assert!(tables_of(root.path()) == expected_tables());
@@ -476,16 +486,6 @@ fn a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others() 
         .jobs_run,
         0
     );
-    // A run that does not come to them counts none as failed.
-    let stopped = run(
-        &Layout::new(&Disk, root.path()),
-        &bounded(""),
-        options(&AtomicBool::new(true), 2),
-        &fine,
-        &mut |_| (),
-    );
-    let stopped = stopped.unwrap();
-    assert_eq!((stopped.jobs_failed, stopped.jobs_left), (0, cut));
     let longer = run_all(root.path(), &bounded(""), &fine);
     assert_eq!((longer.jobs_run, longer.jobs_left), (cut, 0));
     assert!(!texts(root.path(), "jobs", "outcome").contains(&"time limit".to_owned()));
