@@ -3,6 +3,7 @@
 //! ```text
 //! keys.rs       keys of sweep files, from the descriptions of the library
 //! simulate.rs   one job -> tables
+//! measured.rs   measured slips -> a results directory
 //! run.rs        a sweep -> a results directory, with progress
 //! results.rs    a results directory -> tables
 //! table.rs      Arrow tables, handed on through the C interface of Arrow
@@ -20,6 +21,7 @@
 
 mod errors;
 mod keys;
+mod measured;
 mod results;
 mod run;
 mod simulate;
@@ -48,6 +50,8 @@ mod _stickslip {
     use super::errors::{ResultsError, SimulationError, SweepError};
     #[pymodule_export]
     use super::keys::keys;
+    #[pymodule_export]
+    use super::measured::measured;
     #[pymodule_export]
     use super::results::{read, reduce, sweep_of};
     #[pymodule_export]

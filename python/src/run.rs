@@ -74,6 +74,13 @@ impl Progress {
     }
 }
 
+/// Reduces the tables of a directory and draws its figures.
+pub fn reduce_and_draw(layout: &Layout<'_>, name: &str) -> Result<(), Error> {
+    stickslip::reduce::reduce(&Results::read(layout)?)?;
+    draw_all(layout, &[], &Look::of_sweep(name), &Format::DEFAULT)?;
+    Ok(())
+}
+
 /// Runs or resumes a sweep file, or the text of one. Returns the results directory, and warnings.
 #[pyfunction]
 #[pyo3(signature = (file, text, out, threads, retry_failed, walltime, reduce, callback))]
@@ -134,16 +141,7 @@ pub fn run(
                     let report =
                         joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
                     if reduce && report.jobs_left == 0 && !report.stopped {
-                        joined.reduce(|| -> Result<(), Error> {
-                            stickslip::reduce::reduce(&Results::read(&layout)?)?;
-                            draw_all(
-                                &layout,
-                                &[],
-                                &Look::of_sweep(sweep.name()),
-                                &Format::DEFAULT,
-                            )?;
-                            Ok(())
-                        })?;
+                        joined.reduce(|| reduce_and_draw(&layout, sweep.name()))?;
                     }
                     Ok(report)
                 },

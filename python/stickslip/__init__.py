@@ -5,6 +5,7 @@
     one = stickslip.simulate(Delta=1e-6, frequency=29, slips=20)     one realisation
     results = stickslip.run("sweeps/fig3.toml")                      a sweep, or what is missing of it
     results = stickslip.open("results/fig3")                         what is there
+    results = stickslip.measured(table, "results/mine", ...)         measured slips
 
     results.slips().to_pandas()          or to_polars(), to_pyarrow(); DuckDB takes the table directly
     results.plot.phase_eta()             a figure to build on
@@ -18,6 +19,7 @@ need numpy, pandas, pyarrow and scipy.
 
 from ._stickslip import VERSION as __version__
 from ._stickslip import ResultsError, SimulationError, SweepError, Table
+from .measured import measured
 from .progress import Progress
 from .results import Results, open
 from .simulation import Simulation, simulate
@@ -33,6 +35,7 @@ __all__ = [
     "SweepError",
     "Table",
     "__version__",
+    "measured",
     "run",
     "simulate",
 ]

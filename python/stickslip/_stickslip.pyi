@@ -19,6 +19,7 @@ __all__ = [
     "VERSION",
     "keys",
     "main",
+    "measured",
     "minimum_phase",
     "read",
     "reduce",
@@ -103,6 +104,12 @@ def run(
     reduce: bool,
     callback: Callable[[int, int, float, list[str]], object] | None,
 ) -> tuple[Path, list[str]]: ...
+def measured(
+    stream: bytes,
+    columns: list[tuple[str, str, str | None]],
+    set: list[tuple[str, str, str | None]],
+    out: str | PathLike[str],
+) -> list[tuple[str, str]]: ...
 def sweep_of(directory: str | PathLike[str]) -> tuple[str, str]: ...
 def reduce(directory: str | PathLike[str]) -> None: ...
 def read(directory: str | PathLike[str], table: str, columns: list[str] | None, join: bool) -> Table: ...

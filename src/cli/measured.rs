@@ -2,27 +2,30 @@
 
 use super::run::reduce_and_draw;
 use super::{Exit, UsageError, catch_signals, layout, output};
-use crate::measured::{Experiment, Request};
+use crate::measured::{Experiment, Given, Request, Sources};
 use crate::run::{Options, Shard, join};
 use crate::sweep::Job;
 use crate::table::shown::shown_text;
 use anyhow::Result;
 use clap::Args;
+use std::panic;
 use std::path::PathBuf;
 
 /// Read measured slips into a results directory, for the statistics and figures of the model's slips
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  stickslip measured slips.csv -o results/mine --set V0=100:um/s
+  stickslip measured slips.csv -o results/mine --set V0=100:um/s --set Delta=0
   stickslip measured slips.csv -o results/mine --column onset=t_slip:ms --column drop=dF:mN --set V0=1e-4 \\
     --set Delta=0.6:um --set frequency=29 --maximum 0.0123
-  stickslip measured rig1.csv rig2.csv -o results/mine --column run=id --column V0=velocity:mm/s
+  stickslip measured rig1.csv rig2.csv -o results/mine --column run=id --column V0=velocity:mm/s --set Delta=0
+  stickslip measured slips.csv -o results/mine --set V0=1e-4 --set Delta=0 --dry-run
 
-A file is CSV, also with semicolons or tabs, or Parquet, and has a row for each slip. Keys are onset (s); drop and
-peak_force (N); run, where series begin; V0 (m/s), Kd (N/m), Delta (m), T (s) or frequency (Hz); and maximum (s), as
-the flag, if series differ in it. Units may have prefixes; times may be in min or h. Series with Delta = 0 are the
-control of those with the same V0 and Kd.")]
+A file is CSV, also with semicolons or tabs, or Parquet, and has a row for each slip. Keys are onset (s); drop (N, or
+1 for what is no force) and peak_force (N); run, where series begin; V0 (m/s), Kd (N/m), Delta (m), T (s) or frequency
+(Hz); maximum (s), as the flag, if series differ in it; and end (s), when the record of a series ended. Units may have
+prefixes; times may be in min or h. V0 is needed, and Delta, which is 0 without modulation; only slips with T or
+frequency may lack it. Series with Delta = 0 are the control of those with the same V0 and Kd.")]
 pub struct Arguments {
     /// Tables of slips
     #[arg(value_name = "FILE", required = true)]
@@ -39,29 +42,52 @@ pub struct Arguments {
     /// A time at which the modulation has a maximum, in s unless a unit follows, as in 12.3:ms [default: 0]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     maximum: Option<String>,
+    /// Numbers in CSV have decimal commas
+    #[arg(long)]
+    decimal_comma: bool,
+    /// Report what would be read, and write nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+impl Arguments {
+    fn request(&self) -> Result<Request> {
+        let maximum = self.maximum.iter();
+        let maximum = maximum.map(|time| format!("maximum={time}"));
+        let settings: Vec<String> = self.settings.iter().cloned().chain(maximum).collect();
+        let mut options = Vec::new();
+        for (flag, texts) in [("--column", &self.columns), ("--set", &settings)] {
+            let texts = texts.iter().map(|text| output::quoted(text));
+            options.extend(texts.map(|text| format!("{flag} {text}")));
+        }
+        options.extend(self.decimal_comma.then(|| "--decimal-comma".to_owned()));
+        let columns = Given::parse_all("--column", &self.columns)?;
+        let settings = Given::parse_all("--set", &settings)?;
+        Ok(Request {
+            sources: Sources::new(columns, settings)?,
+            decimal_comma: self.decimal_comma,
+            options: options.join(" "),
+        })
+    }
 }
 
 pub fn measured(arguments: &Arguments) -> Result<Exit> {
-    let maximum = arguments.maximum.iter();
-    let maximum = maximum.map(|time| format!("maximum={time}"));
-    let settings: Vec<String> = arguments.settings.iter().cloned().chain(maximum).collect();
-    let mut command = "stickslip measured".to_owned();
-    let files = arguments.files.iter().map(|file| output::quoted_path(file));
-    command.extend(files.map(|file| format!(" {file}")));
-    for (flag, texts) in [("--column", &arguments.columns), ("--set", &settings)] {
-        let options = texts.iter().map(|text| output::quoted(text));
-        command.extend(options.map(|text| format!(" {flag} {text}")));
-    }
-    let experiment = Experiment::read(Request {
-        files: &arguments.files,
-        columns: &arguments.columns,
-        settings: &settings,
-        command: &command,
-    });
     let refused = |error: anyhow::Error| UsageError(shown_text(&format!("{error:#}")).to_string());
+    let request = arguments.request().map_err(refused)?;
+    // A library that panics on a damaged file has nothing to say to a user.
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| ()));
+    let experiment = Experiment::read(&arguments.files, &request);
+    panic::set_hook(hook);
     let experiment = experiment.map_err(refused)?;
     let sweep = &experiment.sweep;
+    let read = experiment.read.iter();
+    let read: Vec<_> = read.map(|(head, text)| (&**head, text.clone())).collect();
+    output::pairs(&read)?;
     output::warn(&sweep.warnings());
+    if arguments.dry_run {
+        return Ok(Exit::Done);
+    }
     let layout = layout(&arguments.out);
     let options = Options {
         threads: None,

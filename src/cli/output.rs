@@ -146,11 +146,18 @@ pub fn unfinished(results: &Results<'_>) -> Result<Option<String>> {
 /// The command that continues with a directory.
 pub fn command(results: &Results<'_>) -> String {
     let root = quoted_path(results.layout().root());
-    let measured = results.sweep().measured();
-    measured.map_or_else(
-        || format!("stickslip run {root}"),
-        |measured| format!("{} -o {root}", measured.command),
-    )
+    let Some(measured) = results.sweep().measured() else {
+        return format!("stickslip run {root}");
+    };
+    if measured.files.is_empty() {
+        return format!("stickslip.measured(TABLE, \"{root}\", ...) in Python, with its table");
+    }
+    let files = measured.files.iter();
+    // Not to be taken for a flag.
+    let files = files.map(|file| quoted_path(&Path::new(".").join(&file.name)));
+    let files: Vec<String> = files.collect();
+    let files = files.join(" ");
+    format!("stickslip measured {files} {} -o {root}", measured.options)
 }
 
 /// A count with its noun, in the plural where that fits.

@@ -1,7 +1,7 @@
 //! `stickslip verify`: whether a results directory is whole, and what to do if not.
 
 use super::{Exit, layout, output};
-use crate::measured::compare_files;
+use crate::measured::{Compared, compare_files};
 use crate::results::Results;
 use crate::results::verification::{Problem, Verification};
 use crate::table::shown::{shown, shown_text};
@@ -17,7 +17,8 @@ Examples:
   stickslip verify results/fig3
   stickslip verify results/fig3 --repair     then `run` computes what was moved away
 
-Nothing is changed without --repair. Exit codes: 3 parts are missing, 4 something is damaged.")]
+Nothing is changed without --repair. Exit codes: 3 parts are missing, 4 something is damaged, or a file of measured slips has
+changed.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
@@ -57,7 +58,13 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let is_damaged = !verification.whole && !arguments.repair;
     let root = output::quoted_path(layout.root());
     let results = Results::read(layout)?;
-    let measured = results.sweep().measured();
+    let sources = results
+        .sweep()
+        .measured()
+        .into_iter()
+        .flat_map(compare_files);
+    let sources: Vec<(&str, Compared)> = sources.collect();
+    let has_changed = sources.iter().any(|(_, state)| *state == Compared::Differs);
     let mut commands = Vec::new();
     if is_damaged {
         commands.push(format!("stickslip verify {root} --repair"));
@@ -69,14 +76,17 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
         verification: &verification,
         repaired: arguments.repair && !verification.whole,
         commands,
-        sources: measured.map_or_else(Vec::new, compare_files),
+        sources: sources
+            .iter()
+            .map(|(name, state)| format!("{name}: {}", state.word()))
+            .collect(),
     };
     if arguments.json {
         output::json(JSON_FORMAT, &report)?;
     } else {
         report.print()?;
     }
-    Ok(if is_damaged {
+    Ok(if is_damaged || has_changed {
         Exit::Damaged
     } else if verification.missing.is_empty() {
         Exit::Done

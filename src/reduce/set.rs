@@ -125,6 +125,8 @@ fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongu
     let squares = sequences(jobs, |slip| Some([square(non_nan(slip.drop)?)])).estimate();
     let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&drops));
     (row.drop_deviation, row.drop_deviation_interval) = squares.deviation(unseen);
+    let ratio = row.drop_deviation.zip(row.drop_mean);
+    row.drop_variation = ratio.map(|(deviation, mean)| deviation / mean);
 }
 
 /// Intervals in periods, as angles.

@@ -84,8 +84,8 @@ impl<'a> Results<'a> {
             let kept = &kept[table];
             match table {
                 tables::SLIPS => encoded(file, &gaps, &jobs, kept, |job, outcome| {
-                    let slips = outcome.iter().flat_map(|measured| &measured.slips);
-                    slips.map(move |slip| (Cow::Borrowed(job), Cow::Borrowed(slip)))
+                    let slips = outcome.iter().flat_map(Measurements::all_slips);
+                    slips.map(move |slip| (Cow::Borrowed(job), slip))
                 }),
                 tables::PRECURSORS => encoded(file, &gaps, &jobs, kept, |job, outcome| {
                     let precursors = outcome.iter().flat_map(|measured| &measured.precursors);

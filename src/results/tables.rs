@@ -95,18 +95,36 @@ pub fn tables_of(recording: &Recording) -> impl DoubleEndedIterator<Item = &'sta
         .filter(move |table| has_precursors || *table != PRECURSORS)
 }
 
+/// What sets say of drops in N.
+const DROPS_IN_NEWTONS: [&str; 6] = [
+    "drop_mean",
+    "drop_mean_low",
+    "drop_mean_high",
+    "drop_sd",
+    "drop_sd_low",
+    "drop_sd_high",
+];
+
 /// In what the tables of a sweep have not all that their row types describe.
 pub fn gaps(sweep: &Sweep) -> Gaps {
     let parameters = sweep.unknown().iter();
     let mut unknown: Vec<_> = parameters.map(|symbol| symbol.key().into()).collect();
-    if let Some(measured) = sweep.measured() {
+    let measured = sweep.measured();
+    if let Some(measured) = measured {
         let mut others = [Slip::names(), JobRecord::names()].concat();
         others.retain(|name| !measured.has(name));
         unknown.extend(others);
+        if sweep.unknown().contains(&Symbol::Delta) {
+            unknown.extend(["eta", "Delta_onset"].map(Cow::from));
+        }
+        if !measured.pure.is_empty() {
+            unknown.extend(DROPS_IN_NEWTONS.map(Cow::from));
+        }
     }
     Gaps {
         left_out: sweep.recording().left_out(),
         unknown,
+        pure: measured.map_or_else(Vec::new, |measured| measured.pure.clone()),
     }
 }
 
@@ -185,7 +203,7 @@ impl JobRecord {
         Self {
             outcome: measured.map_or(JobOutcome::Failed, JobOutcome::of),
             reason: outcome.err().map(str::to_owned),
-            slips: measured.map(|measured| measured.slips.len() as u64),
+            slips: measured.map(Measurements::slip_count),
             precursors: measured
                 .map(|measured| measured.slips.iter().map(|slip| slip.precursors).sum()),
             ruptures: measured.map(|measured| measured.ruptures),

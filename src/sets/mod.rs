@@ -98,6 +98,7 @@ columns! {
         drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop", "σ(ΔF)" "S.d. of the stress drop";
         drop_deviation_interval as "drop_sd": Option<Interval> = "N", "lower end of its 95 % confidence interval";
+        drop_variation as "drop_cv": Option<f64> = "", "drop_sd over drop_mean: the shape of drops in any unit", "cv(ΔF)" "Coefficient of variation of the stress drop";
         peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips", "⟨F⟩ at onsets" "Mean peak force";
         peak_force_interval as "peak_force_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         mean_friction: Option<f64> = "N", "shear force, over the time of all jobs", "⟨Fₛ⟩" "Mean friction";

@@ -277,8 +277,8 @@ impl Sweep {
         values.extend(Symbol::ALL.into_iter().filter(is_fixed).map(parameter));
         values.extend(settings(self.solver, &self.recording));
         if let Some(measured) = &self.measured {
-            values.push(("measured.files".to_owned(), measured.files.join(", ")));
-            values.push(("measured.command".to_owned(), measured.command.clone()));
+            values.push(("measured.rows".to_owned(), measured.rows.clone()));
+            values.push(("measured.options".to_owned(), measured.options.clone()));
         }
         values
     }

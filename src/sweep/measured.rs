@@ -6,12 +6,25 @@ use super::source::{Entry, Refused, Section, SweepError, all};
 /// Where measured slips come from.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Files, behind their SHA-256.
-    pub files: Vec<String>,
-    /// The command that reads them again, without the directory of the results.
-    pub command: String,
-    /// Columns of slips that the files have beside the onset.
+    /// Empty if a program gave them.
+    pub files: Vec<SourceFile>,
+    /// SHA-256 of the numbers that were read: what ids depend on.
+    pub rows: String,
+    /// The flags that read the files again.
+    pub options: String,
+    /// Columns of slips that are known beside the onset.
     columns: Vec<String>,
+    /// Those of them that have another unit than the model's, or none: `drop` alone can be one.
+    pub pure: Vec<String>,
+}
+
+/// A file that was read.
+#[derive(Clone, Debug, Default)]
+pub struct SourceFile {
+    pub name: String,
+    pub bytes: u64,
+    /// Empty if it was a pipe.
+    pub sha256: String,
 }
 
 /// Columns of slips and jobs that are always known.
@@ -30,24 +43,41 @@ const KNOWN: &[&str] = &[
 
 impl Measured {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, Refused> {
-        section.only(&["files", "series", "command", "columns"])?;
+        section.only(&[
+            "files", "bytes", "sha256", "rows", "options", "series", "columns", "pure",
+        ])?;
         let required = |key| section.required(key, "`stickslip measured` writes this section");
         let text = |entry: &Entry<'_>| {
             let text = entry.word().map(str::to_owned);
             text.ok_or_else(|| entry.must_be("a text"))
         };
-        let texts = |key| {
+        let list = |key| {
             let entry = required(key)?;
-            let list = entry.list();
-            let list = list.ok_or_else(|| entry.must_be("a list of texts"))?;
-            all(list.iter().map(text))
+            entry.list().ok_or_else(|| entry.must_be("a list"))
         };
+        let texts = |key| all(list(key)?.iter().map(text));
         // Where each series begins is for readers alone.
         texts("series")?;
+        let names = texts("files")?;
+        let lengths = list("bytes")?;
+        let lengths = all(lengths.iter().map(|entry| entry.count(0, u64::MAX)))?;
+        let checksums = texts("sha256")?;
+        let is_whole = names.len() == lengths.len() && names.len() == checksums.len();
+        if !is_whole {
+            return Err(required("files")?.must_be("as long as bytes and sha256"));
+        }
+        let files = names.into_iter().zip(lengths).zip(checksums);
+        let file = |((name, bytes), sha256)| SourceFile {
+            name,
+            bytes,
+            sha256,
+        };
         Ok(Self {
-            files: texts("files")?,
-            command: text(&required("command")?)?,
+            files: files.map(file).collect(),
+            rows: text(&required("rows")?)?,
+            options: text(&required("options")?)?,
             columns: texts("columns")?,
+            pure: texts("pure")?,
         })
     }
 

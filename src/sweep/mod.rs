@@ -39,7 +39,7 @@ pub use cost::{LARGE, certain_memory, predicted_cost, predicted_memory};
 pub use expression::Expression;
 pub use grid::Sweep;
 pub use job::{Identity, Job};
-pub use measured::Measured;
+pub use measured::{Measured, SourceFile};
 pub use plan::{
     Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, PartName, Plan, Totals,
 };

@@ -128,7 +128,7 @@ impl Point {
     }
 
     pub fn is_modulated(&self) -> bool {
-        self.parameters.modulation_amplitude > 0.0
+        self.parameters.is_modulated()
     }
 
     /// Brings the period into canonical form: derived where it is, absent without modulation.

@@ -106,8 +106,11 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         plan_version,
     };
     if sweep.measured.is_some() {
-        // An experiment knows what moves it, and what its file says.
-        let is_known = |symbol: &Symbol| symbol.is_of_modulation() || sweep.moves(*symbol);
+        // An experiment knows what moves it, and what its file says: of a tide, the period alone.
+        let is_known = |symbol: &Symbol| {
+            let has_amplitude = *symbol != Symbol::Delta || !sweep.moves(Symbol::T);
+            sweep.moves(*symbol) || (symbol.is_of_modulation() && has_amplitude)
+        };
         let unknown = Symbol::ALL.into_iter().filter(|symbol| !is_known(symbol));
         sweep.base.unknown = unknown.collect();
     }

@@ -97,6 +97,8 @@ pub struct Gaps {
     pub left_out: Vec<Cow<'static, str>>,
     /// Columns that are null in all rows.
     pub unknown: Vec<Cow<'static, str>>,
+    /// Columns whose numbers have no unit.
+    pub pure: Vec<String>,
 }
 
 /// Rows of one table, column by column, before they become a record batch. How rows came in leaves no trace in the
@@ -144,6 +146,10 @@ impl RowBuffer {
             } else if gaps.unknown.iter().any(|name| name == field.name()) {
                 self.is_unknown[place] = true;
                 fields.push(Arc::new(field.as_ref().clone().with_nullable(true)));
+            } else if gaps.pure.contains(field.name()) {
+                let mut metadata = field.metadata().clone();
+                metadata.insert(UNIT.to_owned(), String::new());
+                fields.push(Arc::new(field.as_ref().clone().with_metadata(metadata)));
             } else {
                 fields.push(FieldRef::clone(field));
             }

@@ -1,14 +1,15 @@
 //! Measured slips in the built program: read in any form, reduced as the model's, refused where they make no sense.
 
 use crate::program::{Cell, Folder, json};
+use crate::unreadable::fifo;
 use std::fs;
-use stickslip::measured::{Experiment, Request};
+use stickslip::measured::{Experiment, Given, Request, Sources};
 
 /// The model, as a source of slips: without modulation and with two.
 const MODEL: &str = "name = \"model\"\n[model]\nN = 10\nNs = 5\n[axes]\nseed = { count = 9 }\n\
                      zip = { Delta = [0, 1e-6, 1e-6], frequency = [29, 29, 58] }\n\
                      [record]\nslips = 60\ndiscard = 0\n";
-const COLUMNS: &str = "--column run=id --column onset=t:ms --column V0=v:um/s --column Delta=amp:µm \
+const COLUMNS: &str = "--decimal-comma --column run=id --column onset=t:ms --column V0=v:um/s --column Delta=amp:µm \
                        --column frequency=f --column drop=d:mN --column peak_force=F:kN";
 
 /// The slips of the model as an experiment would write them, with the seeds of each set counted on.
@@ -137,7 +138,7 @@ fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
     }
     let other = folder.ends(
         2,
-        "measured slips.csv -o out --column run=id --column onset=t --set V0=1e-4",
+        "measured slips.csv -o out --decimal-comma --column run=id --column onset=t --set V0=1e-4 --set Delta=0",
     );
     assert!(
         other.stderr.contains("holds other results"),
@@ -154,17 +155,23 @@ fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
     fs::write(&part, "damaged").unwrap();
     let next = folder.ends(4, "verify moved").stdout;
     assert!(
-        next.contains("stickslip measured slips.csv --column run=id"),
+        next.contains("stickslip measured ./slips.csv --column run=id"),
         "{next}"
     );
     folder.ends(0, "verify moved --repair");
     folder.ends(0, &command.replace("-o out", "-o moved"));
     assert_eq!(folder.tables("moved"), before);
     fs::rename(folder.path("moved"), folder.path("out")).unwrap();
-    folder.write("slips.csv", "changed");
-    assert!(verified(0).contains("slips.csv: differs from what was read"));
+    // One byte in as many, and fewer.
+    let read = fs::read_to_string(folder.path("slips.csv")).unwrap();
+    for changed in [read.replacen(';', ",", 1), "changed".to_owned()] {
+        folder.write("slips.csv", &changed);
+        assert!(verified(4).contains("slips.csv: differs from what was read"));
+    }
     fs::remove_file(folder.path("slips.csv")).unwrap();
-    assert!(verified(0).contains("slips.csv: cannot be read here"));
+    assert!(verified(0).contains("slips.csv: is not there"));
+    fifo(&folder.path("slips.csv"));
+    assert!(verified(0).contains("slips.csv: is not there"));
 
     for command in [
         "status out",
@@ -265,20 +272,23 @@ fn files_of_other_programs_just_work() {
         ("quoted.csv", plain.replace("onset", "\"onset\"")),
         ("comments.csv", format!("\n# rig 1\n\n{plain}\n\n")),
         ("tabs.tsv", plain.replace(',', "\t")),
-        ("german.csv", plain.replace(',', ";").replace('.', ",")),
+        ("semicolons.csv", plain.replace(',', ";")),
         ("spaces.csv", plain.replace(',', " , ")),
         (
             "missing.csv",
             plain
                 .replace("\n4.5,3", "\n4.5,NA")
-                .replace("\n9.5,3", "\n9.5,-"),
+                .replace("\n9.5,3", "\n9.5,-")
+                .replace("\n16.5,3", "\n16.5,nan")
+                .replace("\n25.5,3", "\n25.5,"),
         ),
         ("no-end.csv", plain.trim_end().to_owned()),
     ];
     let mut found = Vec::new();
     for (name, text) in forms {
         folder.write(name, &text);
-        folder.ends(0, &format!("measured {name} -o {name}-out --set V0=1e-4"));
+        let unmodulated = "--set V0=1e-4 --set Delta=0";
+        folder.ends(0, &format!("measured {name} -o {name}-out {unmodulated}"));
         found.push(folder.table(&format!("{name}-out"), "slips").reals("onset"));
     }
     assert!(found.iter().all(|onsets| *onsets == found[0]), "{found:?}");
@@ -313,6 +323,11 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
         (good.clone(), "--column onst=drop", "did you mean onset?"),
         (good.clone(), "--set drop=3", "beside --set drop"),
         (
+            good.clone(),
+            "--column drop=drop:1 --set drop=3",
+            "drop is given twice",
+        ),
+        (
             good.replace("\n4,3", "\n3,3"),
             "",
             "line 5: onset 3 s is not after 3 s",
@@ -325,9 +340,23 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
         (
             good.replace("\n4,3", "\nNaN,3"),
             "",
-            "line 5: onset = NaN: must be a number",
+            "line 5: onset is missing",
         ),
-        (good.replace("\n4,3", "\n,3"), "", "line 5: onset: is empty"),
+        (
+            good.replace("\n4,3", "\ninf,3"),
+            "",
+            "line 5: onset = inf: must be a number",
+        ),
+        (
+            good.replace("\n4,3", "\n4,inf"),
+            "",
+            "line 5: drop = inf: must be a number",
+        ),
+        (
+            good.replace("\n4,3", "\n,3"),
+            "",
+            "line 5: onset is missing",
+        ),
         (
             good.replace("\n4,3", "\n4,x"),
             "",
@@ -368,7 +397,7 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
         (
             good.clone(),
             "--maximum 1 --set maximum=2",
-            "gives a key twice",
+            "maximum is given twice",
         ),
         (
             good.clone(),
@@ -376,6 +405,96 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
             "allowed are onset, drop, peak_force, run, V0, Kd",
         ),
         (String::new(), "", "has no column onset"),
+        (
+            good.replace(",3", ",\"1,012\""),
+            "",
+            "drop = 1,012: has a comma; if commas are decimal in this file, add --decimal-comma",
+        ),
+        (
+            good.replace(',', "\t").replace("\t3", "\t1,012"),
+            "",
+            "line 2: drop = 1,012: has a comma",
+        ),
+        (
+            good.replace(',', ";").replace(";3", ";1.012"),
+            "--decimal-comma",
+            "line 2: drop = 1.012: has a point",
+        ),
+        (
+            good.replace("onset,drop\n", ""),
+            "",
+            "line 1: has numbers where names of columns must stand",
+        ),
+        (
+            format!("# {good}"),
+            "",
+            "line 1: if # onset,drop names the columns, remove the #",
+        ),
+        (
+            format!("sep=,\n{good}"),
+            "",
+            "line 1: sep= is for Excel alone",
+        ),
+        (
+            good.clone(),
+            "--set end=9",
+            "line 11: end is before the onset at 10 s",
+        ),
+        (
+            lines("onset,end", |n| format!("{n},{}", 20 + n / 9)),
+            "",
+            "line 10: end differs within a series",
+        ),
+        (
+            lines("onset,Delta,T", |n| {
+                format!("{n},{},1", if n == 7 { "" } else { "1e-6" })
+            }),
+            "",
+            "line 8: Delta is missing",
+        ),
+        (
+            lines("onset,Kd", |n| {
+                format!("{n},{}", if n == 7 { "NA" } else { "4e7" })
+            }),
+            "",
+            "line 8: Kd is missing",
+        ),
+        (
+            lines("onset,T", |n| {
+                format!("{n},{}", if n == 7 { "nan" } else { "1" })
+            }),
+            "",
+            "line 8: T is missing",
+        ),
+        (
+            lines("onset,run", |n| {
+                format!("{n},{}", if n == 7 { "-" } else { "a" })
+            }),
+            "",
+            "line 8: run is missing",
+        ),
+        (
+            lines("onset,maximum", |n| {
+                format!("{n},{}", if n == 7 { "" } else { "0.1" })
+            }),
+            "--set T=2",
+            "line 8: maximum is missing",
+        ),
+        (
+            lines("onset,delta", |n| format!("{n},1e-6")),
+            "--set T=2",
+            "column delta: is it Delta?",
+        ),
+        (
+            good.replace("drop", "Peak_Force [kN]"),
+            "",
+            "--column 'peak_force=Peak_Force [kN]:kN'",
+        ),
+        (
+            good.replace("onset,drop", "onset,T"),
+            "--set frequency=2",
+            "T and frequency are given",
+        ),
         (
             (0..50)
                 .map(|n| format!("c{n:02}"))
@@ -386,6 +505,11 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
         ),
         ("onset,drop\n".to_owned(), "", "has no slips"),
         ("\u{0}\u{1}PAR".to_owned(), "", "has no column onset"),
+        (
+            "onset\n1".to_owned(),
+            "--set V0=1e-4:furlong",
+            "furlong: must be m/s",
+        ),
         ("PAR1".to_owned(), "", "slips.csv: "),
         (
             good.clone(),
@@ -406,7 +530,20 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
         } else {
             "--set V0=1e-4"
         };
-        let refused = folder.ends(2, &format!("measured slips.csv -o out {speed} {options}"));
+        // What a tide has, or a table of its own amplitudes.
+        let amplitude = if ["T=", "Delta"]
+            .iter()
+            .any(|word| options.contains(word) || text.contains("Delta"))
+            || text.contains(",T")
+        {
+            ""
+        } else {
+            "--set Delta=0"
+        };
+        let refused = folder.ends(
+            2,
+            &format!("measured slips.csv -o out {speed} {amplitude} {options}"),
+        );
         assert!(
             refused.stderr.starts_with("error: ") && refused.stderr.contains(expected),
             "{expected}: {}",
@@ -423,7 +560,9 @@ fn series_are_refused_where_they_run_into_each_other_and_lines_are_counted_right
     folder.write("slips.csv", &good);
     let without = folder.ends(2, "measured slips.csv -o out");
     assert!(
-        without.stderr.contains("line 2: V0 is missing"),
+        without
+            .stderr
+            .contains("V0 is missing: --column V0=NAME:UNIT, or --set"),
         "{}",
         without.stderr
     );
@@ -431,25 +570,23 @@ fn series_are_refused_where_they_run_into_each_other_and_lines_are_counted_right
         "runs.csv",
         &lines("onset,run", |n| format!("{n},{}", n / 3 % 2)),
     );
-    let again = folder.ends(2, "measured runs.csv -o out --set V0=1e-4");
+    let again = folder.ends(2, "measured runs.csv -o out --set V0=1e-4 --set Delta=0");
     assert!(
         again.stderr.contains("line 7: run 0 begins again"),
         "{}",
         again.stderr
     );
-    let twice = folder.ends(2, "measured slips.csv slips.csv -o out --set V0=1e-4");
-    assert!(twice.stderr.contains("holds the same"), "{}", twice.stderr);
     // Lines count whatever ends them, and those without a row.
     let breaks = format!("# a\n\n{}", good.replace("\n4,3", "\n\n4,x")).replace('\n', "\r\n");
     folder.write("slips.csv", &breaks);
-    let counted = folder.ends(2, "measured slips.csv -o out --set V0=1e-4");
+    let counted = folder.ends(2, "measured slips.csv -o out --set V0=1e-4 --set Delta=0");
     assert!(
         counted.stderr.contains("line 8: drop = x"),
         "{}",
         counted.stderr
     );
     folder.write("slips.csv", &good);
-    let fast = folder.ends(0, "measured slips.csv -o fast --set V0=100");
+    let fast = folder.ends(0, "measured slips.csv -o fast --set V0=100 --set Delta=0");
     assert!(fast.stderr.contains("far too fast"), "{}", fast.stderr);
 }
 
@@ -476,7 +613,7 @@ fn a_missing_control_and_a_single_series_are_named() {
     for run in 0..24 {
         for slip in 1..40 {
             let shift = 0.125 * f64::from(run);
-            let time = 7.0 * f64::from(slip) + f64::from(slip * 5 % 7);
+            let time = 7.0 * f64::from(slip) + f64::from(slip * 5 % 7) + 0.001 * f64::from(run);
             rows.push(format!("free {run},{time},0,0"));
             let time = 30.0 * f64::from(slip) - 1.0 + shift;
             rows.push(format!("{run},{time},1e-6,{shift}"));
@@ -501,6 +638,287 @@ fn a_missing_control_and_a_single_series_are_named() {
     assert!(forgotten.stdout.contains(note), "{}", forgotten.stdout);
 }
 
+/// Irregular onsets, of which no two lists are equal.
+fn irregular(count: u32, seed: u32) -> Vec<f64> {
+    let interval = |n: u32| 1.0 + f64::from(n.wrapping_mul(2_654_435_761) >> 20) / 4096.0;
+    let mut time = 0.0;
+    let onset = |n| {
+        time += interval(n + 1000 * seed);
+        time
+    };
+    (0..count).map(onset).collect()
+}
+
+fn table(head: &str, rows: impl Iterator<Item = String>) -> String {
+    format!("{head}\n{}\n", rows.collect::<Vec<_>>().join("\n"))
+}
+
+#[test]
+fn the_same_slips_twice_are_refused_with_both_places() {
+    let folder = Folder::new();
+    let onsets = irregular(12, 0);
+    let text = table("onset", onsets.iter().map(f64::to_string));
+    folder.write("a.csv", &text);
+    folder.write("b.csv", &format!("# another byte\n{text}"));
+    let unmodulated = "--set V0=1e-4 --set Delta=0";
+    let twice = folder.ends(2, &format!("measured a.csv b.csv -o out {unmodulated}"));
+    let expected =
+        "b.csv, line 3: a series begins with the onsets and drops of that at a.csv, line 2";
+    assert!(twice.stderr.contains(expected), "{}", twice.stderr);
+    // Within a table, under other parameters.
+    let both = onsets.iter().map(|onset| format!("{onset},a,1e-4"));
+    let both = both.chain(onsets.iter().map(|onset| format!("{onset},b,2e-4")));
+    folder.write("both.csv", &table("onset,run,V0", both));
+    let twice = folder.ends(2, "measured both.csv -o out --set Delta=0");
+    assert!(
+        twice.stderr.contains("both.csv, line 14"),
+        "{}",
+        twice.stderr
+    );
+    // A clock is as regular as another, and few slips may be equal by rounding.
+    let few = onsets[..9].iter().map(f64::to_string);
+    folder.write("c.csv", &table("onset", few.clone()));
+    folder.write("d.csv", &format!("\n{}", table("onset", few)));
+    folder.ends(0, &format!("measured c.csv d.csv -o few {unmodulated}"));
+    let regular = || (1..20).map(|n: u32| format!("{}", f64::from(n)));
+    folder.write("e.csv", &table("onset", regular()));
+    folder.write("f.csv", &format!("\n{}", table("onset", regular())));
+    folder.ends(0, &format!("measured e.csv f.csv -o regular {unmodulated}"));
+}
+
+#[test]
+fn samples_of_a_trace_are_refused_and_slips_that_lock_are_not() {
+    let folder = Folder::new();
+    let every = |count: u32, seconds: f64| {
+        table(
+            "onset",
+            (1..=count).map(|n| format!("{}", seconds * f64::from(n))),
+        )
+    };
+    folder.write("trace.csv", &every(100, 0.0005));
+    let options = "--set V0=1e-4 --set Delta=1e-6";
+    let refused = folder.ends(
+        2,
+        &format!("measured trace.csv -o out {options} --set T=0.03"),
+    );
+    assert!(
+        refused.stderr.contains("samples of a trace"),
+        "{}",
+        refused.stderr
+    );
+    folder.write("short.csv", &every(99, 0.0005));
+    folder.ends(
+        0,
+        &format!("measured short.csv -o short {options} --set T=0.03"),
+    );
+    folder.write("locked.csv", &every(120, 0.06));
+    folder.ends(
+        0,
+        &format!("measured locked.csv -o locked {options} --set T=0.03"),
+    );
+    folder.ends(
+        2,
+        &format!("measured locked.csv -o out {options} --set T=0.04"),
+    );
+}
+
+#[test]
+fn a_tide_whose_amplitude_nobody_knows_has_phases_and_no_excess() {
+    let folder = Folder::new();
+    let onsets = irregular(40, 0);
+    folder.write(
+        "tide.csv",
+        &table("onset", onsets.iter().map(f64::to_string)),
+    );
+    let read = folder.ends(0, "measured tide.csv -o out --set V0=1e-9 --set T=0.7");
+    assert!(read.stdout.contains("Delta   not given"), "{}", read.stdout);
+    let sets = folder.file("out/reduced/sets.parquet");
+    for known in ["resultant_length", "locking_index", "phase_mean"] {
+        assert_eq!(sets.reals(known).len(), 1, "{known}");
+    }
+    for unknown in ["Delta", "eta", "resultant_drive", "resultant_excess"] {
+        assert!(
+            sets.column(unknown).all(|cell| *cell == Cell::Null),
+            "{unknown}"
+        );
+    }
+    let slips = folder.table("out", "slips");
+    for unknown in ["eta", "Delta", "Delta_onset"] {
+        assert!(
+            slips.column(unknown).all(|cell| *cell == Cell::Null),
+            "{unknown}"
+        );
+    }
+    for command in [
+        "show out --json",
+        "report out",
+        "plot out",
+        "export out --out csv --format csv",
+        "status out",
+    ] {
+        folder.ends(0, command);
+    }
+}
+
+#[test]
+fn the_end_of_records_says_how_much_too_short_the_mean_is() {
+    let folder = Folder::new();
+    let onsets = irregular(11, 0);
+    let text = table("onset", onsets.iter().map(f64::to_string));
+    folder.write("slips.csv", &text);
+    let command = "measured slips.csv --set V0=1e-4 --set Delta=0";
+    let without = folder.ends(0, &format!("{command} -o without")).stdout;
+    // cv^2/10 is 1 % there.
+    assert!(without.contains("variation of 0.32 on"), "{without}");
+    let with = folder
+        .ends(0, &format!("{command} -o with --set end=40:s"))
+        .stdout;
+    assert!(!with.contains("variation of"), "{with}");
+    let off = |directory: &str| {
+        let sets = folder.file(&format!("{directory}/reduced/sets.parquet"));
+        sets.reals("tau_mean_off").first().copied()
+    };
+    assert_eq!(off("without"), None);
+    let sets = folder.file("with/reduced/sets.parquet");
+    let variation = sets.reals("tau_sd")[0] / sets.reals("tau_mean")[0];
+    let expected = -variation * variation / 10.0;
+    assert!((off("with").unwrap() / expected - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn drops_that_are_no_force_have_a_shape_and_no_newtons() {
+    let folder = Folder::new();
+    let onsets = irregular(30, 0);
+    let rows = onsets
+        .iter()
+        .map(|onset| format!("{onset},{}", 0.1 + 0.01 * onset.fract()));
+    folder.write("slips.csv", &table("onset,mu", rows));
+    folder.ends(
+        0,
+        "measured slips.csv -o out --column drop=mu:1 --set V0=1e-4 --set Delta=0",
+    );
+    let sets = folder.file("out/reduced/sets.parquet");
+    for unknown in ["drop_mean", "drop_mean_low", "drop_sd", "drop_sd_high"] {
+        assert!(
+            sets.column(unknown).all(|cell| *cell == Cell::Null),
+            "{unknown}"
+        );
+    }
+    let slips = folder.table("out", "slips");
+    assert_eq!(slips.unit("drop"), "");
+    let drops = slips.reals("drop");
+    let mean = drops.iter().sum::<f64>() / 30.0;
+    let variance = drops.iter().map(|drop| (drop - mean).powi(2)).sum::<f64>() / 29.0;
+    let [variation] = sets.reals("drop_cv")[..] else {
+        panic!()
+    };
+    assert!(
+        (variation / (variance.sqrt() / mean) - 1.0).abs() < 1e-9,
+        "{variation}"
+    );
+    let other = folder.ends(
+        2,
+        "measured slips.csv -o no --column peak_force=mu:1 --set V0=1e-4 --set Delta=0",
+    );
+    assert!(
+        other.stderr.contains("1: must be N, or with prefixes"),
+        "{}",
+        other.stderr
+    );
+}
+
+#[test]
+fn what_is_read_is_said_before_anything_is_written() {
+    let folder = Folder::new();
+    folder.write(
+        "slips.csv",
+        &lines("t (ms),amp,note,rig", |n| format!("{}.5,0.6,x,7", n * n)),
+    );
+    let command = |rest: &str| {
+        let mut words = vec![
+            "measured",
+            "slips.csv",
+            "-o",
+            "out",
+            "--column",
+            "onset=t (ms):ms",
+        ];
+        words.extend([
+            "--column",
+            "Delta=amp:um",
+            "--set",
+            "V0=100:um/s",
+            "--set",
+            "T=0.03",
+        ]);
+        words.extend(rest.split_whitespace());
+        let ended = folder.run_words(&words, "");
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        ended.stdout
+    };
+    let said = command("--dry-run");
+    for line in [
+        "onset     column t (ms) (ms), 0.0015 to 0.1005 s",
+        "Delta     column amp (um), 0.0000006 to 0.0000006 m",
+        "V0        100 um/s",
+        "not used  note, rig",
+        "series    1",
+        "slips     10",
+    ] {
+        assert!(said.contains(line), "{said}");
+    }
+    assert!(!folder.path("out").exists());
+    assert!(command("").starts_with(&said));
+}
+
+#[test]
+fn ids_follow_from_what_was_read_and_not_from_where_it_lay() {
+    let folder = Folder::new();
+    fs::create_dir(folder.path("sub")).unwrap();
+    let text = table("onset", irregular(12, 0).iter().map(f64::to_string));
+    folder.write("a.csv", &text);
+    folder.write("sub/b.csv", &text.replace('\n', "\r\n"));
+    let options = "--set V0=1e-4 --set Delta=0";
+    folder.ends(0, &format!("measured a.csv -o out {options}"));
+    folder.ends(0, &format!("measured sub/b.csv -o other {options}"));
+    let ids = |directory: &str| {
+        let jobs = folder.table(directory, "jobs");
+        jobs.column("job_id").cloned().collect::<Vec<_>>()
+    };
+    assert_eq!(ids("out"), ids("other"));
+    // The same, read again from elsewhere, is nothing new; other numbers are.
+    fs::rename(folder.path("a.csv"), folder.path("sub/a.csv")).unwrap();
+    folder.ends(0, &format!("measured sub/a.csv -o out {options}"));
+    folder.write("a.csv", &text.replacen(".0", ".1", 1).replacen('1', "0", 1));
+    folder.ends(2, &format!("measured a.csv -o out {options}"));
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_refused_at_once_and_a_pipe_is_read_once() {
+    let folder = Folder::new();
+    let options = "--set V0=1e-4 --set Delta=0";
+    fifo(&folder.path("fifo"));
+    for path in ["fifo", "/dev/zero", "."] {
+        let refused = folder.ends(2, &format!("measured {path} -o out {options}"));
+        assert!(
+            refused.stderr.contains("is no file"),
+            "{path}: {}",
+            refused.stderr
+        );
+    }
+    let text = table("onset", irregular(12, 0).iter().map(f64::to_string));
+    let command = format!("measured /dev/stdin -o out {options}");
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let piped = folder.run_words(&words, &text);
+    assert_eq!(piped.code, Some(0), "{}", piped.stderr);
+    let verified = folder.ends(0, "verify out").stdout;
+    assert!(
+        verified.contains("/dev/stdin: came from a pipe, and is gone"),
+        "{verified}"
+    );
+}
+
 #[test]
 fn no_cut_or_changed_file_makes_a_panic() {
     let folder = Folder::new();
@@ -509,6 +927,11 @@ fn no_cut_or_changed_file_makes_a_panic() {
         "simulate --set N=10 --set Ns=5 --slips 9 --slip-table slips.parquet",
     );
     let parquet = fs::read(folder.path("slips.parquet")).unwrap();
+    let given = |text: &str| Given::parse_all("--set", &[text.to_owned()]).unwrap();
+    let request = Request {
+        sources: Sources::new(Vec::new(), given("Delta=0")).unwrap(),
+        ..Request::default()
+    };
     let text = lines("run,onset,drop,V0", |n| format!("\"a\",{n}.5,3e2,1e-4"));
     for (name, bytes) in [("a.csv", text.into_bytes()), ("a.parquet", parquet)] {
         let file = [folder.path(name)];
@@ -518,12 +941,7 @@ fn no_cut_or_changed_file_makes_a_panic() {
             changed[place] ^= 0x15;
             for bytes in [&bytes[..place], &changed] {
                 fs::write(&file[0], bytes).unwrap();
-                let read = Experiment::read(Request {
-                    files: &file,
-                    columns: &[],
-                    settings: &[],
-                    command: "",
-                });
+                let read = Experiment::read(&file, &request);
                 assert!(read.is_ok() || format!("{:#}", read.unwrap_err()).contains(name));
             }
         }

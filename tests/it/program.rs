@@ -76,9 +76,16 @@ impl Folder {
 
     /// Runs the program with arguments that contain no spaces.
     pub fn run(&self, arguments: &str) -> Ended {
+        let words: Vec<&str> = arguments.split_whitespace().collect();
+        self.run_words(&words, "")
+    }
+
+    /// Runs the program with these arguments and what a pipe gives it.
+    pub fn run_words(&self, words: &[&str], input: &str) -> Ended {
         let mut command = assert_cmd::Command::new(PROGRAM);
         let output = command
-            .args(arguments.split_whitespace())
+            .args(words)
+            .write_stdin(input)
             .current_dir(self.0.path())
             .timeout(LONGEST)
             .output()

@@ -161,7 +161,7 @@ fn a_file_that_does_not_fit_in_memory_is_named() {
 }
 
 /// Makes a FIFO, which nobody writes.
-fn fifo(path: &Path) {
+pub fn fifo(path: &Path) {
     mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
 }
 

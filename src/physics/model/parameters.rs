@@ -120,10 +120,15 @@ impl Parameters {
             self.set(symbol, symbol.checked(value).ok_or_else(refuse)?)?;
         }
         self.check_rules()?;
-        if self.modulation_amplitude == 0.0 {
+        if !self.is_modulated() {
             self.modulation_period = None;
         }
         Ok(self)
+    }
+
+    /// Whether the drive oscillates, be it by an amplitude that is not known.
+    pub fn is_modulated(&self) -> bool {
+        self.modulation_amplitude > 0.0 || self.unknown.contains(&Symbol::Delta)
     }
 
     /// Checks the rules between parameters, each of which is in its range.

@@ -7,6 +7,9 @@ use crate::solver::{
     Limits, Observer, SimulationError, Solver, Summary, simulate, simulate_audited,
 };
 use crate::value::words;
+use std::borrow::Cow;
+use std::fmt::Debug;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// What a job measures as a whole.
@@ -51,12 +54,29 @@ impl Regime {
     }
 }
 
+/// Slips that need not be held: each is made from what is known of it, in a third of the memory.
+pub trait MakesSlips: Debug + Send + Sync {
+    fn count(&self) -> usize;
+
+    /// The slip at a place, from 0.
+    fn slip(&self, place: usize) -> Slip;
+}
+
+impl PartialEq for dyn MakesSlips {
+    fn eq(&self, other: &Self) -> bool {
+        let mut places = 0..self.count();
+        self.count() == other.count() && places.all(|place| self.slip(place) == other.slip(place))
+    }
+}
+
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
     /// Onsets of the slips of start-up, in s.
     pub start_up: Vec<f64>,
     /// Slips past start-up, in order.
     pub slips: Vec<Slip>,
+    /// Slips that follow them and are made when they are written.
+    pub made: Option<Arc<dyn MakesSlips>>,
     /// Their precursors, in order; empty if not recorded.
     pub precursors: Vec<Precursor>,
     /// Ruptures of any size, start-up included.
@@ -76,6 +96,20 @@ impl Measurements {
     pub fn regime(&self) -> Option<Regime> {
         self.averages
             .map(|averages| Regime::at(averages.slip_share))
+    }
+
+    /// All slips past start-up, in order.
+    pub fn all_slips(&self) -> impl Iterator<Item = Cow<'_, Slip>> {
+        let made = self.made.iter().flat_map(|made| {
+            let slip = |place| Cow::Owned(made.slip(place));
+            (0..made.count()).map(slip)
+        });
+        self.slips.iter().map(Cow::Borrowed).chain(made)
+    }
+
+    pub fn slip_count(&self) -> u64 {
+        let made = self.made.as_ref().map_or(0, |made| made.count());
+        (self.slips.len() + made) as u64
     }
 }
 

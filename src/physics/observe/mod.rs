@@ -12,7 +12,7 @@ mod slip;
 mod slip_observer;
 
 pub use drops::Drops;
-pub use measure::{Averages, Measurements, Regime, measure};
+pub use measure::{Averages, MakesSlips, Measurements, Regime, measure};
 pub use recording::{Recording, RecordingKey};
 pub use records::{
     AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow,
