@@ -3,7 +3,7 @@
 use super::{Findings, MethodRow, Study, other_settings, others_in_words, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
-use crate::results::destination::{Destination, Kind, refuse_reserved};
+use crate::results::destination::{Destination, refuse_reserved};
 use crate::table::arrow;
 use crate::table::file::PROGRAM;
 use crate::table::storage::{Disk, Storage};
@@ -43,25 +43,20 @@ pub fn to_json(study: &Study, findings: &Findings) -> Value {
     })
 }
 
-/// Refuses a folder in which something would be lost.
+/// Refuses what is no folder, and one among the data of a results directory.
 pub fn check(folder: &Path) -> Result<()> {
     refuse_reserved(folder)?;
-    for name in Disk.list(folder)? {
-        let file = folder.join(name);
-        if let Some(kind) = Kind::of_name(&file) {
-            Destination::new(&file, kind)?;
-        }
-    }
+    Disk.list(folder)?;
     Ok(())
 }
 
 /// Writes what a study found into a folder, over what an earlier one left there, with a figure for the sets that differ
-/// in the modulation alone; returns the files. `stop` says whether a signal came to stop the command.
+/// in the modulation alone; returns the files. A signal sets `stop`.
 pub fn write(
     study: &Study,
     findings: &Findings,
     folder: &Path,
-    stop: fn() -> Result<&'static AtomicBool>,
+    stop: &AtomicBool,
 ) -> Result<Vec<PathBuf>> {
     let mut sets: Vec<Parameters> = Vec::new();
     for set in study.sets.iter().map(Parameters::without_modulation) {
@@ -70,7 +65,8 @@ pub fn write(
         }
     }
     let mut documents = vec![(
-        "accuracy.json".to_owned(),
+        "accuracy".to_owned(),
+        "json",
         to_json(study, findings).to_string().into_bytes(),
     )];
     for set in sets {
@@ -78,15 +74,14 @@ pub fn write(
         let others: String = others.collect();
         let name = format!("work-precision-V0-{:e}{others}", set.drive_velocity);
         let picture = work_precision_figure(&set, findings)?;
-        documents.push((format!("{name}.svg"), picture.svg().into_bytes()));
-        documents.push((format!("{name}.png"), picture.png()?));
+        documents.push((name.clone(), "svg", picture.svg().into_bytes()));
+        documents.push((name, "png", picture.png()?));
     }
     Disk.ensure_folder(folder)?;
     let mut files = Vec::new();
-    for (name, bytes) in documents {
-        let file = folder.join(name);
-        let kind = Kind::of_name(&file).unwrap_or(Kind::NEW);
-        Destination::new(&file, kind)?.write(stop, |mut file| Ok(file.write(&bytes)?))?;
+    for (name, extension, bytes) in documents {
+        let file = folder.join(format!("{name}.{extension}"));
+        Destination::new(&file, extension)?.write(stop, |mut file| Ok(file.write(&bytes)?))?;
         files.push(file);
     }
     Ok(files)
@@ -239,7 +234,7 @@ mod tests {
         };
         let findings = findings();
         check(folder.path()).unwrap();
-        let files = write(&study, &findings, folder.path(), || Ok(&NEVER)).unwrap();
+        let files = write(&study, &findings, folder.path(), &NEVER).unwrap();
         let left = std::fs::read_dir(folder.path()).unwrap().count();
         assert_eq!(left, files.len(), "a draft stayed");
         let names: Vec<_> = files
@@ -266,14 +261,10 @@ mod tests {
         );
         assert_eq!(json["methods"][1]["median_break_error"], Value::Null);
         assert_eq!(json["biases"][0]["quantity"], "interval");
-        check(folder.path()).expect("over an earlier study");
-        for file in &files {
-            let bytes = std::fs::read(file).unwrap();
-            std::fs::write(file, "mine").unwrap();
-            let error = check(folder.path()).unwrap_err();
-            assert!(error.to_string().contains("was not replaced"), "{error}");
-            std::fs::write(file, bytes).unwrap();
-        }
+        check(folder.path()).unwrap();
+        let again = write(&study, &findings, folder.path(), &NEVER).unwrap();
+        assert_eq!(again, files, "over an earlier study");
+        check(&files[0]).unwrap_err();
     }
 
     #[test]

@@ -109,7 +109,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     accuracy::check(&out)?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
-    let files = accuracy::write(&study, &findings, &out, catch_signals)?;
+    let files = accuracy::write(&study, &findings, &out, catch_signals()?)?;
     if arguments.json {
         output::print(&format!("{:#}\n", accuracy::to_json(&study, &findings)))?;
     } else {

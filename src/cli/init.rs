@@ -2,8 +2,9 @@
 
 use super::sweep::{Preset, Variation, changes, preset_parser, vary};
 use super::{Exit, output};
-use crate::results::destination::{Destination, Kind};
+use crate::results::destination::{Destination, THERE};
 use crate::sweep::Sweep;
+use crate::table::error::ResultsError;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
@@ -109,7 +110,10 @@ pub fn init(arguments: &Arguments) -> Result<Exit> {
         let begin = text.find("name = ").unwrap_or(0);
         text.replace_range(..begin, &format!("# {question}\n"));
     }
-    output::write(&Destination::new(file, Kind::NEW)?, text.as_bytes())?;
+    if file.symlink_metadata().is_ok() {
+        return Err(ResultsError::refused(file, THERE).into());
+    }
+    output::write(&Destination::new(file, "toml")?, text.as_bytes())?;
     let path = shown(file);
     let quoted = output::quoted_path(file);
     output::report(&format!(

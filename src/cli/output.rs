@@ -42,7 +42,7 @@ pub fn warn(warnings: &[String]) {
 }
 
 pub fn write(file: &Destination, bytes: &[u8]) -> Result<()> {
-    file.write(catch_signals, |mut file| Ok(file.write(bytes)?))
+    file.write(catch_signals()?, |mut file| Ok(file.write(bytes)?))
 }
 
 /// Prints a value as JSON, with the version of its form.

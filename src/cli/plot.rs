@@ -8,7 +8,7 @@ use crate::figure::{
 };
 use crate::reduce::{SetRow, SlipOfSet, renew};
 use crate::results::Results;
-use crate::results::destination::{Destination, Kind};
+use crate::results::destination::Destination;
 use crate::table::columns::{Column, Row as _};
 use crate::table::shown::shown;
 use anyhow::Result;
@@ -129,9 +129,8 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
 /// Where a picture goes, and the format that the name ends in.
 pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
     let extension = file.extension().and_then(|extension| extension.to_str());
-    let format = extension.and_then(Format::from_word);
-    match format.zip(Kind::of_name(file)) {
-        Some((format, kind)) => Ok((Destination::new(file, kind)?, format)),
+    match extension.and_then(Format::from_word) {
+        Some(format) => Ok((Destination::new(file, format.word())?, format)),
         None => Err(UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into()),
     }
 }

@@ -3,13 +3,15 @@
 use super::{Exit, layout, message, output};
 use crate::reduce::NoJobs;
 use crate::results::Results;
-use crate::results::destination::{Destination, Kind};
+use crate::results::destination::Destination;
 use crate::results::layout::Layout;
 use crate::run::{RunEvent, RunReport};
 use crate::table::shown::shown;
+use crate::table::storage::{StorageError, StoredFile};
 use anyhow::Result;
 use clap::Args;
-use std::path::PathBuf;
+use std::fs::OpenOptions;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Write one HTML page to explore a results directory in a browser
@@ -27,7 +29,7 @@ pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// File to write, over an earlier report [default: report.html in DIR]
+    /// File to write, as .html, or a device such as /dev/stdout [default: report.html in DIR]
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -36,18 +38,28 @@ pub fn report(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&layout(&arguments.directory))?;
     let path = match &arguments.out {
         None => crate::report::write(&results, None)?,
+        Some(device) if is_device(device) => {
+            let file = OpenOptions::new().append(true).open(device);
+            let file = file.map_err(StorageError::at("write", device))?;
+            let page = crate::report::page(&results, None)?;
+            // Nothing follows the page there.
+            StoredFile::new(device, file).write(page.as_bytes())?;
+            return Ok(Exit::Done);
+        }
         Some(path) => {
-            let destination = Destination::new(path, Kind::REPORT)?;
+            let destination = Destination::new(path, "html")?;
             let page = crate::report::page(&results, None)?;
             output::write(&destination, page.as_bytes())?;
             path.clone()
         }
     };
-    // Where the page itself went to standard output, nothing follows it.
-    if path.is_file() {
-        output::print(&format!("{}\n", shown(&path)))?;
-    }
+    output::print(&format!("{}\n", shown(&path)))?;
     Ok(Exit::Done)
+}
+
+/// Whether a place is written to as it is. Memory has files like those of a disk.
+fn is_device(place: &Path) -> bool {
+    place.starts_with("/dev") && !place.starts_with("/dev/shm")
 }
 
 /// Least time between two reports of a run.

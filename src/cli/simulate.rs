@@ -10,7 +10,7 @@ use super::{Exit, UsageError, catch_signals};
 use crate::figure::simulation;
 use crate::model::{Parameters, Selected, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
-use crate::results::destination::{Destination, Kind};
+use crate::results::destination::Destination;
 use crate::results::tables::{self, All, DriveAndSeed, JobOutcome, SlipRow};
 use crate::sets::Digits;
 use crate::single_job::{self, Records, Request};
@@ -19,7 +19,6 @@ use crate::sweep::{Change, Sweep};
 use crate::table::Table;
 use crate::table::arrow::{self, Gaps};
 use crate::table::file::{Footer, TableWriter};
-use crate::table::shown::shown;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -72,7 +71,7 @@ struct JobFlags {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Tables, as Parquet")]
+#[command(next_help_heading = "Tables, as .parquet")]
 struct TableFlags {
     /// Write shear force, displacement and attached fraction over time
     #[arg(long, value_name = "FILE")]
@@ -196,6 +195,8 @@ enum Panel {
 }
 
 const JSON_FORMAT: u32 = 1;
+/// The extension of tables.
+const TABLE: &str = "parquet";
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let changes = arguments.job.changes()?;
@@ -252,7 +253,7 @@ struct Tables<'a> {
 impl Tables<'_> {
     fn write<R: Table>(&self, path: Option<&Path>, rows: impl Iterator<Item = R>) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
-        Destination::new(path, Kind::PARQUET)?.write(catch_signals, |file| {
+        Destination::new(path, TABLE)?.write(catch_signals()?, |file| {
             let mut writer = TableWriter::new(self.gaps, path, file, self.footer)?;
             for row in rows {
                 writer.push(&row)?;
@@ -281,10 +282,7 @@ impl Arguments {
         ];
         let mut all = Vec::new();
         for table in tables.into_iter().flatten() {
-            if table.exists() && !table.is_file() {
-                return Err(UsageError(format!("{}: must be a file", shown(table))).into());
-            }
-            all.push(Destination::new(table, Kind::PARQUET)?);
+            all.push(Destination::new(table, TABLE)?);
         }
         for file in &self.plot.files {
             all.push(picture_file(file)?.0);

@@ -7,108 +7,51 @@ use crate::results::layout::{Layout, RUN};
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::shown::shown;
 use crate::table::storage::{Disk, Storage, StorageError, StoredFile};
-use std::fs::{self, File, Permissions};
-use std::io::{self, Read};
-use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+use std::fs::{self, Permissions};
+use std::io;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use tempfile::{Builder, TempDir};
 
 const PREFIX: &str = ".stickslip-";
-/// Bytes at the beginning of a file that say what it is.
-const BEGINNING: u64 = 1024;
-const THERE: &str = "is there already and was not changed; choose another name";
+pub const THERE: &str = "is there already and was not changed; choose another name";
 
-/// What a file holds. An existing file is replaced by its own kind only.
-#[derive(Clone, Copy, Debug)]
-pub struct Kind {
-    name: &'static str,
-    /// Its first bytes, and bytes that come soon after.
-    signs: [&'static [u8]; 2],
-}
-
-impl Kind {
-    /// No existing file is replaced.
-    pub const NEW: Self = Self::new("", [b"", b""]);
-    pub const REPORT: Self = Self::new("a report", [b"<!doctype html>", b"<title>stickslip "]);
-    pub const PARQUET: Self = Self::new("a Parquet file", [b"PAR1", b""]);
-
-    const fn new(name: &'static str, signs: [&'static [u8]; 2]) -> Self {
-        Self { name, signs }
-    }
-
-    pub fn of_name(file: &Path) -> Option<Self> {
-        match file.extension()?.to_str()? {
-            "parquet" => Some(Self::PARQUET),
-            "json" => Some(Self::new("an accuracy.json", [b"{\"b", b""])),
-            "svg" => Some(Self::new("an SVG", [b"<", b"<svg"])),
-            "png" => Some(Self::new("a PNG", [b"\x89PNG\r\n\x1a\n", b""])),
-            "pdf" => Some(Self::new("a PDF", [b"%PDF-", b""])),
-            _ => None,
-        }
-    }
-
-    /// Whether a file with this beginning is of this kind, or empty.
-    fn may_be(self, beginning: &[u8]) -> bool {
-        let [first, later] = self.signs;
-        let has_later = || beginning.windows(later.len()).any(|seen| seen == later);
-        beginning.is_empty() || beginning.starts_with(first) && (later.is_empty() || has_later())
-    }
-}
-
+/// A file that is written over an earlier one. Its name says what it holds, so that no sweep file or note is lost.
 #[derive(Debug)]
 pub struct Destination {
     path: PathBuf,
     /// Where links lead.
     place: PathBuf,
-    /// Whether it is a device or a FIFO, which is not replaced.
-    is_device: bool,
 }
 
 impl Destination {
     /// Refuses a place where nothing can be written, or where something would be lost.
-    pub fn new(path: &Path, kind: Kind) -> Result<Self, ResultsError> {
+    pub fn new(path: &Path, extension: &str) -> Result<Self, ResultsError> {
         let refused = |problem: &str| Err(ResultsError::refused(path, problem));
-        let there = fs::metadata(path).ok();
-        if path.is_dir() {
-            return refused("is a folder; name a file in it");
-        }
-        if there.is_some() && kind.name.is_empty() {
-            return refused(THERE);
-        }
-        let destination = |place: PathBuf, is_device: bool| Self {
-            path: path.to_owned(),
-            place,
-            is_device,
-        };
-        if there.as_ref().is_some_and(|there| !there.is_file()) {
-            return Ok(destination(path.to_owned(), true));
-        }
         let place = resolved(path)?;
+        if place.extension().is_none_or(|its| its != extension) {
+            let problem =
+                format!("must end in .{extension}; so must the file that a link leads to");
+            return refused(&problem);
+        }
         if !place.parent().is_some_and(Path::is_dir) {
             return refused("its folder does not exist; make it, or name another file");
         }
-        refuse_reserved(path)?;
-        if there.is_some() {
-            let mut beginning = Vec::new();
-            let read = Disk
-                .open(&place)?
-                .take(BEGINNING)
-                .read_to_end(&mut beginning);
-            read.map_err(StorageError::at("read", path))?;
-            if !kind.may_be(&beginning) {
-                return refused(&format!(
-                    "is not {} and was not replaced; name another file, or remove this one",
-                    kind.name
-                ));
-            }
+        if fs::symlink_metadata(&place).is_ok_and(|there| !there.is_file()) {
+            return refused("is there and is no regular file; name another file");
         }
-        Ok(destination(place, false))
+        refuse_reserved(path)?;
+        Ok(Self {
+            path: path.to_owned(),
+            place,
+        })
     }
 
     pub fn refuse_same(all: &[Self]) -> Result<(), ResultsError> {
         for (number, one) in all.iter().enumerate() {
-            if let Some(other) = all[..number].iter().find(|other| one.is_same(other)) {
+            let mut others = all[..number].iter();
+            if let Some(other) = others.find(|other| one.place == other.place) {
                 let other = shown(&other.path);
                 let problem = format!("is the same file as {other}; give each output its own");
                 return Err(ResultsError::refused(&one.path, problem));
@@ -117,27 +60,14 @@ impl Destination {
         Ok(())
     }
 
-    fn is_same(&self, other: &Self) -> bool {
-        let inode = |file: &Self| {
-            let there = fs::metadata(&file.place);
-            there.map(|there| (there.dev(), there.ino())).ok()
-        };
-        self.place == other.place || inode(self).is_some_and(|of_one| Some(of_one) == inode(other))
-    }
-
-    /// Writes the whole file, or leaves the earlier one after an error or if `stop` is set. A device has no flag.
+    /// Writes the whole file, or leaves the earlier one after an error or if `stop` is set.
     pub fn write(
         &self,
-        stop: impl FnOnce() -> anyhow::Result<&'static AtomicBool>,
+        stop: &AtomicBool,
         write: impl FnOnce(StoredFile) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let failed = |error: io::Error| StorageError::at("write", &self.path)(error);
         let place = &self.place;
-        if self.is_device {
-            let device = File::options().write(true).open(&self.path);
-            return write(StoredFile::new(&self.path, device.map_err(failed)?));
-        }
-        let stop = stop()?;
         let before = fs::metadata(place).ok();
         // The draft of a private file is private, too.
         let mode = if before.is_some() { 0o600 } else { 0o666 };
@@ -150,12 +80,8 @@ impl Destination {
         let file = draft.as_file().try_clone().map_err(failed)?;
         write(StoredFile::new(&self.path, file))?;
         if let Some(before) = before {
-            // Only root gives files away; a group that cannot be kept has no rights.
-            let _ = fchown(draft.as_file(), Some(before.uid()), None);
-            let is_of_group = fchown(draft.as_file(), None, Some(before.gid())).is_ok();
-            let kept = if is_of_group { 0o777 } else { 0o707 };
-            let mode = Permissions::from_mode(before.mode() & kept);
-            draft.as_file().set_permissions(mode).map_err(failed)?;
+            let kept = draft.as_file().set_permissions(before.permissions());
+            kept.map_err(failed)?;
         }
         draft.as_file().sync_all().map_err(failed)?;
         refuse_stopped(stop, &self.path)?;
@@ -175,7 +101,7 @@ impl NewFolder {
     pub fn new(path: &Path) -> Result<Self, ResultsError> {
         refuse_within_results(path, |_| true)?;
         let place = resolved(path)?;
-        let there = fs::metadata(&place).ok();
+        let there = fs::symlink_metadata(&place).ok();
         let is_empty = || fs::read_dir(&place).is_ok_and(|mut names| names.next().is_none());
         if there.is_some() && !is_empty() {
             return Err(ResultsError::refused(path, THERE));
@@ -243,10 +169,6 @@ fn resolved(path: &Path) -> Result<PathBuf, ResultsError> {
     let found = fs::canonicalize(here).map_err(StorageError::at("look up", path));
     match (found, path.parent(), path.file_name()) {
         (Err(error), Some(parent), Some(name)) if error.is_missing() => {
-            if path.is_symlink() {
-                let problem = "is a link that leads nowhere; remove it, or choose another name";
-                return Err(ResultsError::refused(path, problem));
-            }
             Ok(resolved(parent)?.join(name))
         }
         (place, ..) => Ok(place?),
@@ -264,15 +186,14 @@ pub fn refuse_stopped(stop: &AtomicBool, path: &Path) -> Result<(), ResultsError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::{FileTypeExt, chown, symlink};
-    use std::process::Command;
+    use std::os::unix::fs::{MetadataExt, symlink};
+    use std::os::unix::net::UnixListener;
 
     static NEVER: AtomicBool = AtomicBool::new(false);
     static STOPPED: AtomicBool = AtomicBool::new(true);
-    const PARQUET: &[u8] = b"PAR1 and more";
 
-    fn put(path: &Path, kind: Kind, bytes: &[u8]) -> anyhow::Result<()> {
-        Destination::new(path, kind)?.write(|| Ok(&NEVER), |mut file| Ok(file.write(bytes)?))
+    fn put(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+        Destination::new(path, "png")?.write(&NEVER, |mut file| Ok(file.write(bytes)?))
     }
 
     #[track_caller]
@@ -300,92 +221,72 @@ mod tests {
     #[test]
     fn a_file_is_replaced_where_links_lead_and_no_draft_remains() {
         let folder = tempfile::tempdir().unwrap();
-        let [file, link] = ["file", "link"].map(|name| folder.path().join(name));
-        symlink("file", &link).unwrap();
-        assert_refused(Destination::new(&link, Kind::PARQUET), "leads nowhere");
-        put(&file, Kind::PARQUET, b"PAR1 old").unwrap();
-        put(&link, Kind::PARQUET, PARQUET).unwrap();
+        let [file, link] = ["file.png", "link"].map(|name| folder.path().join(name));
+        symlink("file.png", &link).unwrap();
+        put(&file, b"old").unwrap();
+        put(&link, b"new").unwrap();
         assert!(link.is_symlink());
-        assert_refused(
-            Destination::new(folder.path(), Kind::PARQUET),
-            "is a folder",
-        );
-        let destination = Destination::new(&file, Kind::PARQUET).unwrap();
+        let destination = Destination::new(&file, "png").unwrap();
         let half = |mut file: StoredFile| {
-            file.write(b"PAR1 half")?;
+            file.write(b"half")?;
             anyhow::bail!("full")
         };
-        destination.write(|| Ok(&NEVER), half).unwrap_err();
-        let whole = |mut file: StoredFile| Ok(file.write(b"PAR1 stopped")?);
-        destination.write(|| Ok(&STOPPED), whole).unwrap_err();
-        assert_eq!(fs::read(&file).unwrap(), PARQUET);
-        assert_eq!(names(folder.path()), ["file", "link"]);
+        destination.write(&NEVER, half).unwrap_err();
+        let whole = |mut file: StoredFile| Ok(file.write(b"stopped")?);
+        destination.write(&STOPPED, whole).unwrap_err();
+        assert_eq!(fs::read(&file).unwrap(), b"new");
+        assert_eq!(names(folder.path()), ["file.png", "link"]);
     }
 
     #[test]
-    fn a_replaced_file_keeps_owner_and_mode_and_a_new_one_has_those_of_any_other() {
+    fn a_replaced_file_keeps_its_mode_and_a_new_one_has_that_of_any_other() {
         let folder = tempfile::tempdir().unwrap();
-        let [private, new, other] =
-            ["private", "new", "other"].map(|name| folder.path().join(name));
-        fs::write(&private, "").unwrap();
-        fs::set_permissions(&private, Permissions::from_mode(0o640)).unwrap();
-        // As root only.
-        let _ = chown(&private, Some(1234), Some(1235));
-        let rights = |file: &Path| {
-            let there = fs::metadata(file).unwrap();
-            (there.mode(), there.uid(), there.gid())
-        };
-        let before = rights(&private);
-        put(&private, Kind::PARQUET, PARQUET).unwrap();
-        assert_eq!(rights(&private), before);
-        put(&new, Kind::PARQUET, PARQUET).unwrap();
-        fs::write(&other, "").unwrap();
-        assert_eq!(rights(&new), rights(&other));
-    }
-
-    #[test]
-    fn what_is_not_of_the_kind_that_is_written_is_kept() {
-        let folder = tempfile::tempdir().unwrap();
-        let of_name = |name| Kind::of_name(Path::new(name)).unwrap();
-        let page = "<!doctype html>\n<head>\n<title>stickslip report</title>";
-        let svg = "<?xml version=\"1.0\"?>\n<!-- edited -->\n<svg xmlns=\"\">";
-        let kinds = [
-            (Kind::REPORT, page.as_bytes()),
-            (Kind::PARQUET, PARQUET),
-            (of_name("a.json"), b"{\"breaks\":100}"),
-            (of_name("a.svg"), svg.as_bytes()),
-            (of_name("a.png"), b"\x89PNG\r\n\x1a\n..."),
-            (of_name("a.pdf"), b"%PDF-1.7"),
-        ];
-        let others: [&[u8]; 8] = [
-            b"name = \"sweep\"",
-            b"\n",
-            b"\0",
-            b"<!doctype html>\n<title>thesis</title>",
-            b"{\"mine\": 1}",
-            b"P",
-            b"\x89PN",
-            b"<svg",
-        ];
-        let file = folder.path().join("file");
-        for (number, (kind, own)) in kinds.into_iter().enumerate() {
-            let of_other_kinds = kinds
-                .iter()
-                .enumerate()
-                .filter(|(other, _)| *other != number);
-            let foreign = of_other_kinds.map(|(_, (_, bytes))| *bytes).chain(others);
-            // The least that begins like an SVG is one.
-            for foreign in foreign.filter(|bytes| kind.name != "an SVG" || *bytes != b"<svg") {
-                fs::write(&file, foreign).unwrap();
-                assert_refused(Destination::new(&file, kind), "was not replaced");
-                assert_eq!(fs::read(&file).unwrap(), foreign);
-            }
-            for before in [b"", own] {
-                fs::write(&file, before).unwrap();
-                put(&file, kind, own).unwrap();
-                assert_refused(Destination::new(&file, Kind::NEW), "is there already");
-            }
+        let [old, new, other] =
+            ["old.png", "new.png", "other.png"].map(|name| folder.path().join(name));
+        let mode = |file: &Path| fs::metadata(file).unwrap().mode() & 0o777;
+        fs::write(&old, "").unwrap();
+        for kept in [0o640, 0o666] {
+            fs::set_permissions(&old, Permissions::from_mode(kept)).unwrap();
+            put(&old, b"image").unwrap();
+            assert_eq!(mode(&old), kept);
         }
+        put(&new, b"image").unwrap();
+        fs::write(&other, "").unwrap();
+        assert_eq!(mode(&new), mode(&other));
+    }
+
+    #[test]
+    fn what_is_no_file_of_the_name_that_is_written_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("note.toml"), "mine").unwrap();
+        fs::create_dir(path("folder.png")).unwrap();
+        let _socket = UnixListener::bind(path("socket.png")).unwrap();
+        for (target, link) in [
+            ("nowhere.png", "dangling.png"),
+            ("note.toml", "to_note.png"),
+            ("folder.png", "to_folder.png"),
+            ("socket.png", "to_socket.png"),
+            ("loop.png", "loop.png"),
+        ] {
+            symlink(target, path(link)).unwrap();
+        }
+        for (name, words) in [
+            ("note.toml", "must end in .png"),
+            ("new", "must end in .png"),
+            ("png", "must end in .png"),
+            (".png", "must end in .png"),
+            ("to_note.png", "must end in .png"),
+            ("folder.png", "no regular file"),
+            ("socket.png", "no regular file"),
+            ("to_folder.png", "no regular file"),
+            ("to_socket.png", "no regular file"),
+            ("dangling.png", "no regular file"),
+        ] {
+            assert_refused(Destination::new(&path(name), "png"), words);
+        }
+        Destination::new(&path("loop.png"), "png").unwrap_err();
+        assert_eq!(fs::read(path("note.toml")).unwrap(), b"mine");
     }
 
     #[test]
@@ -393,26 +294,23 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         fs::create_dir(path("below")).unwrap();
-        fs::write(path("there"), "").unwrap();
-        symlink("there", path("link")).unwrap();
+        fs::write(path("there.png"), "").unwrap();
+        symlink("there.png", path("link")).unwrap();
         symlink(".", path("here")).unwrap();
-        fs::hard_link(path("there"), path("hard")).unwrap();
-        let destinations = |names: [&str; 2]| {
-            names.map(|name| Destination::new(&path(name), Kind::PARQUET).unwrap())
-        };
+        let destinations =
+            |names: [&str; 2]| names.map(|name| Destination::new(&path(name), "png").unwrap());
         for same in [
-            ["new", "new"],
-            ["new", "./new"],
-            ["new", "below/../new"],
-            ["new", "here/new"],
-            ["there", "link"],
-            ["there", "hard"],
-            ["link", "here/hard"],
+            ["new.png", "new.png"],
+            ["new.png", "./new.png"],
+            ["new.png", "below/../new.png"],
+            ["new.png", "here/new.png"],
+            ["there.png", "link"],
+            ["link", "here/there.png"],
         ] {
             assert_refused(Destination::refuse_same(&destinations(same)), "same file");
         }
-        for different in [["new", "there"], ["new", "below/new"], ["new", "NEW"]] {
-            Destination::refuse_same(&destinations(different)).unwrap();
+        for different in ["there.png", "below/new.png", "NEW.png"] {
+            Destination::refuse_same(&destinations(["new.png", different])).unwrap();
         }
     }
 
@@ -421,35 +319,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::thread::scope(|scope| {
             for number in 0..8 {
-                let file = folder.path().join(number.to_string());
+                let file = folder.path().join(format!("{number}.png"));
                 scope.spawn(move || {
                     for round in 0..50 {
-                        let bytes = format!("PAR1 {number} {round}");
-                        put(&file, Kind::PARQUET, bytes.as_bytes()).unwrap();
+                        let bytes = format!("{number} {round}");
+                        put(&file, bytes.as_bytes()).unwrap();
                         assert_eq!(fs::read_to_string(&file).unwrap(), bytes);
                     }
                 });
             }
         });
         assert_eq!(names(folder.path()).len(), 8);
-    }
-
-    #[test]
-    fn a_pipe_is_written_to_and_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let pipe = folder.path().join("pipe");
-        let made = Command::new("mkfifo").arg(&pipe).status().unwrap();
-        assert!(made.success());
-        std::thread::scope(|scope| {
-            let read = scope.spawn(|| fs::read_to_string(&pipe).unwrap());
-            let destination = Destination::new(&pipe, Kind::REPORT).unwrap();
-            let flag = || panic!("signals must end the program");
-            destination
-                .write(flag, |mut file| Ok(file.write(b"page")?))
-                .unwrap();
-            assert_eq!(read.join().unwrap(), "page");
-        });
-        assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
     }
 
     #[test]
@@ -462,25 +342,31 @@ mod tests {
         fs::remove_dir(path("d/reduced")).unwrap();
         symlink("../elsewhere", path("d/reduced")).unwrap();
         for refused in [
-            "d/tables/x",
-            "d/tables/slips/x",
-            "d/run/x",
-            "d/reduced/x",
-            "link/tables/slips/x",
-            "tables/slips/x",
-            "elsewhere/../d/run/x",
-            "d/figures/../tables/x",
+            "d/tables/x.png",
+            "d/tables/slips/x.png",
+            "d/run/x.png",
+            "d/reduced/x.png",
+            "link/tables/slips/x.png",
+            "tables/slips/x.png",
+            "elsewhere/../d/run/x.png",
+            "d/figures/../tables/x.png",
         ] {
             assert_refused(
-                Destination::new(&path(refused), Kind::PARQUET),
+                Destination::new(&path(refused), "png"),
                 "lies in the results directory",
             );
         }
-        for allowed in ["x", "d/x", "d/figures/x", "d/tables/../x", "elsewhere/x"] {
-            Destination::new(&path(allowed), Kind::PARQUET).unwrap();
+        for allowed in [
+            "x.png",
+            "d/x.png",
+            "d/figures/x.png",
+            "d/tables/../x.png",
+            "elsewhere/x.png",
+        ] {
+            Destination::new(&path(allowed), "png").unwrap();
         }
         assert_refused(
-            Destination::new(&path("missing/x"), Kind::PARQUET),
+            Destination::new(&path("missing/x.png"), "png"),
             "folder does not exist",
         );
     }
@@ -490,6 +376,7 @@ mod tests {
         let folder = folder_with_results();
         let path = |name: &str| folder.path().join(name);
         symlink("d/figures", path("link")).unwrap();
+        symlink("nowhere", path("dangling")).unwrap();
         fs::create_dir_all(path("mine/thesis")).unwrap();
         for (refused, words) in [
             ("d/x", "lies in the results directory"),
@@ -499,6 +386,7 @@ mod tests {
             ("mine/../d/x", "lies in the results directory"),
             ("d", "lies in the results directory"),
             ("mine", "is there already"),
+            ("dangling", "is there already"),
         ] {
             assert_refused(NewFolder::new(&path(refused)), words);
         }

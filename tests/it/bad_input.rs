@@ -568,7 +568,7 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
             "simulate --trace missing/trace.parquet",
             &["missing/trace.parquet: its folder does not exist"],
         ),
-        ("simulate --map empty", &["empty: must be a file"]),
+        ("simulate --map empty", &["empty: must end in .parquet"]),
         (
             "simulate --contacts plain.txt/c.parquet",
             &["plain.txt/c.parquet: its folder does not exist"],
@@ -712,11 +712,11 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
 #[test]
 fn what_is_no_file_is_not_replaced_by_one() {
     let folder = Folder::new();
-    let _socket = std::os::unix::net::UnixListener::bind(folder.path("socket")).unwrap();
+    let _socket = std::os::unix::net::UnixListener::bind(folder.path("socket.parquet")).unwrap();
     assert_refused(
         &folder,
-        "simulate --trace socket",
-        &["socket: must be a file"],
+        "simulate --trace socket.parquet",
+        &["socket.parquet: is there and is no regular file"],
     );
     folder.write("good.toml", GOOD);
     std::os::unix::fs::symlink("nowhere", folder.path("link")).unwrap();

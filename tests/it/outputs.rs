@@ -27,30 +27,30 @@ fn folder_with_results() -> Folder {
 }
 
 #[test]
-fn no_output_replaces_what_is_not_of_its_kind() {
+fn no_output_replaces_what_has_not_a_name_of_its_kind() {
     let folder = folder_with_results();
-    folder.write("thesis.html", "<!doctype html>\n<title>thesis</title>");
-    fs::create_dir(folder.path("study")).unwrap();
-    for name in ["a.svg", "a.png", "a.pdf", "study/accuracy.json"] {
-        folder.write(name, "mine");
-    }
+    folder.write("note", "mine");
+    symlink("note", folder.path("link.html")).unwrap();
     // Found to be wrong after a computation of days, this would come too late.
     let long = "simulate --set N=2000 --slips 1000000";
     let commands = [
         "report r -o a.toml".to_owned(),
-        "report r -o thesis.html".to_owned(),
+        "report r -o note".to_owned(),
+        "report r -o link.html".to_owned(),
         "report r -o r/reduced/sets.parquet".to_owned(),
-        "plot r --x V0 --y tau_mean -o a.svg".to_owned(),
-        "plot r --x V0 --y tau_mean -o a.pdf".to_owned(),
-        "accuracy -o study".to_owned(),
+        "plot r --x V0 --y tau_mean -o r/run/a.svg".to_owned(),
+        "plot r --x V0 --y tau_mean -o note".to_owned(),
+        "accuracy -o note".to_owned(),
         "init a.toml".to_owned(),
+        "init note".to_owned(),
+        "init new".to_owned(),
         format!("{long} --trace a.toml"),
         format!("{long} --map a.toml"),
         format!("{long} --profile a.toml"),
         format!("{long} --contacts a.toml"),
         format!("{long} --slip-table a.toml"),
         format!("{long} --slip-table r/tables/slips/part-000-000000.parquet"),
-        format!("{long} --plot a.png"),
+        format!("{long} --plot a.toml"),
         format!("{long} --plot new.svg --plot ./new.svg"),
         format!("{long} --trace new.parquet --map ./new.parquet"),
         format!("{long} --trace missing/new.parquet"),
@@ -64,12 +64,12 @@ fn no_output_replaces_what_is_not_of_its_kind() {
 }
 
 #[test]
-fn an_output_replaces_its_own_kind_and_keeps_the_mode() {
+fn an_output_replaces_a_file_of_its_name_and_keeps_the_mode() {
     let folder = folder_with_results();
     let commands = [
-        ("report r -o page", "page"),
+        ("report r -o page.html", "page.html"),
         ("plot r --x V0 --y tau_mean -o own.svg", "own.svg"),
-        (&format!("{JOB} --trace table"), "table"),
+        (&format!("{JOB} --trace table.parquet"), "table.parquet"),
         (&format!("{JOB} --plot own.png"), "own.png"),
     ];
     for (command, name) in commands {
@@ -84,7 +84,7 @@ fn an_output_replaces_its_own_kind_and_keeps_the_mode() {
     }
     folder.ends(0, "report r -o /dev/null");
     let page = folder.ends(0, "report r -o /dev/stdout").stdout;
-    assert!(page.starts_with("<!doctype html>"));
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
     let names = folder.contents("").into_keys();
     let drafts = names.filter(|path| path.to_string_lossy().contains(".stickslip-"));
     assert_eq!(drafts.count(), 0);
