@@ -524,8 +524,8 @@ fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
 }
 
 fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
-    let jobs = jobs_of_sets(rows, |row| row.jobs_cut.unwrap_or(0))?;
-    let cut = rows.iter().filter(|row| row.jobs_cut > Some(0));
+    let jobs = jobs_of_sets(rows, |row| row.jobs_cut)?;
+    let cut = rows.iter().filter(|row| row.jobs_cut > 0);
     let off = cut.filter_map(|row| row.tau_off).reduce(f64::min);
     let off = off.map(|off| format!(", by up to about {:.1} %", -100.0 * off));
     let off = off.unwrap_or_default();

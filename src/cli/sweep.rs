@@ -33,54 +33,17 @@ const PRESETS: [Preset; 26] = presets! {
     "sliding-velocity" "stochasticity" "tide" "triggering"
 };
 
-/// Former names of presets, and what stands in their place.
-const FORMER: [(&str, &str); 18] = [
-    ("contacts", "--preset locking-contacts"),
-    ("disorder", "--preset locking-disorder"),
-    ("drive-alone", "--preset locking-drive-alone"),
-    ("eq1", "stickslip simulate --set dfs=0 --set max_time=0.063"),
-    ("excess", "--preset locking-drive-alone"),
-    ("fig1d", "stickslip simulate --slips 9"),
-    (
-        "fig3-full",
-        "--preset fig3 --axis V0=log:1e-6:2e-4:13 --axis eta=log:0.2:1000:49 --axis seed=count:10 --set slips=20",
-    ),
-    ("fig4b", "stickslip simulate --slips 2"),
-    (
-        "fig4d",
-        "stickslip simulate --set Delta=1e-6 --set frequency=58 --slips 16",
-    ),
-    (
-        "friction-precise",
-        "--preset friction --set of=mean_friction --set absolute=3 --set 'seeds={from=24,to=128}'",
-    ),
-    ("fronts", "--preset fig4"),
-    ("regimes", "--preset sliding-regimes"),
-    ("size", "--preset locking-size"),
-    ("staircase", "--preset locking-staircase"),
-    ("startup", "--preset choices-startup"),
-    ("stiff-drive", "--preset locking-stiff-drive"),
-    ("tongue-4", "--preset locking-tongue"),
-    ("velocity", "--preset sliding-velocity"),
-];
-
-/// The names that `--preset` takes; former names are rejected with what stands in their place.
+/// The names that `--preset` takes.
 pub fn preset_parser() -> impl TypedValueParser<Value = Preset> {
-    let current = PRESETS
+    let names = PRESETS
         .iter()
         .map(|preset| PossibleValue::new(preset.name).help(preset.question()));
-    let former = FORMER
-        .iter()
-        .map(|(name, _)| PossibleValue::new(*name).hide(true));
-    PossibleValuesParser::new(current.chain(former)).try_map(|name| Preset::named(&name))
+    PossibleValuesParser::new(names).try_map(|name| Preset::named(&name))
 }
 
 impl Preset {
     /// The preset of a name that [`preset_parser`] knows.
     pub fn named(name: &str) -> Result<Self, String> {
-        if let Some((_, now)) = FORMER.iter().find(|(former, _)| *former == name) {
-            return Err(format!("it is now `{now}`"));
-        }
         let preset = PRESETS.into_iter().find(|preset| preset.name == name);
         preset.ok_or_else(|| "there is no such preset".to_owned())
     }
@@ -231,18 +194,5 @@ mod tests {
             assert!(figure.starts_with("# Figure"), "{figure}");
         }
         assert!(PRESETS.is_sorted_by_key(|preset| preset.name));
-    }
-
-    #[test]
-    fn a_former_name_is_rejected_with_what_stands_in_its_place() {
-        for (name, now) in FORMER {
-            let command = clap::Command::new("run")
-                .arg(clap::arg!(--preset <NAME>).value_parser(preset_parser()));
-            let error = command.try_get_matches_from(["run", "--preset", name]);
-            assert!(error.unwrap_err().to_string().contains(now), "{name}");
-            if let Some(name) = now.strip_prefix("--preset ") {
-                Preset::named(name.split(' ').next().unwrap()).unwrap();
-            }
-        }
     }
 }

@@ -366,11 +366,8 @@ impl SetJobs {
             Some((seed, averages))
         };
         self.averages.extend(averages());
-        // Earlier versions also wrote one for jobs that `max_time` ended.
-        if job.outcome == JobOutcome::NoSlips {
-            let running = job.running_interval.map(|interval| (seed, interval));
-            self.running.extend(running);
-        }
+        let running = job.running_interval.map(|interval| (seed, interval));
+        self.running.extend(running);
         self.regime = match (self.regime, job.regime) {
             (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
             (regime, other) => other.or(regime),
@@ -390,7 +387,7 @@ impl SetJobs {
             finished_jobs: self.finished.len() as u64,
             failed_jobs: self.failed,
             jobs_without_slips: self.without_slips,
-            jobs_cut: Some(self.cut),
+            jobs_cut: self.cut,
             regime: self.regime,
             slip_share: slip_share.value(),
             slip_share_interval: slip_share.interval().map(|ends| Interval {
@@ -627,8 +624,12 @@ pub(super) mod tests {
             parameters: jobs_without_modulation(),
             ..SetJobs::default()
         };
+        let gave_up = outcome == JobOutcome::NoSlips;
         for (seed, &interval) in (0..).zip(waited) {
-            set.push(seed, &facts(outcome, 1.0, 430.0, Some(interval)));
+            set.push(
+                seed,
+                &facts(outcome, 1.0, 430.0, gave_up.then_some(interval)),
+            );
         }
         let slips = [0.1, 0.3, 0.5].map(|interval| slip(Some(interval), None));
         reduced(&set, slips)
@@ -660,7 +661,6 @@ pub(super) mod tests {
 
     #[test]
     fn a_cut_interval_counts_for_nothing_and_the_set_says_how_much_is_missing() {
-        // What earlier versions saw of it is in their tables.
         let row = ended(JobOutcome::TimeLimit, &[0.2, 0.2]);
         let whole = ended(JobOutcome::Done, &[]);
         assert_eq!(
@@ -669,7 +669,7 @@ pub(super) mod tests {
         );
         assert_eq!(
             (row.jobs_cut, row.tau_bound, whole.tau_off),
-            (Some(2), None, None)
+            (2, None, None)
         );
         // Of three intervals with cv = 0.2/0.3, two jobs lost one each.
         assert_close(row.tau_off, -(0.04 / 0.09) * 2.0 / 3.0);

@@ -108,7 +108,7 @@ impl Census {
             let set = set?;
             census.sets += 1;
             census.slips += set.slips;
-            census.jobs_cut += set.jobs_cut.unwrap_or(0);
+            census.jobs_cut += set.jobs_cut;
             let off = census.tau_off.into_iter().chain(set.tau_off);
             census.tau_off = off.reduce(f64::min);
             let regime = set.regime.map_or("", Regime::word);

@@ -100,7 +100,6 @@ pub struct RunReport {
     pub parts_committed: u64,
     /// Whether a signal or the walltime stopped the run before all was done.
     pub stopped: bool,
-    #[serde(default)]
     pub marked: Vec<Marked>,
     /// Hosts of the workers that run the jobs which are left.
     pub hosts: Vec<String>,

@@ -48,7 +48,6 @@ pub struct Worker {
     /// When it began, in the ticks of its system: a later process may have the same id.
     process_start: Option<u64>,
     /// The identity of its results directory, where the host has one.
-    #[serde(default)]
     directory: Option<Directory>,
     /// Checksum of its sweep file.
     sweep: String,

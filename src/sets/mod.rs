@@ -56,7 +56,7 @@ columns! {
         failed_jobs: u64 = "", "jobs that failed";
         is_control as "control": bool = "", "whether its jobs are controls alone (`control = true`)";
         jobs_without_slips: u64 = "", "finished jobs that gave up as no slip came";
-        jobs_cut: Option<u64> = "", "finished jobs whose last interval `max_time` cut; null in reduced data of earlier versions";
+        jobs_cut: u64 = "", "finished jobs whose last interval `max_time` cut";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ", "regime";
         slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs", "slip share" "Share of time within slips";
         slip_share_interval as "slip_share": Option<Interval> = "", "lower end of its 95 % confidence interval, of jobs as units";

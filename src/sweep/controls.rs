@@ -13,9 +13,6 @@ use crate::model::Parameters;
 use std::collections::{BTreeSet, HashSet};
 use std::ops::RangeInclusive;
 
-/// The version of the plan from which controls that no job needs are left out.
-const ONLY_NEEDED: u32 = 7;
-
 impl Axis {
     /// What is left of it without modulation; `None` if nothing is.
     fn unmodulated(&self) -> Option<Self> {
@@ -57,8 +54,7 @@ impl Sweep {
             controls: None,
             ..self.clone()
         };
-        let drops_conditions = controls.conditions.len() < self.conditions.len();
-        if drops_conditions && self.plan_version >= ONLY_NEEDED {
+        if controls.conditions.len() < self.conditions.len() {
             controls.needed = Some(self.needed_of(&controls));
         }
         controls
@@ -114,7 +110,7 @@ impl Plan<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Extension, Job, PLAN_VERSION};
+    use super::super::{Extension, Job};
     use super::*;
     use std::path::Path;
 
@@ -179,15 +175,15 @@ mod tests {
     }
 
     #[test]
-    fn only_controls_that_a_job_needs_are_run_but_a_directory_keeps_those_of_its_version() {
+    fn only_controls_that_a_job_needs_are_run() {
         let text = |condition: &str| {
             format!(
                 "name = \"a\"\nwhere = \"{condition}\"\n[record]\ncontrol = true\n[axes]\nV0 = [1e-5, 1e-4]\n\
                  Delta = [3e-7, 6e-7]\neta = [0.5, 2]\nseed = {{ first = 3, count = 2 }}\n"
             )
         };
-        let velocities = |condition: &str, version: u32| -> Vec<(f64, u64)> {
-            let sweep = Sweep::parse_stored(&text(condition), Path::new("test.toml"), version);
+        let velocities = |condition: &str| -> Vec<(f64, u64)> {
+            let sweep = Sweep::parse(&text(condition), Path::new("test.toml"));
             controls(&sweep.unwrap())
                 .iter()
                 .map(|job| (job.parameters.drive_velocity, job.parameters.seed))
@@ -196,20 +192,10 @@ mod tests {
         let slow = [(1e-5, 3), (1e-5, 4)];
         let fast = [(1e-4, 3), (1e-4, 4)];
         let all = [slow, fast].concat();
-        for condition in [
-            "V0 * eta < 1.5e-4",
-            "eta < 1 and V0 < 5e-5",
-            "eta < V0 * 1e4",
-        ] {
-            assert_eq!(velocities(condition, ONLY_NEEDED - 1), all, "{condition}");
-        }
-        assert_eq!(velocities("V0 * eta < 1.5e-4", PLAN_VERSION), all);
-        assert_eq!(velocities("eta < 1 and V0 < 5e-5", PLAN_VERSION), slow);
-        assert_eq!(velocities("eta < V0 * 1e4", PLAN_VERSION), fast);
-        assert_eq!(
-            velocities("seed > 3 and V0 * eta > 1e-4", PLAN_VERSION),
-            fast
-        );
+        assert_eq!(velocities("V0 * eta < 1.5e-4"), all);
+        assert_eq!(velocities("eta < 1 and V0 < 5e-5"), slow);
+        assert_eq!(velocities("eta < V0 * 1e4"), fast);
+        assert_eq!(velocities("seed > 3 and V0 * eta > 1e-4"), fast);
     }
 
     #[test]

@@ -19,9 +19,6 @@ use crate::sets::AllButSeed;
 use crate::solver::Solver;
 use std::ops::Range;
 
-/// The version of the plan from which conditions see twelve digits of what fixes the period.
-const CONDITIONS_SEE_COLUMNS: u32 = 7;
-
 #[derive(Clone, Debug)]
 pub struct Sweep {
     pub(super) name: String,
@@ -38,7 +35,6 @@ pub struct Sweep {
     pub(super) measured: Option<Measured>,
     /// In a sweep of controls, the sets that are run, in order; `None`: all.
     pub(super) needed: Option<Vec<u64>>,
-    pub(super) plan_version: u32,
 }
 
 impl Sweep {
@@ -341,11 +337,9 @@ impl Sweep {
     pub(super) fn admits(&self, point: &Point) -> bool {
         let number = |&quantity: &Quantity| {
             let number = point.number(quantity);
-            let is_derived = matches!(quantity, Quantity::Eta | Quantity::Frequency);
-            if is_derived && self.plan_version >= CONDITIONS_SEE_COLUMNS {
-                to_twelve_digits(number)
-            } else {
-                number
+            match quantity {
+                Quantity::Eta | Quantity::Frequency => to_twelve_digits(number),
+                Quantity::Parameter(_) => number,
             }
         };
         let mut conditions = self.conditions.iter();

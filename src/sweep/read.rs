@@ -10,7 +10,6 @@ use super::expression::Expression;
 use super::grid::Sweep;
 use super::job::{Identity, VERSIONS};
 use super::measured::Measured;
-use super::plan::PLAN_VERSION;
 use super::quantity::{Point, Quantity};
 use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
@@ -41,26 +40,25 @@ impl Sweep {
     /// Reads the text of a sweep file; the path is for messages only.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SweepError> {
         let source = Source::new(path, text);
-        read(&source, true, PLAN_VERSION).map_err(|_| source.error())
+        read(&source, true).map_err(|_| source.error())
     }
 
     /// The same with a text that was made of something, such as flags.
     pub fn parse_made(text: &str, of: &str) -> Result<Self, SweepError> {
         let mut source = Source::new(Path::new(of), text);
         source.made_of = Some(of);
-        read(&source, true, PLAN_VERSION).map_err(|_| source.error())
+        read(&source, true).map_err(|_| source.error())
     }
 
-    /// The same with a text that a results directory holds, under its version of the plan: what its sweep was allowed
-    /// when it began stays readable.
-    pub fn parse_stored(text: &str, path: &Path, plan_version: u32) -> Result<Self, SweepError> {
+    /// The same with a text that a results directory holds: what its sweep was allowed when it began stays readable.
+    pub fn parse_stored(text: &str, path: &Path) -> Result<Self, SweepError> {
         let source = Source::new(path, text);
-        read(&source, false, plan_version).map_err(|_| source.error())
+        read(&source, false).map_err(|_| source.error())
     }
 }
 
 /// Reads the whole file, also past mistakes.
-fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, Refused> {
+fn read(source: &Source<'_>, is_new: bool) -> Result<Sweep, Refused> {
     let table = source.table()?;
     let file = Section {
         source,
@@ -103,7 +101,6 @@ fn read(source: &Source<'_>, is_new: bool, plan_version: u32) -> Result<Sweep, R
         rounds: rounds?,
         controls: None,
         needed: None,
-        plan_version,
     };
     if sweep.measured.is_some() {
         // An experiment knows what moves it, and what its file says: of a tide, the period alone.

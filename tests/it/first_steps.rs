@@ -43,14 +43,6 @@ fn a_sweep_of_the_paper_runs_without_a_file_and_can_be_changed() {
     assert!(folder.ends(0, "plan my-map.toml").stdout.contains("my-map"));
     let unknown = folder.ends(2, "run --preset fig33");
     assert!(unknown.stderr.contains("fig3"), "{}", unknown.stderr);
-    let former = folder.ends(2, "run --preset velocity");
-    assert!(
-        former
-            .stderr
-            .contains("it is now `--preset sliding-velocity`"),
-        "{}",
-        former.stderr
-    );
     let both = folder.ends(2, "plan my-map.toml --preset fig3");
     assert!(
         both.stderr.contains("cannot be used with"),

@@ -33,7 +33,6 @@ mod program;
 mod pulses;
 mod ramp;
 mod regimes;
-mod released;
 mod report;
 mod rounds;
 mod runs;

@@ -11,7 +11,7 @@ SOURCES = {
     path: path.read_text()
     for folder in ("src", "python", "tests", "benches", "scripts")
     for path in sorted((ROOT / folder).rglob("*"))
-    if path.is_file() and path.suffix in ("", ".rs", ".py", ".js") and "released" not in path.parts
+    if path.is_file() and path.suffix in ("", ".rs", ".py", ".js")
 }
 DOCUMENTS = [ROOT / "README.md", ROOT / "results" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 #: A name of several words.

@@ -1,7 +1,6 @@
 //! Rounds end, whatever a condition leaves out, and a stop is obeyed between two of them.
 
 use super::*;
-use crate::sweep::PLAN_VERSION;
 use proptest::prelude::*;
 
 /// Far more than any of these sweeps has when each round brings new points.
@@ -19,7 +18,7 @@ fn in_rounds(condition: &str, rounds: &str, control: bool) -> Option<Sweep> {
          V0 = {{ linear = [1e-4, 2e-4], points = 3 }}\n[record]\nslips = 3\ncontrol = {control}\n\
          {rounds}seeds = {{ from = 24, to = 60 }}\n"
     );
-    Sweep::parse_stored(&text, Path::new("test.toml"), PLAN_VERSION).ok()
+    Sweep::parse_stored(&text, Path::new("test.toml")).ok()
 }
 
 /// Intervals of slips that grow with the velocity and vary with the seed.
