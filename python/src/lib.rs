@@ -53,7 +53,7 @@ mod _stickslip {
     #[pymodule_export]
     use super::measured::measured;
     #[pymodule_export]
-    use super::results::{read, reduce, sweep_of};
+    use super::results::{read, reduce, side_by_side, sweep_of};
     #[pymodule_export]
     use super::run::run;
     #[pymodule_export]

@@ -23,7 +23,8 @@ pub fn measured(
     set: Vec<KeyFromUnit>,
     out: PathBuf,
 ) -> PyResult<Vec<(String, String)>> {
-    let experiment = read(stream, &columns, &set).map_err(|error| Error::Sweep(format!("{error:#}")))?;
+    let experiment =
+        read(stream, &columns, &set).map_err(|error| Error::Sweep(format!("{error:#}")))?;
     let sweep = &experiment.sweep;
     watched(
         py,
@@ -53,7 +54,8 @@ pub fn measured(
 
 fn read(stream: &[u8], columns: &[KeyFromUnit], set: &[KeyFromUnit]) -> anyhow::Result<Experiment> {
     let given = |(key, from, unit): &KeyFromUnit| Given::new(key, from, unit.as_deref());
-    let all = |given_all: &[KeyFromUnit]| given_all.iter().map(given).collect::<anyhow::Result<_>>();
+    let all =
+        |given_all: &[KeyFromUnit]| given_all.iter().map(given).collect::<anyhow::Result<_>>();
     let request = Request {
         sources: Sources::new(all(columns)?, all(set)?)?,
         options: format!("columns={columns:?}, set={set:?}"),

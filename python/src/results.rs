@@ -9,8 +9,9 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use stickslip::figure::Beside;
 use stickslip::reduce::{
-    BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, TriggerRow, renew,
+    BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, TriggerRow, read_sets, renew,
 };
 use stickslip::results::exported::{JoinedTable, with_columns};
 use stickslip::results::layout::Layout;
@@ -32,6 +33,32 @@ pub fn sweep_of(py: Python<'_>, directory: PathBuf) -> PyResult<(String, String)
         ))
     });
     Ok(sweep?)
+}
+
+/// The names of directories side by side, and in what each differs from others.
+#[pyfunction]
+pub fn side_by_side(
+    py: Python<'_>,
+    directories: Vec<PathBuf>,
+    names: Vec<String>,
+) -> PyResult<Vec<(String, String)>> {
+    let described = py.detach(|| {
+        let layouts: Vec<Layout<'_>> = directories
+            .iter()
+            .map(|directory| Layout::new(&Disk, directory))
+            .collect();
+        let all = layouts.iter().map(|layout| renew(&Results::read(layout)?));
+        let all: Vec<Results<'_>> = all.collect::<anyhow::Result<_>>()?;
+        let Some((first, others)) = all.split_first() else {
+            return Ok(Vec::new());
+        };
+        let beside = Beside::read(first, others, &names)?;
+        let sets = read_sets(first.layout()).collect::<Result<Vec<_>, _>>()?;
+        let described = beside.described(&sets);
+        let described = described.map(|(name, settings)| (name.to_owned(), settings));
+        Ok::<_, Error>(described.collect())
+    });
+    Ok(described?)
 }
 
 /// Reduces the tables of a results directory.

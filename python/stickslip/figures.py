@@ -5,11 +5,10 @@ Each returns its axes, so that anything can be added or changed: `axes.set_xlim(
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ._stickslip import ResultsError, Table, minimum_phase
+from ._stickslip import ResultsError, Table, minimum_phase, side_by_side
 from .guesses import Guessed
 
 if TYPE_CHECKING:
@@ -86,28 +85,35 @@ class Plot(Guessed):
         return getattr(self, figure.replace("-", "_"))(**options)
 
     @_styled()
-    def phase_eta(self, axes: "Axes | None" = None, others: "Sequence[Tables]" = ()) -> "Axes":
+    def phase_eta(
+        self, axes: "Axes | None" = None, others: "Sequence[Tables]" = (), legend: Sequence[str] = ()
+    ) -> "Axes":
         """Phases of slips (rad) against eta, with means of all slips in bins of eta and where Eq. 2 lets slips begin (Fig. 3e).
 
-        Of other directories, computed or measured, the means are hollow marks under their names:
-        `results.plot.phase_eta(others=[stickslip.open("results/mine")])`.
+        Of other directories, computed or measured, the means are hollow marks:
+        `results.plot.phase_eta(others=[stickslip.open("results/mine")])`. `legend` names all directories, this one first; by
+        default, they have the shortest ends of their paths that differ. What differs between them stands above the axes.
         """
+        described = side_by_side([results.directory for results in (self._results, *others)], list(legend))
         points = self._slips("phase")
         axes = axes or _new_axes()
         low, high = 0.8 * points["eta"].min(), 1.25 * points["eta"].max()
         axes.axvspan(min(low, 1), 1, color="0.9", zorder=0, label=r"$\eta$ < 1")
         _scatter(axes, points, "eta", "phase")
         label = r"mean of all slips in a bin of $\eta$, 95 %"
+        label = f"{described[0][0]}: {label}" if described else label
         _mark(axes, self._mean_phases(points), fmt="o", color=AVERAGE, markersize=4.5, label=label)
-        for other, marker in zip(others, cycle("sDv^"), strict=False):
+        for other, (name, _), marker in zip(others, described[1:], "Dsv^p", strict=False):
             plot = Plot(other)
             means = plot._mean_phases(plot._slips("phase"))
             hollow = {"markerfacecolor": "white", "markersize": 6, "zorder": 4}
-            _mark(axes, means, fmt=marker, color="black", label=other.name, **hollow)
+            _mark(axes, means, fmt=marker, color="black", label=name, **hollow)
             low, high = min(low, 0.8 * means["eta_low"].min()), max(high, 1.25 * means["eta_high"].max())
         axes.plot(*_least_phases(high), color=THEORY, linewidth=1.6, label=r"$\phi_{\min}$, Eq. 2")
         label = r"$\eta = 2\pi\Delta/(T\,V_0)$"
         axes.set(xscale="log", xlim=(low, high), xlabel=label, ylabel=r"Phase $\phi$ (rad)")
+        differing = [f"{name}: {settings}".replace("$", r"\$") for name, settings in described if settings]
+        axes.set_title("\n".join(differing), loc="left", fontsize=9)
         axes.xaxis.set_major_formatter("{x:g}")
         _in_units_of_pi(axes)
         # No slip begins there.

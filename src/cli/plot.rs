@@ -3,12 +3,13 @@
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
-    CustomFigure, Dots, Format, Limits, Look, Other, Size, Style, draw_all, draw_custom,
-    write_custom,
+    Beside, CustomFigure, Dots, Drawn, Format, Limits, Look, Size, Style, draw_all, draw_custom,
+    remarks, write_custom,
 };
 use crate::reduce::{SetRow, SlipOfSet, renew};
 use crate::results::Results;
 use crate::results::destination::Destination;
+use crate::results::layout::Layout;
 use crate::table::columns::{Column, Row as _};
 use crate::table::shown::shown;
 use anyhow::Result;
@@ -47,6 +48,10 @@ pub struct Arguments {
     /// of sets. Repeatable
     #[arg(long = "with", value_name = "DIR")]
     others: Vec<PathBuf>,
+    /// Name of a directory in legends, in their order, the first one's first; repeat it for each [default: the shortest
+    /// ends of their paths that differ]
+    #[arg(long, value_name = "NAME", requires = "others")]
+    legend: Vec<String>,
     #[command(flatten)]
     custom: CustomFlags,
     /// File of the custom figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
@@ -93,36 +98,42 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let results = renew(&Results::read(&layout(directory))?)?;
     let layout = results.layout();
     let look = arguments.look(&results);
-    let other =
-        |directory: &PathBuf| Other::read(&renew(&Results::read(&self::layout(directory))?)?);
-    let others = arguments
+    let layouts: Vec<Layout<'_>> = arguments
         .others
         .iter()
-        .map(other)
-        .collect::<Result<Vec<Other>>>()?;
+        .map(|other| self::layout(other))
+        .collect();
+    let others = layouts.iter().map(|other| renew(&Results::read(other)?));
+    let others = others.collect::<Result<Vec<Results<'_>>>>()?;
+    let beside = Beside::read(&results, &others, &arguments.legend)?;
     if arguments.custom.of == Dots::Slips && !others.is_empty() {
         let problem = "--with: figures of slips show one directory; leave --of slips out";
         return Err(UsageError(problem.to_owned()).into());
     }
-    let files = if let Some(figure) = arguments.custom.figure() {
-        let picture = draw_custom(&results, &others, &figure, &look)?;
+    let drawn = if let Some(figure) = arguments.custom.figure() {
+        let picture = draw_custom(&results, &beside, &figure, &look)?;
         if look.style == Style::Print {
             output::report(&format!("for the caption: {}", picture.note()));
         }
-        match &out {
+        let remarks = remarks(std::slice::from_ref(&picture));
+        let files = match &out {
             None => write_custom(layout, picture, &look, &arguments.format)?,
             Some((out, format)) => {
                 output::write(out, &picture.encoded(*format)?)?;
                 arguments.out.iter().cloned().collect()
             }
-        }
+        };
+        Drawn { files, remarks }
     } else {
-        draw_all(layout, &others, &look, &arguments.format)?
+        draw_all(layout, &beside, &look, &arguments.format)?
     };
-    if files.is_empty() {
+    for remark in &drawn.remarks {
+        output::report(remark);
+    }
+    if drawn.files.is_empty() {
         output::report("there is nothing to draw: no set has a result");
     }
-    output::lines(files.iter().map(|path| shown(path).to_string()))?;
+    output::lines(drawn.files.iter().map(|path| shown(path).to_string()))?;
     Ok(Exit::Done)
 }
 

@@ -2,13 +2,14 @@
 
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
-use crate::model::{Parameters, Selected, Selection, Symbol};
+use crate::model::{Parameters, Selected, Selection, Symbol, Value as Parameter};
 use crate::reduce::{
-    Condition, EdgeRow, FREQUENCY, Interval, Pulses, SetRow, TriggerRow, Values, ascending,
-    compare, differing, means_of_slips, read_optional, read_sets, renew,
+    Comparison, Condition, Difference, EdgeRow, FREQUENCY, Interval, Pulses, SetInRounds, SetRow,
+    TriggerRow, Values, ascending, compare, differing, means_of_slips, read_optional, read_sets,
+    read_sets_in_rounds, renew,
 };
 use crate::results::Results;
-use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, with_decimals};
+use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, symbol_of, with_decimals};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Row as _};
@@ -17,7 +18,8 @@ use crate::table::value::floored;
 use anyhow::Result;
 use clap::Args;
 use serde_json::{Map, Value as Json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Show the result of a sweep: a line for each parameter set, with 95 % intervals
@@ -58,7 +60,7 @@ Examples:
 
 Columns are those of stickslip plot --list.";
 
-const JSON_FORMAT: u32 = 1;
+const JSON_FORMAT: u32 = 2;
 
 /// Sets that the end of a run shows, and reads for its columns and for what ended otherwise.
 const FIRST: usize = 12;
@@ -80,19 +82,19 @@ impl Arguments {
         !self.json && !self.csv
     }
 
-    /// Prints the chosen columns of the chosen sets, as JSON with the edges. `rows` are the sets of a single directory.
+    /// Prints the chosen columns of the chosen sets, as JSON with a further field. `rows` are the sets of a single
+    /// directory.
     fn print(
         &self,
         columns: &[Values],
         count: usize,
         rows: &[SetRow],
-        edges: &[EdgeRow],
+        (field, value): (&str, Json),
     ) -> Result<()> {
         if self.json {
             let sets = (0..count).map(|set| record(columns, set).into_iter().collect());
             let sets: Vec<Map<String, Json>> = sets.collect();
-            let edges: Vec<Json> = edges.iter().map(json).collect();
-            let found = serde_json::json!({ "sets": sets, "edges": edges });
+            let found = serde_json::json!({ "sets": sets, field: value });
             output::json(JSON_FORMAT, &found)
         } else if self.csv {
             print_csv(columns, count)
@@ -105,48 +107,82 @@ impl Arguments {
 /// Shows in what the sets of two directories differ.
 fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) -> Result<()> {
     let others = Results::read(&layout(other))?;
-    let columns = compare(results, &others)?;
+    let Comparison {
+        columns,
+        differences,
+    } = compare(results, &others)?;
     let count = columns.first().map_or(0, |values| values.numbers.len());
     if count == 0 {
         let problem = "no set agrees with one of the first in all parameters that either varies";
         return Err(UsageError(format!("{}: {problem}", shown(other))).into());
     }
+    let named = [("A", &*arguments.directory), ("B", other)]
+        .into_iter()
+        .enumerate();
+    let mut lines: Vec<String> = named
+        .map(|(place, (letter, path))| {
+            let settings = Difference::settings(&differences, place).replace('\u{a0}', " ");
+            let line = format!("{letter} is {}: {settings}", shown(path));
+            line.trim_end_matches(": ").to_owned()
+        })
+        .collect();
+    let sweeps = [results.sweep(), others.sweep()];
+    if sweeps.iter().all(|sweep| sweep.measured().is_none()) {
+        // Parameters are those of the sets.
+        let rest = sweeps[0].differences(sweeps[1]).into_iter();
+        lines.extend(rest.filter(|line| !line.starts_with("name") && !line.starts_with("model.")));
+    }
     if arguments.is_text() {
-        let first = shown(&arguments.directory);
-        output::print(&format!("A is {first}, B is {}\n", shown(other)))?;
-        let sweeps = [results.sweep(), others.sweep()];
-        if sweeps.iter().all(|sweep| sweep.measured().is_none()) {
-            let differences = sweeps[0].differences(sweeps[1]).into_iter();
-            output::lines(differences.filter(|difference| !difference.starts_with("name")))?;
+        output::lines(lines)?;
+    } else {
+        for line in &lines {
+            output::report(line);
         }
     }
-    arguments.print(&columns, count, &[], &[])
+    let of_drive = differences
+        .iter()
+        .filter(|difference| difference.is_of_drive());
+    let of_drive: Vec<String> = of_drive
+        .map(|difference| symbol_of(difference.symbol))
+        .collect();
+    if !of_drive.is_empty() {
+        let drive = of_drive.join(", ");
+        output::warn(&[format!(
+            "A and B differ in {drive}, which enters all differences below"
+        )]);
+    }
+    let constants = differences.iter();
+    let constants = constants.map(|difference| (difference.symbol.key(), &difference.constants));
+    let constants: BTreeMap<&str, &Vec<Option<Parameter>>> = constants.collect();
+    arguments.print(
+        &columns,
+        count,
+        &[],
+        ("differences", serde_json::json!(constants)),
+    )
 }
 
 /// Shows the sets of a directory whose reduced data are up to date.
 fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
-    let mut rows = sets(results, usize::MAX)?;
-    let usual = usual_names(&rows);
+    let all = read_sets_in_rounds(results.layout()).collect::<Result<_, _>>();
+    let mut all: Vec<SetInRounds> = all?;
+    let usual = usual_names(&all.iter().map(|(row, _)| row));
     if let Some(text) = &arguments.condition {
-        let condition = Condition::read(text, &SetRow::columns())
-            .map_err(|problem| UsageError(format!("--where {text}: {problem}")))?;
-        if arguments.is_text() && !rows.iter().any(|row| condition.holds(row)) {
-            return output::print(&(condition.unmatched("sets", &rows) + "\n"));
+        let refuse = |problem: String| UsageError(format!("--where {text}: {problem}"));
+        let condition = Condition::read(text, &SetInRounds::columns()).map_err(refuse)?;
+        if !all.iter().any(|row| condition.holds(row)) {
+            return Err(refuse(condition.unmatched("sets", &all)).into());
         }
-        rows.retain(|row| condition.holds(row));
+        all.retain(|row| condition.holds(row));
     }
     if let Some(column) = &arguments.sort {
-        sort(&mut rows, column)?;
+        sort(&mut all, column)?;
     }
-    let matching = rows.len();
-    if arguments.csv && rows.is_empty() {
-        // The names of the columns are those of all sets.
-        rows = sets(results, usize::MAX)?;
-    }
+    let rows: Vec<SetRow> = all.iter().map(|(row, _)| row.clone()).collect();
     let columns = if arguments.columns.is_empty() {
         usual_columns(&usual, &rows)
     } else {
-        chosen_columns(results, usual, &arguments.columns, &rows)?
+        chosen_columns(results, usual, &arguments.columns, &all, &rows)?
     };
     let mut edges: Vec<EdgeRow> = read_optional(results.layout())?;
     if arguments.condition.is_some() {
@@ -159,7 +195,8 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
         output::print(&table_of_edges(&edges, &rows))?;
         output::print(&table_of_pulses(&read_optional(results.layout())?))?;
     }
-    arguments.print(&columns, matching, &rows, &edges)?;
+    let edges: Vec<Json> = edges.iter().map(json).collect();
+    arguments.print(&columns, rows.len(), &rows, ("edges", edges.into()))?;
     if arguments.is_text() {
         output::lines(notes(results, &rows))?;
     }
@@ -170,7 +207,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let results = &renew(results)?;
     let rows = sets(results, MAX_READ)?;
-    let columns = usual_columns(&usual_names(&rows), &rows);
+    let columns = usual_columns(&usual_names(&rows.iter()), &rows);
     // A line that says how many more there are is as long as one of these.
     let first = FIRST + usize::from(count == FIRST as u64 + 1);
     let mut text = table_of_edges(&read_optional(results.layout())?, &rows);
@@ -193,8 +230,8 @@ fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
 }
 
 /// The parameters in which sets differ.
-fn usual_names(rows: &[SetRow]) -> Vec<&'static str> {
-    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(column_of).collect();
+fn usual_names<'a>(rows: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<&'static str> {
+    let mut names: Vec<&str> = differing(rows).into_iter().map(column_of).collect();
     names.extend(names.contains(&FREQUENCY).then_some("eta"));
     names
 }
@@ -218,11 +255,12 @@ fn chosen_columns(
     results: &Results<'_>,
     parameters: Vec<&'static str>,
     chosen: &[String],
+    all: &[SetInRounds],
     rows: &[SetRow],
 ) -> Result<Vec<Values>> {
     let mut columns = Vec::new();
     for name in chosen {
-        columns.push(match Values::of(rows, name) {
+        columns.push(match Values::of(all, name) {
             Ok(values) => values,
             Err(problem) => means_of_slips(results, rows, name)?
                 .ok_or_else(|| UsageError(format!("--columns {name}: {problem}")))?,
@@ -234,7 +272,7 @@ fn chosen_columns(
     Ok(all)
 }
 
-fn sort(rows: &mut Vec<SetRow>, column: &str) -> Result<()> {
+fn sort(rows: &mut Vec<SetInRounds>, column: &str) -> Result<()> {
     let (name, sign) = match column.strip_prefix('-') {
         Some(name) => (name, -1.0),
         None => (column, 1.0),
@@ -302,11 +340,8 @@ fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: u
     let label = values.label();
     let is_interval = values.column.name == "tau_mean";
     let bound = |set: usize| rows.get(set).filter(|_| is_interval)?.tau_bound;
-    let size = |set: usize| values.numbers[set].or_else(|| bound(set)).map(f64::abs);
-    let largest = (0..values.numbers.len())
-        .filter_map(size)
-        .fold(0.0, f64::max);
-    let (factor, unit) = label.scale(largest);
+    let bounds = (0..values.numbers.len()).filter_map(bound);
+    let (factor, unit) = label.scale(bounds.fold(values.largest, f64::max));
     let digits = values.digits();
     let cell = |set: usize| match (values.numbers[set], values.intervals[set]) {
         (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
@@ -445,6 +480,9 @@ fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
 /// How far the middle of an interval may lie from its value, as a share of the half-width, to be shown as ±.
 const LOPSIDED: f64 = 0.2;
 
+/// Sizes of numbers that are read without an exponent.
+const PLAIN: Range<f64> = 1e-6..1e5;
+
 /// A value and the half-width of its interval, with the digits that this leaves; or its ends, if the value is not in
 /// the middle, or ± would reach beyond zero and the interval does not.
 fn with_interval(value: f64, low: f64, high: f64) -> String {
@@ -455,12 +493,23 @@ fn with_interval(value: f64, low: f64, high: f64) -> String {
     }
     let crosses = low >= 0.0 && value < half || high <= 0.0 && value > -half;
     let is_lopsided = crosses || (value - low - half).abs() > LOPSIDED * half;
+    let largest = value.abs().max(low.abs()).max(high.abs());
+    let power = if PLAIN.contains(&largest) {
+        0.0
+    } else {
+        libm::floor(libm::log10(largest))
+    };
     // Two digits of an error that begins with 1, and of ends.
     let exponent = libm::floor(libm::log10(half));
     let has_two = is_lopsided || half / libm::exp10(exponent) < 1.95;
-    let digits = floored(f64::from(u8::from(has_two)) - exponent).min(18);
-    let half = with_decimals(half, digits);
-    let [value, low, high] = [value, low, high].map(|end| with_decimals(end, digits));
+    let digits = floored(f64::from(u8::from(has_two)) - exponent + power).min(18);
+    let ending = if power == 0.0 {
+        String::new()
+    } else {
+        format!("e{power}")
+    };
+    let number = |number: f64| with_decimals(number / libm::exp10(power), digits) + &ending;
+    let [value, low, high, half] = [value, low, high, half].map(number);
     if is_lopsided {
         format!("{value} ({low} to {high})")
     } else {
@@ -558,7 +607,8 @@ fn note_on_control(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let control = if sweep.measured().is_some() {
         let setting = |symbol: Symbol| {
             let value = row.parameters.get(symbol).number()?;
-            Some(label(symbol.key()).setting(value, Digits::THREE))
+            let digits = Digits::THREE.distinguishing(&[value]);
+            Some(label(symbol.key()).setting(value, digits))
         };
         let settings = [Symbol::V0, Symbol::Kd].into_iter().filter_map(setting);
         let settings: Vec<String> = settings.collect();
@@ -659,6 +709,21 @@ mod tests {
                 "3",
                 "-0.02 ± 0.06",
                 "0.000 ± 0.002"
+            ]
+        );
+    }
+
+    #[test]
+    fn what_is_very_large_or_small_has_an_exponent() {
+        let shown = [(1.234e8, 2e5), (3e-9, 4e-10), (2e5, 0.0), (5.0e7, 4.9e7)];
+        let shown = shown.map(|(value, half)| with_interval(value, value - half, value + half));
+        assert_eq!(
+            shown,
+            [
+                "1.234e8 ± 0.002e8",
+                "3.0e-9 ± 0.4e-9",
+                "2e5",
+                "0.5e8 ± 0.5e8"
             ]
         );
     }

@@ -1,21 +1,21 @@
 //! Charts: a dot for each set against a column, with error bars where there are intervals. The overview of a sweep and
 //! custom figures are charts.
 
-use super::BadOption;
 use super::axis::Axis;
 use super::frame::{Ends, LEFT, Layout, Place};
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::{Quantity, parameter, shows_phase, without_value};
+use super::quantity::{Quantity, belongs_to_all, distinct, parameter, shows_phase, without_value};
 use super::style::{
-    BAR_WIDTH, BLACK, Dot, GREY, INKS, Ink, Look, RADIUS, REFERENCE, STRIPE, Stroke, WHITE,
-    drive_alone,
+    BAR_WIDTH, BLACK, DARK_GREY, Dot, GREY, INKS, Ink, Look, RADIUS, REFERENCE, STRIPE, Stroke,
+    WHITE, drive_alone,
 };
+use super::{BadOption, Beside};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, Values, is_same};
+use crate::reduce::{SetRow, Values, is_same, swept};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -42,16 +42,21 @@ const ALONE: Dot = Dot::solid(GREY, SMALL_RADIUS);
 /// By how much the hole in the dot of a set that slides is smaller.
 const HOLE: f64 = 1.6;
 
+/// The sets of a chart, if each has a dot, and of which directories they are.
+pub(super) struct Rows<'a> {
+    pub(super) sets: &'a [SetRow],
+    /// The swept parameters of the first directory, by which its sets are joined and told apart.
+    pub(super) swept: &'a [Values],
+    pub(super) beside: &'a Beside,
+    /// Which of the sets are those of each other directory.
+    pub(super) others: Vec<Range<usize>>,
+}
+
 /// Sets against a column: a panel for each quantity and each value of another column.
 pub(super) struct Chart<'a> {
     /// What has a dot each, in the plural.
     pub(super) of: &'static str,
-    /// The sets, if each has a dot.
-    pub(super) sets: &'a [SetRow],
-    /// Names of other directories, and which of the sets are theirs.
-    pub(super) others: Vec<(String, Range<usize>)>,
-    /// The swept parameters, by which sets are joined and told apart.
-    pub(super) swept: &'a [Values],
+    pub(super) rows: Rows<'a>,
     pub(super) x: Quantity<'a>,
     pub(super) ys: Vec<Quantity<'a>>,
     pub(super) colour: Option<Quantity<'a>>,
@@ -163,11 +168,11 @@ impl<'a> Chart<'a> {
     fn free(&self) -> Vec<usize> {
         let is_free = |&set: &usize| {
             self.x.symbol == Some(Symbol::T)
-                && self.sets[set].parameters.modulation_period.is_none()
+                && self.rows.sets[set].parameters.modulation_period.is_none()
                 && !self.x.has(set)
                 && self.ys.iter().any(|y| y.has(set))
         };
-        let free = (0..self.sets.len()).filter(|set| self.other(*set).is_none());
+        let free = (0..self.rows.sets.len()).filter(|set| self.other(*set).is_none());
         let free: Vec<usize> = free.filter(is_free).collect();
         if free.len() > INKS.len() {
             Vec::new()
@@ -178,7 +183,7 @@ impl<'a> Chart<'a> {
 
     /// Sets that differ in the x axis alone, in its order.
     fn lines(&self, sets: &[usize]) -> Vec<Vec<usize>> {
-        let Some(symbol) = self.x.joined_along(self.swept) else {
+        let Some(symbol) = self.x.joined_along(self.rows.swept) else {
             return Vec::new();
         };
         // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.
@@ -189,7 +194,7 @@ impl<'a> Chart<'a> {
             return Vec::new();
         }
         let is_other = |swept: &&Values| parameter(swept.name()) != Some(symbol);
-        let others = self.swept.iter().filter(is_other);
+        let others = self.rows.swept.iter().filter(is_other);
         let others: Vec<_> = others.map(Values::places).collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
         for &set in sets.iter().filter(|set| self.other(**set).is_none()) {
@@ -211,7 +216,8 @@ impl<'a> Chart<'a> {
 
     fn ink(&self, dots: &Dots, set: usize) -> Ink {
         let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) else {
-            return INKS[0];
+            // As in the legend.
+            return self.other(set).map_or(INKS[0], |_| BLACK);
         };
         colour.number(set).map_or(GREY, |value| hues.ink(value))
     }
@@ -258,8 +264,8 @@ impl<'a> Chart<'a> {
 
     /// The number of the other directory that a set is of.
     fn other(&self, set: usize) -> Option<usize> {
-        let mut others = self.others.iter();
-        others.position(|(_, sets)| sets.contains(&set))
+        let mut others = self.rows.others.iter();
+        others.position(|sets| sets.contains(&set))
     }
 
     fn place(&self, y: &Quantity<'_>, set: usize) -> Option<Place> {
@@ -313,18 +319,18 @@ impl<'a> Chart<'a> {
     }
 
     fn slides(&self, set: usize) -> bool {
-        let set = self.sets.get(set);
+        let set = self.rows.sets.get(set);
         set.is_some_and(|set| set.regime == Some(Regime::Sliding))
     }
 
     /// Amplitudes at which the paper finds a significant reduction of the friction to begin, on the x axis.
     fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
         let is_fixed = |symbol| {
-            let mut swept = self.swept.iter();
+            let mut swept = self.rows.swept.iter();
             swept.all(|swept| parameter(swept.name()) != Some(symbol))
         };
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
-        let mut sets = self.sets.iter();
+        let mut sets = self.rows.sets.iter();
         let free = sets.find(|row| row.parameters.modulation_period.is_none());
         let free = free.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
@@ -346,8 +352,12 @@ impl Chart<'_> {
                 entries.push(entry(Mark::Dot(Dot::solid(GREY, RADIUS)), text));
             }
         }
-        let others = self.others.iter().enumerate();
-        entries.extend(others.map(|(other, (name, _))| entry(Mark::Hollow(other), name)));
+        let has_marks = |other| inside.iter().any(|&set| self.other(set) == other);
+        let ink = dots.hues.as_ref().map_or(INKS[0], |_| DARK_GREY);
+        let own = has_marks(None).then_some(Mark::Dot(Dot::solid(ink, RADIUS)));
+        let own = own.or((!dots.free.is_empty()).then_some(Mark::Line(REFERENCE)));
+        let beside = self.rows.beside;
+        entries.extend(beside.entries(own, |other| has_marks(Some(other))));
         if !dots.free.is_empty() {
             entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
         }
@@ -389,8 +399,12 @@ impl Chart<'_> {
         let sources = asked.chain(&self.panels).flat_map(|values| &values.sources);
         let shown: Vec<Option<Symbol>> = sources.map(|source| parameter(source)).collect();
         let is_pooled = |swept: &&Values| !shown.contains(&parameter(swept.name()));
-        let pooled = self.swept.iter().filter(is_pooled);
+        let others = self.rows.others.iter();
+        let others = others.flat_map(|sets| swept(&self.rows.sets[sets.clone()]));
+        let all: Vec<Values> = self.rows.swept.iter().cloned().chain(others).collect();
+        let pooled = all.iter().filter(is_pooled);
         let symbols: Vec<String> = pooled.map(|swept| swept.label().symbol).collect();
+        let symbols = distinct(symbols.iter().map(String::as_str));
         (!symbols.is_empty())
             .then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))
     }
@@ -408,7 +422,7 @@ impl Chart<'_> {
         let count = self.count();
         let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));
         let is_still = |set: &usize| {
-            shows_intervals && self.slides(*set) && self.sets[*set].tau_mean.is_none()
+            shows_intervals && self.slides(*set) && self.rows.sets[*set].tau_mean.is_none()
         };
         let still = (0..count).filter(is_still).count();
         if still > 0 {
@@ -417,7 +431,8 @@ impl Chart<'_> {
         let mut quantities = self.ys.iter().chain([&self.x]);
         let shows_phase = quantities.any(|shown| shows_phase(shown.name()));
         let has_none = |row: &SetRow| !row.has_phase && row.phase_mean.is_some();
-        let is_unphased = |set: &usize| shows_phase && self.sets.get(*set).is_some_and(has_none);
+        let is_unphased =
+            |set: &usize| shows_phase && self.rows.sets.get(*set).is_some_and(has_none);
         let unphased = (0..count).filter(is_unphased).count();
         if unphased > 0 {
             let text = format!("not shown: {unphased} of {count} sets, without a phase");
@@ -473,10 +488,13 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
     };
     let mut groups: Vec<_> = values.distinct.iter().map(of).collect();
     groups.retain(|(_, sets)| !sets.is_empty());
-    // Sets without a value, such as a frequency at Δ = 0, have a separate panel.
     let mut without = sets.to_vec();
     without.retain(|&set| values.numbers[set].is_none());
-    if !groups.is_empty() && !without.is_empty() {
+    if belongs_to_all(values) {
+        for (_, members) in &mut groups {
+            members.extend(&without);
+        }
+    } else if !groups.is_empty() && !without.is_empty() {
         groups.insert(0, (without_value(values), without));
     }
     let problem = match groups.len() {
@@ -493,7 +511,6 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
 mod tests {
     use super::super::custom::tests::rows;
     use super::*;
-    use crate::reduce::swept;
 
     #[test]
     fn only_sets_that_differ_in_x_alone_are_joined() {
@@ -503,9 +520,12 @@ mod tests {
             let sets: Vec<usize> = (0..rows.len()).collect();
             Chart {
                 of: "sets",
-                sets: rows,
-                others: Vec::new(),
-                swept: &swept,
+                rows: Rows {
+                    sets: rows,
+                    swept: &swept,
+                    beside: &Beside::default(),
+                    others: Vec::new(),
+                },
                 x,
                 ys: Vec::new(),
                 colour: None,

@@ -1,14 +1,13 @@
 //! Custom figures: any column of the table of sets, or of slips, or a formula of columns, against any other.
 
-use super::chart::Chart;
+use super::chart::{Chart, Rows};
 use super::quantity::{Limits, Quantity, parameter};
-use super::{BadOption, Look, Picture};
+use super::{BadOption, Look, Picture, check_text};
 use crate::model::Symbol;
-use crate::reduce::{Condition, SetRow, Values};
+use crate::reduce::{Condition, Values};
 use crate::table::columns::Row;
 use crate::table::value::words;
 use anyhow::Result;
-use std::ops::Range;
 
 words! {
     /// What has a dot each in a custom figure.
@@ -73,18 +72,21 @@ impl CustomFigure {
 /// rows are `sets`, those that differ in one parameter of the x axis alone are joined; if they are slips, there are none.
 pub(super) fn custom<'a>(
     quantity: &dyn Fn(&'static str, &str) -> Result<Quantity<'a>>,
-    sets: &[SetRow],
-    others: Vec<(String, Range<usize>)>,
-    swept: &[Values],
+    rows: Rows<'a>,
     figure: &'a CustomFigure,
     look: &Look,
 ) -> Result<Picture> {
+    let label = |option, text: &'a Option<String>| {
+        let label = text.as_deref();
+        label.map_or(Ok(()), |text| check_text(option, text))?;
+        Ok::<_, BadOption>(label)
+    };
     let mut x = quantity("x", &figure.x)?;
     x.limits = figure.xlim;
-    x.label = figure.xlabel.as_deref();
+    x.label = label("xlabel", &figure.xlabel)?;
     let mut y = quantity("y", &figure.y)?;
     y.limits = figure.ylim;
-    y.label = figure.ylabel.as_deref();
+    y.label = label("ylabel", &figure.ylabel)?;
     if let Some(axes) = &figure.log {
         x.is_log = axes.contains('x');
         y.is_log = axes.contains('y');
@@ -93,6 +95,7 @@ pub(super) fn custom<'a>(
         name.as_ref().map(|name| quantity(option, name)).transpose()
     };
     let panels = named("panels", &figure.panels)?;
+    let swept = rows.swept;
     let mut shown: Vec<Symbol> = x.joined_along(swept).into_iter().collect();
     shown.extend(panels.iter().flat_map(Quantity::parameters));
     let is_free =
@@ -103,11 +106,12 @@ pub(super) fn custom<'a>(
     let name = format!("{}-{}", y.name(), x.name()).replace(|letter| !is_plain(letter), "-");
     let chart = Chart {
         of: figure.of.word(),
-        sets,
-        others,
-        swept: if sets.is_empty() { &[] } else { swept },
+        rows: Rows {
+            swept: if rows.sets.is_empty() { &[] } else { swept },
+            ..rows
+        },
         colour: named("colour", &figure.colour.clone().or_else(next))?,
-        panels: panels.map(|panels| panels.column),
+        panels: panels.map(|panels| panels.column.of_modulated()),
         x,
         ys: vec![y],
     };
@@ -116,13 +120,14 @@ pub(super) fn custom<'a>(
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::Beside;
     use super::super::chart::LINE_WIDTH;
     use super::super::quantity::tests::set;
     use super::super::style::{BAR_WIDTH, Style};
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
-    use crate::reduce::{Interval, swept};
+    use crate::reduce::{Interval, SetRow, swept};
 
     /// Sets at rising V0, and two amplitudes.
     pub(in crate::figure) fn rows(count: u32) -> Vec<SetRow> {
@@ -158,7 +163,13 @@ pub(super) mod tests {
 
     fn drawn_of(rows: &[SetRow], figure: &CustomFigure, look: &Look) -> Result<Picture> {
         let quantity = |option, name: &str| Ok(Quantity::of(rows, option, name)?);
-        custom(&quantity, rows, Vec::new(), &swept(rows), figure, look)
+        let rows = Rows {
+            sets: rows,
+            swept: &swept(rows),
+            beside: &Beside::default(),
+            others: Vec::new(),
+        };
+        custom(&quantity, rows, figure, look)
     }
 
     fn drawn(count: u32, figure: &CustomFigure, look: &Look) -> Result<Picture> {

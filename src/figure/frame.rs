@@ -104,7 +104,10 @@ impl Layout {
         let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * legend::ROW;
         // A journal has the small print in the caption.
         let notes = if look.style == Style::Screen {
-            wrapped(&look.note, right - MARGIN)
+            let notes = std::iter::once(&look.note).chain(&look.directories);
+            notes
+                .flat_map(|note| wrapped(note, right - MARGIN))
+                .collect()
         } else {
             Vec::new()
         };
@@ -354,8 +357,12 @@ fn fitted(text: &str, size: u32, room: f64) -> (String, u32) {
     if let Some(size) = fitting(text, size, room) {
         return (text.to_owned(), size);
     }
-    let mut cut = text.to_owned();
-    while cut.pop().is_some() && text_width(&format!("{cut}…"), NOTE_TEXT) > room {}
+    let mut width = text_width("…", NOTE_TEXT);
+    let fits = |letter: &char| {
+        width += text_width(letter.encode_utf8(&mut [0; 4]), NOTE_TEXT);
+        width <= room
+    };
+    let cut: String = text.chars().take_while(fits).collect();
     (format!("{}…", cut.trim_end()), NOTE_TEXT)
 }
 
@@ -391,6 +398,7 @@ mod tests {
                 style,
                 size,
                 note: "small print ".repeat(40),
+                ..Look::default()
             };
             layout.page("", &look, &[], &[300.0, 200.0]).1.size()
         };
@@ -428,6 +436,7 @@ mod tests {
             style,
             size: Some(Size { width, height }),
             note: "Sweep test".to_owned(),
+            ..Look::default()
         };
         let layout = Layout {
             columns: 2,

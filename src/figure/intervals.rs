@@ -1,14 +1,15 @@
 //! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which they fall.
 
+use super::Beside;
 use super::axis::{Axis, logarithmic_bounds};
+use super::beside::Other;
 use super::frame::{Layout, Place};
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
-use super::style::{Dot, GREY, GRID, LIGHT_GREY, Look};
-use super::{Other, hollow_entries};
+use super::style::{DARK_GREY, Dot, GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::{Point, SetRow, ascending, is_same};
 use crate::sets::{Digits, label};
 
@@ -22,7 +23,7 @@ const LINES: u32 = 12;
 /// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
 /// τ = nT; `None` without intervals at two periods or more. Slips of sets with a phase have the colour of their V0, or
 /// of their Δ at a common V0.
-pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Option<Picture> {
+pub(super) fn intervals(points: &[Point], beside: &Beside, look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
         let period = point.period?;
         let interval = point.interval?;
@@ -46,7 +47,7 @@ pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Opti
         Some((factor * period, set.tau_mean? / period, ends))
     };
     let of_other = |other: &Other| other.sets.iter().filter_map(mean).collect();
-    let means: Vec<Vec<MeanPlace>> = others.iter().map(of_other).collect();
+    let means: Vec<Vec<MeanPlace>> = beside.others.iter().map(of_other).collect();
     let of_others = means.iter().flatten().map(|mean| (mean.0, mean.1));
     let all: Vec<Place> = slips.iter().map(|slip| slip.1).chain(of_others).collect();
     let (low, high) = logarithmic_bounds(all.iter().map(|place| place.0))?;
@@ -87,7 +88,8 @@ pub(super) fn intervals(points: &[Point], others: &[Other], look: &Look) -> Opti
         entries.push(entry(Mark::Dot(dot), "slips of sets without a phase"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
-    entries.extend(hollow_entries(others));
+    let own = Mark::Dot(Dot::solid(DARK_GREY, RADIUS));
+    entries.extend(beside.entries(Some(own), |other| !means[other].is_empty()));
     let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
         let mut layers: Vec<Layer<'_>> = (1..=lines)
             .map(|n| Layer::Level(f64::from(n), GRID))
@@ -134,7 +136,9 @@ mod tests {
         let mut points = vec![point(1, true), point(4, true), point(7, false)];
         points[1].period = Some(0.02);
         let texts = |points: &[Point], texts: &[&str]| {
-            let svg = intervals(points, &[], &Look::default()).unwrap().svg();
+            let svg = intervals(points, &Beside::default(), &Look::default())
+                .unwrap()
+                .svg();
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
         };
         assert!(texts(
@@ -172,6 +176,13 @@ mod tests {
             periods: None,
             ..point(1, false)
         };
-        assert!(intervals(&[still, point(1, true)], &[], &Look::default()).is_none());
+        assert!(
+            intervals(
+                &[still, point(1, true)],
+                &Beside::default(),
+                &Look::default()
+            )
+            .is_none()
+        );
     }
 }

@@ -24,6 +24,8 @@ pub(super) enum Mark {
     Bar(Dot),
     /// The hollow mark of another directory, by its number.
     Hollow(usize),
+    /// That of a directory of which a figure shows nothing: no entry, but a remark.
+    Absent,
     Line(Stroke),
     Patch(Fill),
 }
@@ -41,7 +43,7 @@ fn width((mark, text): &Entry) -> f64 {
 
 const fn mark_width(mark: Mark) -> f64 {
     match mark {
-        Mark::Dot(_) | Mark::Ring(..) | Mark::Bar(_) | Mark::Hollow(_) => DOT,
+        Mark::Dot(_) | Mark::Ring(..) | Mark::Bar(_) | Mark::Hollow(_) | Mark::Absent => DOT,
         Mark::Line(_) | Mark::Patch(_) => MARK,
     }
 }
@@ -103,6 +105,7 @@ fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
             sheet.discs([centre], dot);
         }
         Mark::Hollow(other) => sheet.line(hollow(other, centre), Stroke::solid(BLACK, BAR_WIDTH)),
+        Mark::Absent => {}
         Mark::Line(stroke) => sheet.line(vec![(start, middle), (end, middle)], stroke),
         Mark::Patch(fill) => sheet.rectangle([start, middle - 6.0, MARK, 12.0], fill),
     }

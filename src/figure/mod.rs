@@ -11,6 +11,7 @@
 //! ```
 
 mod axis;
+mod beside;
 mod chart;
 mod custom;
 mod drag;
@@ -32,6 +33,7 @@ mod style;
 mod triggering;
 mod work_precision;
 
+pub use beside::Beside;
 pub use custom::{CustomFigure, Dots};
 pub use picture::{Format, Picture};
 pub use quantity::Limits;
@@ -39,21 +41,21 @@ pub use simulation::simulation;
 pub use style::{INKS, Ink, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
-use self::legend::{Entry, Mark, entry};
-use self::quantity::Quantity;
+use self::chart::Rows;
+use self::quantity::{Quantity, distinct};
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
-    BackboneBin, EdgeRow, Point, SetRow, SlipOfSet, TriggerRow, WRITER, advise, means_of_slips,
-    read_optional, read_reduced, read_sets, sample_of_slips, swept,
+    EdgeRow, SetRow, SlipOfSet, TriggerRow, WRITER, advise, means_of_slips, read_optional,
+    read_reduced, read_sets, sample_of_slips, swept,
 };
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::tables::gaps;
 use crate::results::{Results, ResultsError};
-use crate::sets::{Digits, label, symbol_of};
+use crate::sets::setting;
 use crate::table::Table;
 use anyhow::Result;
-use std::ops::Range;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// What was asked of a figure that cannot be drawn so: the flag, and what to do.
@@ -80,51 +82,53 @@ pub const STANDING: &[&str] = &[
     triggering::NAME,
 ];
 
+/// Those that show other directories, too.
+const BESIDE: [&str; 3] = [phase_eta::NAME, intervals::NAME, overview::NAME];
+
 /// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
 const MAX_SETS: usize = 100_000;
 const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 
-/// Another directory, of which figures show results as hollow marks under the name of its folder.
-#[derive(Clone, Debug)]
-pub struct Other {
-    name: String,
-    sets: Vec<SetRow>,
-    points: Vec<Point>,
-    bins: Vec<BackboneBin>,
-}
+/// Longest text that a user gives for a figure, in characters.
+const MAX_TEXT: usize = 1000;
 
-impl Other {
-    /// Reads a directory whose reduced data are up to date.
-    pub fn read(results: &Results<'_>) -> Result<Self> {
-        let layout = results.layout();
-        let folder = layout.root().file_name().unwrap_or_default();
-        Ok(Self {
-            name: folder.to_string_lossy().into_owned(),
-            sets: sets_with_results(layout).map_err(advise(ADVICE))?,
-            points: read(layout)?,
-            bins: read(layout)?,
-        })
+fn check_text(option: &str, text: &str) -> Result<(), BadOption> {
+    let count = text.chars().count();
+    if count <= MAX_TEXT {
+        return Ok(());
     }
+    let start: String = text.chars().take(20).collect();
+    let problem = format!("has {count} characters; it may have {MAX_TEXT}");
+    Err(BadOption::new(option, &format!("{start}…"), &problem))
 }
 
-/// Entries of a legend with the names of other directories.
-fn hollow_entries(others: &[Other]) -> impl Iterator<Item = Entry> + use<'_> {
-    let others = others.iter().enumerate();
-    others.map(|(number, other)| entry(Mark::Hollow(number), &other.name))
+/// Figures that were written, and what is to be said of them.
+#[derive(Clone, Debug, Default)]
+pub struct Drawn {
+    pub files: Vec<PathBuf>,
+    pub remarks: Vec<String>,
 }
 
-/// Sets followed by those of other directories, and which these are, by the names of their directories.
-fn with_others(
-    mut sets: Vec<SetRow>,
-    others: &[Other],
-) -> (Vec<SetRow>, Vec<(String, Range<usize>)>) {
-    let mut ranges = Vec::new();
-    for other in others {
-        let begin = sets.len();
-        sets.extend(other.sets.iter().cloned());
-        ranges.push((other.name.clone(), begin..sets.len()));
+/// What is to be said of pictures: in what directories differ, which have no mark, and letters that are boxes.
+pub fn remarks(pictures: &[Picture]) -> Vec<String> {
+    let lines = pictures.iter().flat_map(|picture| &picture.directories);
+    let lines = distinct(lines.map(String::as_str)).into_iter();
+    let lines = lines.map(|line| format!("differs  {}", line.replace('\u{a0}', " ")));
+    let mut remarks: Vec<String> = lines.collect();
+    for picture in pictures {
+        let name = picture.name();
+        let absent = picture.absent.iter();
+        remarks.extend(absent.map(|absent| format!("figure {name} shows nothing of {absent}")));
     }
-    (sets, ranges)
+    let boxes: BTreeSet<char> = pictures.iter().flat_map(Picture::boxes).collect();
+    if !boxes.is_empty() {
+        let letters: Vec<String> = boxes.iter().map(char::to_string).collect();
+        remarks.push(format!(
+            "warning: the font of figures lacks {}: boxes stand for them (in SVG, unless the viewer has another font)",
+            letters.join(" ")
+        ));
+    }
+    remarks
 }
 
 /// Draws the figures of a results directory into `figures/`, each in these formats: those whose data are there.
@@ -132,19 +136,25 @@ fn with_others(
 /// Returns the files, in the order in which they were written.
 pub fn draw_all(
     layout: &Layout<'_>,
-    others: &[Other],
+    beside: &Beside,
     look: &Look,
     formats: &[Format],
-) -> Result<Vec<PathBuf>> {
+) -> Result<Drawn> {
     let _alone = exclusive_lock(layout, WRITER)?;
     let points = read(layout)?;
     let mut sets = sets_with_results(layout).map_err(advise(ADVICE))?;
     // Slips after a pulse have a figure of their own.
     sets.retain(|set| set.parameters.pulse_start.is_none());
-    let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters)));
+    let of_all = &beside.look(look, &sets);
+    let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters), &[]));
     let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(phase_eta::phase_eta(&points, &read(layout)?, others, look));
-    pictures.extend(intervals::intervals(&points, others, look));
+    pictures.extend(phase_eta::phase_eta(
+        &points,
+        &read(layout)?,
+        beside,
+        of_all,
+    ));
+    pictures.extend(intervals::intervals(&points, beside, of_all));
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
@@ -156,7 +166,7 @@ pub fn draw_all(
                 .is_some_and(|second| second.distinct.len() > INKS.len())
         };
         if sets.len() > 1 && !(map.is_some() && is_net()) {
-            pictures.extend(overview::overview(&sets, others, look));
+            pictures.extend(overview::overview(&sets, beside, of_all));
         }
         pictures.extend(map);
     }
@@ -168,22 +178,33 @@ pub fn draw_all(
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
     }
     if pictures.is_empty() {
-        pictures.extend(overview::overview(&sets, others, look));
+        pictures.extend(overview::overview(&sets, beside, of_all));
     }
-    write(layout, &pictures, look, formats)
+    let mut remarks = remarks(&pictures);
+    let is_beside = |picture: &Picture| BESIDE.contains(&picture.name());
+    if !beside.others.is_empty() && !pictures.iter().any(is_beside) {
+        let figures = BESIDE.join(", ");
+        remarks.push(format!(
+            "no figure shows other directories: there is none of {figures}"
+        ));
+    }
+    Ok(Drawn {
+        files: write(layout, &pictures, look, formats)?,
+        remarks,
+    })
 }
 
 /// Draws a custom figure of the sets or slips of a results directory; writes nothing.
 pub fn draw_custom(
     results: &Results<'_>,
-    others: &[Other],
+    beside: &Beside,
     figure: &CustomFigure,
     look: &Look,
 ) -> Result<Picture> {
     let sets = read_sets(results.layout()).collect::<Result<Vec<_>, _>>();
     let sets = sets.map_err(advise(ADVICE))?;
     let picture = match figure.of {
-        Dots::Sets => draw_sets(results, sets, others, figure, look),
+        Dots::Sets => draw_sets(results, sets, beside, figure, look),
         Dots::Slips => draw_slips(results, &sets, figure, look),
     }?;
     check_size(&picture, look)?;
@@ -193,30 +214,36 @@ pub fn draw_custom(
 fn draw_sets(
     results: &Results<'_>,
     mut own: Vec<SetRow>,
-    others: &[Other],
+    beside: &Beside,
     figure: &CustomFigure,
     look: &Look,
 ) -> Result<Picture> {
-    let mut others = others.to_vec();
+    let mut beside = beside.clone();
     if let Some(condition) = figure.condition::<SetRow>()? {
         if !own.iter().any(|set| condition.holds(set)) {
             return Err(figure.unmatched(&condition, &own).into());
         }
-        let all = others.iter_mut().map(|other| &mut other.sets);
+        let all = beside.others.iter_mut().map(|other| &mut other.sets);
         all.chain([&mut own])
             .for_each(|sets| sets.retain(|set| condition.holds(set)));
     }
-    let common = common(own.iter().map(|set| &*set.parameters));
+    let mut look = beside.look(look, &own);
+    look.note += &figure.shown_condition();
     let swept = swept(&own);
-    let (sets, others) = with_others(own, &others);
+    let (sets, others) = beside.with_others(own);
     let quantity = |option, name: &str| {
         Quantity::of(&sets, option, name).or_else(|unknown| {
             let mean = means_of_slips(results, &sets, name)?.ok_or(unknown)?;
             Ok(Quantity::of_values(option, mean))
         })
     };
-    let look = look.with_note(&(common + &figure.shown_condition()));
-    custom::custom(&quantity, &sets, others, &swept, figure, &look)
+    let rows = Rows {
+        sets: &sets,
+        swept: &swept,
+        beside: &beside,
+        others,
+    };
+    custom::custom(&quantity, rows, figure, &look)
 }
 
 fn draw_slips(
@@ -236,7 +263,7 @@ fn draw_slips(
     } else {
         String::new()
     };
-    let common = common(slips.iter().map(|slip| &*slip.0.1));
+    let common = common(slips.iter().map(|slip| &*slip.0.1), &[]);
     let condition = figure.shown_condition();
     let look = look.with_note(&format!("{common}{condition}; {part}{matching} slips"));
     let unknown = gaps(results.sweep()).unknown;
@@ -248,7 +275,13 @@ fn draw_slips(
             None => Ok(quantity),
         }
     };
-    custom::custom(&quantity, &[], Vec::new(), &swept(sets), figure, &look)
+    let rows = Rows {
+        sets: &[],
+        swept: &swept(sets),
+        beside: &Beside::default(),
+        others: Vec::new(),
+    };
+    custom::custom(&quantity, rows, figure, &look)
 }
 
 /// Puts a figure into `figures/`, in these formats.
@@ -323,8 +356,8 @@ fn write(
     Ok(files)
 }
 
-/// What some parameters have in common, in symbols.
-pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
+/// What some parameters have in common, in symbols, but those left out.
+pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>, left_out: &[Symbol]) -> String {
     let all: Vec<&Parameters> = all.collect();
     let Some(first) = all.first() else {
         return String::new();
@@ -334,6 +367,7 @@ pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
     let is_shown = |symbol: &Symbol| {
         let value = first.get(*symbol);
         !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
+            && !left_out.contains(symbol)
             && value != Value::Null
             && (value != Parameters::default().get(*symbol)
                 || !symbol.description().symbol.is_empty())
@@ -342,22 +376,19 @@ pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
                 .all(|parameters| parameters.get(*symbol) == value)
     };
     let setting = |symbol: Symbol| {
-        let setting = match first.get(symbol) {
-            Value::Real(real) => label(symbol.key()).setting(real, Digits::THREE),
-            value => format!("{} = {value}", symbol_of(symbol)),
-        };
-        // Lines are not broken within one.
-        setting.replace(' ', "\u{a0}")
+        let value = first.get(symbol);
+        setting(symbol, value, value.number().as_slice())
     };
     let shown = Symbol::ALL.into_iter().filter(is_shown);
-    shown.map(setting).collect::<Vec<_>>().join(", ")
+    shown.filter_map(setting).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
 mod tests {
     use super::quantity::tests::set;
     use super::*;
-    use crate::reduce::HistogramBin;
+    use crate::reduce::{BackboneBin, HistogramBin, Point};
+    use crate::sets::symbol_of;
     use crate::table::Table;
     use crate::table::arrow::Gaps;
     use crate::table::file::{Footer, TableWriter};
@@ -386,6 +417,10 @@ mod tests {
         (root, layout)
     }
 
+    fn files_of(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
+        Ok(draw_all(layout, &Beside::default(), look, formats)?.files)
+    }
+
     fn modulated(step: u32) -> Point {
         let period = 0.01 * f64::from(1 + step % 5);
         Point {
@@ -405,7 +440,7 @@ mod tests {
     #[test]
     fn figures_are_byte_identical_when_drawn_again() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
-        let files = draw_all(&layout, &[], &Look::default(), &Format::DEFAULT).unwrap();
+        let files = files_of(&layout, &Look::default(), &Format::DEFAULT).unwrap();
         let names: Vec<_> = files
             .iter()
             .map(|file| file.file_name().unwrap().to_string_lossy().into_owned())
@@ -427,7 +462,7 @@ mod tests {
         };
         let before = bytes();
         assert_eq!(
-            draw_all(&layout, &[], &Look::default(), &Format::DEFAULT).unwrap(),
+            files_of(&layout, &Look::default(), &Format::DEFAULT).unwrap(),
             files
         );
         assert!(bytes() == before);
@@ -445,14 +480,14 @@ mod tests {
             ..Look::default()
         };
         let drawn = || {
-            let files = draw_all(&layout, &[], &look, &[Format::Pdf]).unwrap();
+            let files = files_of(&layout, &look, &[Format::Pdf]).unwrap();
             fs::read(&files[0]).unwrap()
         };
         let pdf = drawn();
         assert!(pdf.starts_with(b"%PDF-") && pdf.trim_ascii_end().ends_with(b"%%EOF"));
         assert!(drawn() == pdf);
         let svg =
-            fs::read_to_string(&draw_all(&layout, &[], &look, &[Format::Svg]).unwrap()[0]).unwrap();
+            fs::read_to_string(&files_of(&layout, &look, &[Format::Svg]).unwrap()[0]).unwrap();
         assert!(svg.contains(r#"width="86.00mm""#), "{}", &svg[..200]);
     }
 
@@ -460,9 +495,8 @@ mod tests {
     fn a_size_that_a_figure_does_not_fit_is_refused_with_the_least_one() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
         let drawn = |width, height| {
-            draw_all(
+            files_of(
                 &layout,
-                &[],
                 &Look {
                     size: Some(Size { width, height }),
                     ..Look::default()
@@ -488,7 +522,7 @@ mod tests {
         };
         let (_root, layout) = reduced(&[still]);
         assert!(
-            draw_all(&layout, &[], &Look::default(), &Format::DEFAULT)
+            files_of(&layout, &Look::default(), &Format::DEFAULT)
                 .unwrap()
                 .is_empty()
         );
@@ -499,7 +533,7 @@ mod tests {
         let mut other = set(1e-6, 0.02, 4.0).parameters.parameters;
         other.blocks = 9;
         let all = [set(1e-6, 0.02, 4.0).parameters.parameters, other];
-        let found = common(all.iter()).replace('\u{a0}', " ");
+        let found = common(all.iter(), &[]).replace('\u{a0}', " ");
         assert!(
             found.starts_with("Nₛ = 20, M = 11.5 kg, K = 10⁸ N/m, K_d = 4·10⁷ N/m"),
             "{found}"
@@ -508,7 +542,9 @@ mod tests {
             found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1 µm, T = 20 ms"),
             "{found}"
         );
-        assert!(!found.contains("N = ") && !found.contains("seed") && common([].iter()).is_empty());
+        assert!(
+            !found.contains("N = ") && !found.contains("seed") && common([].iter(), &[]).is_empty()
+        );
         let symbols = [Symbol::RampTime, Symbol::Seed, Symbol::TauR, Symbol::V0].map(symbol_of);
         assert_eq!(symbols, ["ramp time", "seed", "τᵣ", "V₀"]);
     }

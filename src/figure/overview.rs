@@ -1,8 +1,8 @@
 //! The overview of a sweep: what was found of the sets, over what was swept.
 
-use super::chart::{Chart, MAX_COLUMNS};
-use super::quantity::Quantity;
-use super::{Look, Other, Picture, with_others};
+use super::chart::{Chart, MAX_COLUMNS, Rows};
+use super::quantity::{Quantity, belongs_to_all};
+use super::{Beside, Look, Picture};
 use crate::observe::Regime;
 use crate::reduce::{SetRow, swept};
 
@@ -19,9 +19,9 @@ const QUANTITIES: [&str; 5] = [
 
 /// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third
 /// panels. A single set is a dot over its velocity. `None` if nothing was found.
-pub(super) fn overview(own: &[SetRow], others: &[Other], look: &Look) -> Option<Picture> {
+pub(super) fn overview(own: &[SetRow], beside: &Beside, look: &Look) -> Option<Picture> {
     let swept = swept(own);
-    let (rows, others) = with_others(own.to_vec(), others);
+    let (rows, others) = beside.with_others(own.to_vec());
     let rows = &rows[..];
     let quantity = |place: usize, option| Quantity::of(rows, option, swept.get(place)?.name()).ok();
     let x = quantity(0, "x").or_else(|| Quantity::of(rows, "x", "V0").ok())?;
@@ -41,6 +41,7 @@ pub(super) fn overview(own: &[SetRow], others: &[Other], look: &Look) -> Option<
     let fills_panels = |place: &usize| {
         let places = swept[*place].places();
         let mut values = places.clone();
+        values.retain(|value| value.is_some() || !belongs_to_all(&swept[*place]));
         values.sort();
         values.dedup();
         let has_all = |y: &Quantity<'_>| {
@@ -56,9 +57,12 @@ pub(super) fn overview(own: &[SetRow], others: &[Other], look: &Look) -> Option<
     let panels = panels.map(|place| swept[place].clone());
     Chart {
         of: "sets",
-        sets: rows,
-        others,
-        swept: &swept,
+        rows: Rows {
+            sets: rows,
+            swept: &swept,
+            beside,
+            others,
+        },
         x,
         ys,
         colour,
@@ -82,7 +86,9 @@ mod tests {
     }
 
     fn overview_of(sets: &[SetRow]) -> String {
-        overview(sets, &[], &Look::default()).unwrap().svg()
+        overview(sets, &Beside::default(), &Look::default())
+            .unwrap()
+            .svg()
     }
 
     #[test]
@@ -118,7 +124,7 @@ mod tests {
             overview_of(&sets[..1]).contains("Drive velocity V₀"),
             "a single set"
         );
-        assert!(overview(&[], &[], &Look::default()).is_none());
+        assert!(overview(&[], &Beside::default(), &Look::default()).is_none());
     }
 
     #[test]

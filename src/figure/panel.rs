@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::frame::{Cell, Ends, Frame, HEADING, Layout, Place};
 use super::hues::{COLOUR_BAR, ColourBar};
-use super::legend::Entry;
+use super::legend::{Entry, Mark};
 use super::picture::Picture;
 use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, Look, Stroke, WHITE, hollow};
 
@@ -160,6 +160,8 @@ pub(super) fn draw(
     legend: &[Entry],
     panels: Vec<Panel<'_>>,
 ) -> Picture {
+    let is_absent = |(mark, _): &Entry| matches!(mark, Mark::Absent);
+    let (absent, legend): (Vec<Entry>, Vec<Entry>) = legend.iter().cloned().partition(is_absent);
     if panels.iter().any(|panel| panel.bar.is_some()) {
         layout.right = COLOUR_BAR;
     }
@@ -167,7 +169,8 @@ pub(super) fn draw(
         layout.heading = HEADING;
     }
     let heights: Vec<f64> = panels.iter().map(|panel| panel.height).collect();
-    let (page, mut sheet) = layout.page(name, look, legend, &heights);
+    let (page, mut sheet) = layout.page(name, look, &legend, &heights);
+    sheet.absent = absent.into_iter().map(|(_, name)| name).collect();
     for (number, panel) in panels.into_iter().enumerate() {
         let frame = page.frame(number, panel.x, panel.y);
         for layer in panel.layers {

@@ -2,7 +2,9 @@
 
 use super::BadOption;
 use super::pdf::pdf;
-use super::style::{BLACK, Dot, Fill, HALF_DIGIT, Ink, Look, Size, Stroke, Style, text_width};
+use super::style::{
+    BLACK, Dot, FACE, Fill, HALF_DIGIT, Ink, Look, Size, Stroke, Style, text_width,
+};
 use crate::table::shown::shown_text;
 use crate::table::value::words;
 use anyhow::{Result, anyhow};
@@ -11,6 +13,7 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 pub(super) use kuva::render::render::TextAnchor as Anchor;
 use kuva::render::render::{Primitive, Scene};
+use std::collections::BTreeSet;
 
 /// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
@@ -27,6 +30,10 @@ pub struct Picture {
     name: String,
     pub(super) style: Style,
     note: String,
+    /// In what each of several directories differs from others.
+    pub(super) directories: Vec<String>,
+    /// Names of directories of which it shows nothing.
+    pub(super) absent: Vec<String>,
     pub(super) scene: Scene,
 }
 
@@ -60,8 +67,28 @@ impl Picture {
 
     /// Its small print, which print leaves to the caption.
     pub fn note(&self) -> String {
+        let lines = std::iter::once(&self.note).chain(&self.directories);
         // Lines may be broken anywhere there.
-        self.note.replace('\u{a0}', " ")
+        lines
+            .map(|line| line.replace('\u{a0}', " "))
+            .collect::<Vec<_>>()
+            .join("\n")
+    }
+
+    /// Letters in its texts that its font lacks.
+    pub(super) fn boxes(&self) -> BTreeSet<char> {
+        let texts = self
+            .scene
+            .elements
+            .iter()
+            .filter_map(|primitive| match primitive {
+                Primitive::Text { content, .. } => Some(content),
+                _ => None,
+            });
+        let letters = texts.flat_map(|text| text.chars());
+        letters
+            .filter(|letter| FACE.glyph_index(*letter).is_none())
+            .collect()
     }
 
     pub fn size(&self) -> Size {
@@ -124,6 +151,8 @@ impl Picture {
             name: name.to_owned(),
             style: look.style,
             note: look.note.clone(),
+            directories: look.directories.clone(),
+            absent: Vec::new(),
             scene,
         }
     }

@@ -289,10 +289,14 @@ pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str>
     })
 }
 
+/// Whether sets without a value of a column belong to every value: without modulation there is no period.
+pub(super) fn belongs_to_all(values: &Values) -> bool {
+    parameter(values.name()) == Some(Symbol::T)
+}
+
 /// What sets without a value of a column are called: of a period, that they have no modulation.
 pub(super) fn without_value(values: &Values) -> String {
-    let is_period = parameter(&values.column.name) == Some(Symbol::T);
-    if is_period {
+    if belongs_to_all(values) {
         "Δ = 0".to_owned()
     } else {
         format!("no {}", values.label().symbol)

@@ -60,7 +60,7 @@ pub fn simulation(
     map: Option<&[MapRow]>,
     onsets: [&[f64]; 2],
 ) -> Result<Picture> {
-    let of_all = common(std::iter::once(parameters));
+    let of_all = common(std::iter::once(parameters), &[]);
     let look = &Look::default().with_note(&format!("{of_all}, seed {}", parameters.seed));
     let instants = trace.into_iter().flatten().map(|sample| sample.0);
     let instants = instants.chain(map.into_iter().flatten().map(|cell| cell.time));

@@ -90,6 +90,8 @@ pub struct Look {
     pub size: Option<Size>,
     /// Small print under them, or in the caption.
     pub note: String,
+    /// A line of small print for each of several directories: in what it differs from others.
+    pub directories: Vec<String>,
 }
 
 impl Look {
@@ -249,11 +251,15 @@ pub(super) const STRIPE: Fill = Fill {
 /// Radius of the dots of statistics.
 pub(super) const RADIUS: f64 = 4.2;
 
-/// The outline, at a place of a sheet, of the mark of another directory by its number: a diamond, a triangle, a pentagon.
+/// The marks of other directories: corners, and where the first stands, in corners from the top. A diamond, a triangle,
+/// a pentagon, a triangle upside down, a square.
+pub(super) const HOLLOW: [(u32, f64); 5] = [(4, 0.0), (3, 0.0), (5, 0.0), (3, 0.5), (4, 0.5)];
+
+/// The outline, at a place of a sheet, of the mark of another directory by its number.
 pub(super) fn hollow(other: usize, (x, y): Place) -> Vec<Place> {
-    let corners = [4, 3, 5][other % 3];
+    let (corners, first) = HOLLOW[other];
     let corner = |number: u32| {
-        let turn = TAU * f64::from(number) / f64::from(corners);
+        let turn = TAU * (f64::from(number) + first) / f64::from(corners);
         let radius = 1.3 * RADIUS;
         (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
     };

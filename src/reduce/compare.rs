@@ -6,6 +6,7 @@
 //! mean over these seeds, of what each adds to it: the jackknife to first order, in a time proportional to the number
 //! of slips.
 
+use super::differences::Difference;
 use super::gather::{Gathered, Gathering, MAX_SLIPS, sets_of};
 use super::sequence::{Sum, unit};
 use super::set::{SetJobs, non_nan};
@@ -101,9 +102,11 @@ fn pairs<'a>(
             .map(|&symbol| set.parameters.get(symbol).to_string());
         values.collect::<Vec<_>>()
     };
-    let of_b: BTreeMap<Vec<String>, &SetJobs> = b.iter().map(|set| (key(set), set)).collect();
-    let pair = |set: &'a SetJobs| {
-        let other = of_b.get(&key(set)).copied()?;
+    let mut of_b: BTreeMap<Vec<String>, Vec<&SetJobs>> = BTreeMap::new();
+    for set in b {
+        of_b.entry(key(set)).or_default().push(set);
+    }
+    let pair = |set: &'a SetJobs, other: &'a SetJobs| {
         let is_used =
             |seeds: &SetJobs, seed: &u64| !have_common_seeds || seeds.finished.contains(seed);
         let seeds_of_a = set.finished.iter().filter(|seed| is_used(other, seed));
@@ -116,7 +119,11 @@ fn pairs<'a>(
         };
         (!pair.seeds_of_a.is_empty()).then_some(pair)
     };
-    a.iter().filter_map(pair).collect()
+    let others = |set: &SetJobs| of_b.get(&key(set)).cloned().unwrap_or_default();
+    let all = a
+        .iter()
+        .flat_map(|set| others(set).into_iter().map(move |other| (set, other)));
+    all.filter_map(|(set, other)| pair(set, other)).collect()
 }
 
 /// The interval of the error of a difference B - A, if those of both sides are independent.
@@ -134,13 +141,30 @@ fn independent(b: &Found, a: &Found, name: &str) -> Option<Interval> {
     })
 }
 
-/// Sets of two directories A and B that agree in all parameters that either varies: these parameters, the common seeds,
-/// and mean interval, mean friction and resultant length in A, in B, and their differences B - A with 95 % intervals.
-pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsError> {
+/// Two directories A and B side by side.
+pub struct Comparison {
+    /// Of their sets that agree in all parameters that either varies and both know: the parameters that either varies,
+    /// the seeds that count, and mean interval, mean friction and resultant length in A, in B, and their differences
+    /// B - A with 95 % intervals.
+    pub columns: Vec<Values>,
+    /// In what all sets of A differ from all of B.
+    pub differences: Vec<Difference>,
+}
+
+pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsError> {
     let sets_of_a = sets_in(a)?;
     let sets_of_b = sets_in(b)?;
-    let is_varied = |key: &Symbol| varies(&sets_of_a, *key) || varies(&sets_of_b, *key);
-    let keys: Vec<Symbol> = Symbol::ALL.into_iter().filter(is_varied).collect();
+    let both = [&sets_of_a, &sets_of_b];
+    let parameters = both.map(|sets| sets.iter().map(|set| &set.parameters).collect());
+    let mut differences = Difference::all(&parameters);
+    differences.retain(Difference::is_constant);
+    let is_varied = |key: &Symbol| both.iter().any(|sets| varies(sets, *key));
+    let varied: Vec<Symbol> = Symbol::ALL.into_iter().filter(is_varied).collect();
+    let unknown = |key: &Symbol| {
+        let mut sets = both.iter().filter_map(|sets| sets.first());
+        sets.any(|set| set.parameters.unknown.contains(key))
+    };
+    let keys: Vec<Symbol> = varied.iter().copied().filter(|key| !unknown(key)).collect();
     let have_common_seeds = [a, b]
         .iter()
         .all(|results| results.sweep().measured().is_none());
@@ -156,10 +180,14 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
     let of_pair = |pair: &Pair<'_>| (&found_in_a[&pair.a.set_id], &found_in_b[&pair.b.set_id]);
     let sets: Vec<(&Found, &Found)> = pairs.iter().map(of_pair).collect();
 
-    let seeds = pairs
-        .iter()
-        .map(|pair| (Some(pair.seeds_of_a.len() as f64), None));
-    let mut found = vec![Values::computed("seeds", Kind::Count, seeds)];
+    let seeds = |name: &str, count: fn(&Pair<'_>) -> usize| {
+        let counts = pairs.iter().map(|pair| (Some(count(pair) as f64), None));
+        Values::computed(name, Kind::Count, counts)
+    };
+    let mut found = vec![
+        seeds("seeds_a", |pair| pair.seeds_of_a.len()),
+        seeds("seeds_b", |pair| pair.seeds_of_b.len()),
+    ];
     for (statistic, name) in STATISTICS.into_iter().enumerate() {
         let number = |found: &Found| found.row.number(name);
         let difference = |(a, b): &(&Found, &Found)| {
@@ -177,15 +205,31 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Vec<Values>, ResultsE
         let in_b = sets.iter().map(|(_, b)| (number(b), None));
         let differences = sets.iter().map(difference);
         let name = |which| format!("{name}_{which}");
-        found.extend([
+        let mut of_statistic = [
             Values::computed(&name("a"), Kind::Real, in_a),
             Values::computed(&name("b"), Kind::Real, in_b),
             Values::computed(&name("difference"), Kind::Real, differences),
-        ]);
+        ];
+        let largest = of_statistic
+            .iter()
+            .map(|values| values.largest)
+            .fold(0.0, f64::max);
+        for values in &mut of_statistic {
+            values.largest = largest;
+        }
+        found.extend(of_statistic);
     }
     found.retain(|values| values.numbers.iter().any(Option::is_some));
-    let rows: Vec<SetRow> = sets.iter().map(|(a, _)| a.row.clone()).collect();
-    let parameters = keys.into_iter().map(column_of);
-    let parameters = parameters.filter_map(|name| Values::of(&rows, name).ok());
-    Ok(parameters.chain(found).collect())
+    let of_a: Vec<SetRow> = sets.iter().map(|(a, _)| a.row.clone()).collect();
+    let of_b: Vec<SetRow> = sets.iter().map(|(_, b)| b.row.clone()).collect();
+    let parameters = varied.into_iter().filter_map(|key| {
+        let is_of_a = sets_of_a
+            .iter()
+            .all(|set| !set.parameters.unknown.contains(&key));
+        Values::of(if is_of_a { &of_a } else { &of_b }, column_of(key)).ok()
+    });
+    Ok(Comparison {
+        columns: parameters.chain(found).collect(),
+        differences,
+    })
 }

@@ -5,6 +5,7 @@ mod backbone;
 mod compare;
 mod confidence;
 mod crossings;
+mod differences;
 mod dimension;
 mod drive_alone;
 mod gather;
@@ -17,16 +18,17 @@ mod slips;
 mod triggers;
 mod values;
 
-pub use crate::sets::{FREQUENCY, SetRow};
+pub use crate::sets::{FREQUENCY, SetRow, is_same};
 pub use crate::table::columns::Interval;
 pub use backbone::BackboneBin;
-pub use compare::compare;
+pub use compare::{Comparison, compare};
 #[cfg(test)]
 pub(crate) use confidence::mean_of;
 pub(crate) use confidence::student_at;
 #[cfg(test)]
 pub(crate) use crossings::{Edge, GROUPS, Sample};
 pub use crossings::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
+pub use differences::Difference;
 pub use gather::{Point, RampStage, reduce_chosen};
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
@@ -35,14 +37,12 @@ pub(crate) use reduction::RoundOfSet;
 pub(crate) use reduction::WRITER;
 pub use reduction::{
     HistogramBin, NoJobs, ReductionSummary, SetInRounds, advise, error_over_target, read_optional,
-    read_reduced, read_sets, reduce, renew,
+    read_reduced, read_sets, read_sets_in_rounds, reduce, renew,
 };
 pub use sequence::quantile;
 pub use slips::{SlipOfSet, means_of_slips, sample_of_slips};
 pub use triggers::{Mean, Pulses, TriggerRow};
-pub use values::{
-    Condition, Values, ascending, differing, has_even_steps, is_same, is_spread, swept,
-};
+pub use values::{Condition, Values, ascending, differing, has_even_steps, is_spread, swept};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};

@@ -387,13 +387,20 @@ pub fn read_optional<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>, ResultsErr
     }
 }
 
+/// The rows of the reduced sets with how they came about in rounds, controls left out, in order.
+pub fn read_sets_in_rounds<'a>(
+    layout: &Layout<'a>,
+) -> impl Iterator<Item = Result<SetInRounds, ResultsError>> + use<'a> {
+    let file = layout.reduced_file(SetRow::NAME);
+    let rows = Dataset::new(layout.storage, vec![file]).rows::<SetInRounds>();
+    rows.filter(|row| !matches!(row, Ok((set, _)) if set.is_control))
+}
+
 /// The rows of the reduced sets, controls left out, in order.
 pub fn read_sets<'a>(
     layout: &Layout<'a>,
 ) -> impl Iterator<Item = Result<SetRow, ResultsError>> + use<'a> {
-    let file = layout.reduced_file(SetRow::NAME);
-    let rows = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
-    rows.filter(|row| !matches!(row, Ok(row) if row.is_control))
+    read_sets_in_rounds(layout).map(|row| row.map(|(set, _)| set))
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 //! Angles are unit vectors: their mean has a direction and a resultant length. What each job adds to a length is the
 //! jackknife over jobs, to first order.
 
+use super::confidence::ROUNDING;
 use crate::table::value::floored;
 use std::f64::consts::TAU;
 
@@ -140,10 +141,18 @@ impl Estimate<1> {
         self.mean().map(|[mean]| mean)
     }
 
-    /// The squared deviation of a value from the mean.
-    pub(super) fn square_of_deviation(&self) -> impl Fn(f64) -> f64 + use<> {
+    /// The squared deviation of a value from the mean, 0 within the rounding of what values are differences of, of up
+    /// to this size.
+    pub(super) fn square_of_deviation(&self, size: f64) -> impl Fn(f64) -> f64 + use<> {
         let mean = self.value().unwrap_or_default();
-        move |value| (value - mean) * (value - mean)
+        move |value| {
+            let deviation = value - mean;
+            if deviation.abs() <= ROUNDING * size {
+                0.0
+            } else {
+                deviation * deviation
+            }
+        }
     }
 }
 
@@ -295,6 +304,23 @@ mod tests {
     use super::super::sequence::Sequences;
     use super::*;
     use std::f64::consts::PI;
+
+    #[test]
+    fn what_rounding_leaves_of_equal_values_is_no_deviation() {
+        let onsets: Vec<f64> = (0..40)
+            .map(|slip| 1000.0 + 0.15 * f64::from(slip))
+            .collect();
+        let intervals: Vec<f64> = onsets.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let mean = Sequences::of([intervals.iter().map(|interval| [*interval])]).estimate();
+        let squares = |size| {
+            intervals
+                .iter()
+                .map(|&x| mean.square_of_deviation(size)(x))
+                .sum::<f64>()
+        };
+        assert!(squares(0.0) > 0.0 && squares(onsets[39]) == 0.0);
+        assert!(mean.square_of_deviation(onsets[39])(0.15 + 1e-11) > 0.0);
+    }
 
     /// How often of 100 the interval of a mean of 0 holds it, for jobs of such values.
     fn covered(jobs: usize, mut values: impl FnMut(&mut Draws) -> Vec<f64>) -> f64 {

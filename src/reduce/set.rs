@@ -121,7 +121,7 @@ fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongu
     let peak_forces = sequences(jobs, |slip| Some([non_nan(slip.peak_force)?])).estimate();
     row.peak_force_mean = peak_forces.value();
     row.peak_force_interval = peak_forces.interval_with(unseen);
-    let square = drops.square_of_deviation();
+    let square = drops.square_of_deviation(largest(jobs, |slip| slip.peak_force.max(slip.drop)));
     let squares = sequences(jobs, |slip| Some([square(non_nan(slip.drop)?)])).estimate();
     let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&drops));
     (row.drop_deviation, row.drop_deviation_interval) = squares.deviation(unseen);
@@ -194,6 +194,14 @@ impl Cycles {
     }
 }
 
+fn largest(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats) -> f64) -> f64 {
+    jobs.iter()
+        .copied()
+        .flatten()
+        .map(quantity)
+        .fold(0.0, f64::max)
+}
+
 /// A quantity that some of the slips have.
 fn sequences<const D: usize>(
     jobs: &[&[SlipStats]],
@@ -259,7 +267,7 @@ impl<'a> Intervals<'a> {
         let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_mean(&mean));
         row.tau_mean = mean.value();
         row.tau_interval = mean.interval_with(unseen);
-        let square = mean.square_of_deviation();
+        let square = mean.square_of_deviation(largest(self.jobs, |slip| slip.onset));
         let squares = self.estimate(|interval| [square(interval)]);
         let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&mean));
         (row.tau_deviation, row.tau_deviation_interval) = squares.deviation(unseen);

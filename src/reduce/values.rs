@@ -5,15 +5,12 @@
 
 use super::dimension::unit_of_formula;
 use crate::model::Symbol;
-use crate::sets::{Digits, FREQUENCY, Label, SetRow, label};
+use crate::sets::{Digits, FREQUENCY, Label, SetRow, is_same, label};
 use crate::sweep::{Expression, nearest, synonym};
 use crate::table::columns::{Column, Kind, Row, Value};
 use crate::table::value::{Shortest, floored};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
-
-/// Numbers that differ by less than this share count as equal: they were computed from numbers with twelve digits.
-const SAME: f64 = 1e-10;
 
 /// A column of the sets, or of other rows, or a formula of such.
 #[derive(Clone, Debug)]
@@ -29,6 +26,8 @@ pub struct Values {
     pub distinct: Vec<f64>,
     /// The words that occur, sorted; empty for a column of numbers.
     pub words: Vec<String>,
+    /// The largest size of numbers whose unit it shares: its own, and those of what it is compared with.
+    pub largest: f64,
 }
 
 impl Values {
@@ -80,6 +79,10 @@ impl Values {
             sources: vec![column.name.clone()],
             column,
             distinct: ascending(numbers.iter().copied().flatten()),
+            largest: numbers
+                .iter()
+                .flatten()
+                .fold(0.0, |size, number| size.max(number.abs())),
             numbers,
             intervals,
             words,
@@ -122,6 +125,18 @@ impl Values {
         Self::new(column, numbers, intervals, Vec::new())
     }
 
+    /// The same without η = 0, which stands for no modulation: as the period, it has no value there.
+    pub fn of_modulated(mut self) -> Self {
+        if self.name() == "eta" {
+            let is_modulated = |eta: &f64| *eta > 0.0;
+            for number in &mut self.numbers {
+                *number = number.filter(is_modulated);
+            }
+            self.distinct.retain(is_modulated);
+        }
+        self
+    }
+
     pub fn name(&self) -> &str {
         &self.column.name
     }
@@ -145,8 +160,7 @@ impl Values {
 
     /// The factor to the unit in which they are read best, and that unit.
     pub fn scale(&self) -> (f64, &'static str) {
-        let sizes = self.numbers.iter().flatten().map(|value| value.abs());
-        self.label().scale(sizes.fold(0.0, f64::max))
+        self.label().scale(self.largest)
     }
 
     /// The digits that distinguish its values if it is a parameter, or computed from parameters; three for a statistic,
@@ -305,10 +319,6 @@ pub fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values
 }
 
-pub fn is_same(value: f64, other: f64) -> bool {
-    (value - other).abs() <= SAME * value.abs()
-}
-
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
 const EVEN: f64 = 0.02;
 /// Ratio from which two values lie on a logarithmic axis.
@@ -337,6 +347,7 @@ pub fn swept(rows: &[SetRow]) -> Vec<Values> {
             &[symbol.key()]
         };
         let columns = names.iter().filter_map(|name| Values::of(rows, name).ok());
+        let columns = columns.map(Values::of_modulated);
         columns.min_by_key(|swept| (swept.distinct.len(), !has_even_steps(&swept.distinct)))
     };
     let symbols = differing(&rows.iter()).into_iter();

@@ -3,11 +3,15 @@
 
 use super::SetRow;
 use crate::model::Symbol;
-use crate::table::columns::Row;
+use crate::table::columns::{Row, Value};
 use std::collections::HashSet;
 
 /// Digits that distinguish all doubles.
 const MAX_DIGITS: usize = 17;
+/// Most digits of a value that a person has probably written, such as K_d = 10025 N/m, and no computation.
+const WRITTEN_DIGITS: usize = 6;
+/// Numbers that differ by less than this share count as equal: they were computed from numbers with twelve digits.
+const SAME: f64 = 1e-10;
 
 /// Longest meaning, in bytes, that is what a column is in a few words.
 const LONGEST: usize = 40;
@@ -144,6 +148,18 @@ fn with_unit(label: &str, unit: &str) -> String {
     }
 }
 
+/// A parameter and its value with digits that distinguish these, without a space at which a line may be broken. `None`
+/// if it has no value, such as the period of no modulation.
+pub fn setting(symbol: Symbol, value: Value<'_>, beside: &[f64]) -> Option<String> {
+    let digits = Digits::THREE.distinguishing(beside);
+    let setting = match value {
+        Value::Null => return None,
+        Value::Real(real) => label(symbol.key()).setting(real, digits),
+        value => format!("{} = {value}", symbol_of(symbol)),
+    };
+    Some(setting.replace(' ', "\u{a0}"))
+}
+
 /// The symbol of a parameter in the paper, or its key, with the subscripts that there are letters for.
 pub fn symbol_of(symbol: Symbol) -> String {
     let description = symbol.description();
@@ -170,34 +186,50 @@ fn capitalised(text: &str) -> String {
     })
 }
 
-/// The number of significant digits that readers see of the values of a column.
+/// The number of significant digits that readers see of the values of a column, and the number up to which a value is
+/// shown whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Digits(usize);
+pub struct Digits {
+    usual: usize,
+    whole: usize,
+}
 
 impl Digits {
-    pub const THREE: Self = Self(3);
-    pub const FOUR: Self = Self(4);
-    pub const ALL: Self = Self(MAX_DIGITS);
+    pub const THREE: Self = Self::new(3);
+    pub const FOUR: Self = Self::new(4);
+    pub const ALL: Self = Self::new(MAX_DIGITS);
 
-    /// At least as many, and enough that no two of these values look alike unless they are the same.
+    const fn new(usual: usize) -> Self {
+        Self {
+            usual,
+            whole: usual,
+        }
+    }
+
+    /// Those of given values, such as parameters: at least as many, and enough that no two of them look alike unless
+    /// they are the same. A value that a person can have written is shown as such.
     pub fn distinguishing(self, values: &[f64]) -> Self {
         let distinct = |digits| {
-            let shown = values.iter().map(|value| Self(digits).rounded(*value));
+            let shown = values.iter().map(|value| rounded(*value, digits));
             shown.map(f64::to_bits).collect::<HashSet<_>>().len()
         };
         let all = distinct(MAX_DIGITS);
-        let enough = (self.0..MAX_DIGITS).find(|digits| distinct(*digits) == all);
-        Self(enough.unwrap_or(MAX_DIGITS))
-    }
-
-    /// Through the decimal form, so that 29.000000000000004 is 29.
-    fn rounded(self, value: f64) -> f64 {
-        format!("{value:.*e}", self.0 - 1).parse().unwrap_or(value)
+        let enough = (self.usual..MAX_DIGITS).find(|digits| distinct(*digits) == all);
+        let usual = enough.unwrap_or(MAX_DIGITS);
+        Self {
+            usual,
+            whole: usual.max(WRITTEN_DIGITS),
+        }
     }
 
     /// A value without digits that say nothing.
     pub fn number(self, value: f64) -> String {
-        let rounded = self.rounded(value);
+        let whole = rounded(value, self.whole);
+        let rounded = if is_same(whole, value) {
+            whole
+        } else {
+            rounded(value, self.usual)
+        };
         if rounded == 0.0 || (1e-3..1e5).contains(&rounded.abs()) {
             (rounded + 0.0).to_string()
         } else {
@@ -218,10 +250,19 @@ impl Digits {
     }
 }
 
+/// Through the decimal form, so that 29.000000000000004 is 29.
+fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
+}
+
 /// With this many decimals, and no sign before zero.
 pub fn with_decimals(value: f64, decimals: usize) -> String {
     let rounded: f64 = format!("{value:.decimals$}").parse().unwrap_or(value);
     format!("{:.decimals$}", rounded + 0.0)
+}
+
+pub fn is_same(value: f64, other: f64) -> bool {
+    (value - other).abs() <= SAME * value.abs()
 }
 
 pub fn power_of_ten(mantissa: f64, power: i32) -> String {
@@ -305,6 +346,13 @@ mod tests {
             ]
         );
         assert_eq!(shown(&[4e7, 4.0004e7])[1], ["4.0004e7", "4.0004·10⁷"]);
+        // What a person can have written is whole, what is computed is not.
+        assert_eq!(shown(&[1002.0, 2254.0]), [["1002"; 2], ["2254"; 2]]);
+        assert_eq!(shown(&[100.0 / 3.0, 45.25])[0][0], "33.3");
+        assert_eq!(
+            shown(&[1.0 / 58.0 * 1e3, 45.25]),
+            [["17.2"; 2], ["45.25"; 2]]
+        );
         let neighbours = [0.3, 0.3_f64.next_up()];
         assert_eq!(shown(&neighbours)[1][0], "0.30000000000000004");
         assert_eq!(shown(&[-0.0])[0][0], "0");

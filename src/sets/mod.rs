@@ -3,7 +3,7 @@
 
 mod label;
 
-pub use label::{Digits, Label, label, power_of_ten, symbol_of, with_decimals};
+pub use label::{Digits, Label, is_same, label, power_of_ten, setting, symbol_of, with_decimals};
 
 use crate::model::{Selected, Selection, Symbol};
 use crate::observe::Regime;

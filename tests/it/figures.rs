@@ -320,6 +320,10 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
             &["a PNG of 2232 million pixels", "the most is 100 million"],
         ),
         ("--format eps", &["svg, png, pdf"]),
+        (
+            "--x V0 --y tau_mean --with r --legend one",
+            &["--legend one: 2 directories"],
+        ),
         ("--style poster", &["screen, print"]),
         (
             "--x V0 --y tau_mean -o own.eps",
@@ -336,7 +340,74 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
             );
         }
     }
+    for option in ["xlabel", "ylabel"] {
+        let long = format!("plot r --x V0 --y tau_mean --{option} {}", "W".repeat(1001));
+        let problem =
+            format!("--{option} WWWWWWWWWWWWWWWWWWWW…: has 1001 characters; it may have 1000");
+        assert!(folder.ends(2, &long).stderr.contains(&problem));
+    }
     assert!(folder.contents("") == before);
+}
+
+#[test]
+fn letters_that_the_font_lacks_are_named_in_every_format_and_text() {
+    let folder = own();
+    folder.ends(0, "run own.toml --out 振幅 --threads 2");
+    let name = "font of figures lacks ";
+    for format in ["svg", "png", "pdf"] {
+        let plot = format!("plot r --x V0 --y tau_mean -o own.{format}");
+        assert_eq!(folder.ends(0, &plot).stderr, "", "{format}");
+        let said = folder.ends(0, &format!("{plot} --ylabel 频率τ频")).stderr;
+        assert!(
+            said.contains(&format!("{name}率 频: boxes")),
+            "{format}: {said}"
+        );
+    }
+    for options in [
+        "--with 振幅",
+        "--with r --legend 振 --legend 幅",
+        "--x V0 --y tau_mean --with 振幅",
+    ] {
+        let said = folder.ends(0, &format!("plot r {options}")).stderr;
+        assert!(
+            said.contains(&format!("{name}幅 振: boxes")),
+            "{options}: {said}"
+        );
+    }
+}
+
+#[test]
+fn sets_without_modulation_stand_in_every_panel_of_a_period() {
+    let folder = Folder::new();
+    let sweep = |amplitudes: &str| {
+        format!(
+            "name = \"s\"\n[model]\nN = 3\nNs = 4\n[axes]\nKd = [1e7, 2e7, 3e7, 4e7]\nDelta = {amplitudes}\neta = [2, 5]\n\
+             seed = {{ count = 2 }}\n[record]\nslips = 6\n"
+        )
+    };
+    for (directory, amplitudes) in [("with", "[0, 1e-6, 2e-6]"), ("without", "[1e-6, 2e-6]")] {
+        folder.write("sweep.toml", &sweep(amplitudes));
+        folder.ends(0, &format!("run sweep.toml --out {directory}"));
+        let overview = format!("{directory}/figures/overview.svg");
+        let overview = fs::read_to_string(folder.path(&overview)).unwrap();
+        assert!(
+            !overview.contains("not told apart") && overview.contains(">η = 5<"),
+            "{directory}"
+        );
+        assert_eq!(overview.contains(">Δ = 0<"), directory == "with");
+    }
+    folder.ends(0, "plot with --x Kd --y tau_mean --panels eta -o own.svg");
+    let own = fs::read_to_string(folder.path("own.svg")).unwrap();
+    assert!(
+        own.contains(">(b)<") && !own.contains(">(c)<"),
+        "no panel of its own"
+    );
+    // In the colour of what is off: four sets in either panel, and the legend's dot.
+    assert_eq!(
+        own.matches(r##"r="4.2" fill="#000000""##).count(),
+        2 * 4 + 1,
+        "{own}"
+    );
 }
 
 #[test]

@@ -189,7 +189,7 @@ fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
     );
     let seeds = folder.ends(0, "show model out").stdout;
     assert!(
-        seeds.contains("⟨τ⟩, B − A") && !seeds.contains("model.N"),
+        seeds.contains("⟨τ⟩, B − A") && seeds.starts_with("A is model\nB is out\n"),
         "{seeds}"
     );
     // The same slips on both sides, taken as independent: the errors of both add up.
@@ -224,10 +224,12 @@ fn figures_show_other_directories_as_hollow_marks_under_their_names() {
     folder.ends(0, "plot model --with mine");
     for (name, before) in standing.iter().zip(before) {
         let with = figure(name);
-        assert!(
-            with.contains(">mine<") && !before.contains(">mine<"),
-            "{name}"
-        );
+        for directory in [">mine<", ">model<"] {
+            assert!(
+                with.contains(directory) && !before.contains(directory),
+                "{name}: {directory}"
+            );
+        }
         assert!(
             with.matches("<path").count() > before.matches("<path").count(),
             "{name}"
@@ -253,6 +255,117 @@ fn figures_show_other_directories_as_hollow_marks_under_their_names() {
     assert!(!figure("phi-eta").contains(">mine<"));
     folder.ends(2, "plot model --with nowhere");
     folder.ends(2, "plot model --with mine --of slips --x onset --y drop");
+}
+
+/// A directory of a model of two sizes, and one of 16 measured slips at each of these settings.
+fn beside(measured: &[(&str, &str)]) -> Folder {
+    let folder = Folder::new();
+    let sizes = MODEL
+        .replace("N = 10\n", "")
+        .replace("seed = { count = 9 }", "seed = { count = 3 }\nN = [5, 10]");
+    folder.write("model.toml", &sizes);
+    folder.ends(0, "run model.toml --out model");
+    folder.write("slips.csv", &lines("onset", |n| format!("{}.5", n * n)));
+    for (directory, settings) in measured {
+        folder.ends(0, &format!("measured slips.csv -o {directory} {settings}"));
+    }
+    folder
+}
+
+#[test]
+fn in_what_directories_differ_is_said_wherever_they_stand_side_by_side() {
+    let folder = beside(&[
+        (
+            "slow",
+            "--set V0=2e-5 --set Kd=2254 --set Delta=1e-6 --set frequency=29",
+        ),
+        (
+            "same",
+            "--set V0=1e-4 --set Kd=4e7 --set Delta=1e-6 --set frequency=29",
+        ),
+    ]);
+    let slow = "slow: K_d = 2254 N/m, V₀ = 2·10⁻⁵ m/s, Δ = 1 µm, T = 34.5 ms";
+    let plot = "plot model --x frequency --y tau_mean --style print -o own.svg";
+    let said = folder.ends(0, &format!("{plot} --with slow")).stderr;
+    let (caption, said) = said.split_once("differs").unwrap();
+    for line in [slow, "model: K_d = 4·10⁷ N/m, V₀ = 10⁻⁴ m/s"] {
+        assert!(caption.contains(&format!("\n{line}\n")) && said.contains(&format!("  {line}\n")));
+    }
+    // What only the model knows is common to all that know it, and what all share is no difference.
+    assert!(
+        caption.contains("Nₛ = 5, ") && !said.contains("Nₛ"),
+        "{caption}"
+    );
+    let same = folder.ends(0, &format!("{plot} --with same")).stderr;
+    assert!(
+        same.contains("\nsame: Δ = 1 µm, T = 34.5 ms\n") && !same.contains("model: "),
+        "{same}"
+    );
+    let standing = folder.ends(0, "plot model --with slow");
+    assert!(standing.stderr.contains(slow), "{}", standing.stderr);
+    let svg = fs::read_to_string(folder.path("model/figures/overview.svg")).unwrap();
+    assert!(svg.contains(" = 2254 N/m, V₀ = 2·10⁻⁵ m/s"), "{svg}");
+
+    let shown = folder.ends(0, "show model slow");
+    assert!(
+        shown.stdout.starts_with("A is model: K_d = 4·10⁷ N/m, V₀ = 10⁻⁴ m/s\nB is slow: K_d = 2254 N/m, V₀ = 2·10⁻⁵ m/s\n")
+            && shown.stderr.contains("warning: A and B differ in V₀, which"),
+        "{} {}",
+        shown.stdout,
+        shown.stderr
+    );
+    assert_eq!(folder.ends(0, "show model same").stderr, "");
+    // The size, which no experiment knows, hinders no pair, on either side; each side has its count of seeds.
+    for (pair, seeds, difference) in [
+        ("model slow", [3, 1], [1e-4, 2e-5]),
+        ("slow model", [1, 3], [2e-5, 1e-4]),
+    ] {
+        let found = json(&folder.ends(0, &format!("show {pair} --json")).stdout);
+        assert_eq!(found["differences"]["V0"], serde_json::json!(difference));
+        assert!(found["differences"]["N"].is_null() && found["differences"]["T"].is_null());
+        let sets = found["sets"].as_array().unwrap();
+        let sizes: Vec<_> = sets.iter().map(|set| set["N"].as_u64().unwrap()).collect();
+        assert_eq!(sizes, [5, 10], "{pair}");
+        assert!(
+            sets.iter()
+                .all(|set| set["seeds_a"] == seeds[0] && set["seeds_b"] == seeds[1])
+        );
+    }
+}
+
+#[test]
+fn each_directory_with_a_mark_has_an_entry_of_its_name_and_others_are_named() {
+    let drive = "--set V0=1e-4 --set Delta=1e-6 --set frequency=29";
+    let folder = beside(&[
+        ("may/out", drive),
+        ("june/out", drive),
+        ("still", "--set V0=1e-4 --set Delta=0"),
+    ]);
+    let plot = |options: &str| {
+        let flags = "--with may/out --with june/out --with still -o own.svg";
+        folder.run(&format!("plot model --y tau_mean {flags} {options}"))
+    };
+    let svg = || fs::read_to_string(folder.path("own.svg")).unwrap();
+    let said = plot("--x eta").stderr;
+    for name in ["model", "may/out", "june/out", "still"] {
+        assert!(svg().contains(&format!(">{name}<")), "{name}");
+    }
+    assert!(!said.contains("shows nothing"), "{said}");
+    let said = plot("--x frequency").stderr;
+    assert!(
+        !svg().contains(">still<")
+            && said.contains("figure tau_mean-frequency shows nothing of still\n")
+    );
+    plot("--x eta --legend theory --legend first --legend second --legend third");
+    assert!(svg().contains(">theory<") && svg().contains(">third<") && !svg().contains("out<"));
+    let few = plot("--x eta --legend theory --legend first");
+    assert!(
+        few.code == Some(2) && few.stderr.contains("4 directories are drawn"),
+        "{}",
+        few.stderr
+    );
+    let alone = folder.ends(2, "plot model --legend theory").stderr;
+    assert!(alone.contains("--with"), "{alone}");
 }
 
 /// Ten slips, and what else a line holds.

@@ -75,15 +75,6 @@ fn run_ends_with_the_result_and_show_prints_it_again() {
         .map(|set| set["tau_mean"].as_f64().unwrap())
         .collect();
     assert_eq!(of_json, of_table);
-    // A table without rows has its columns, too.
-    for columns in ["", " --columns frequency,tau_mean"] {
-        let csv = |condition: &str| {
-            let show = format!("show out --csv{columns}{condition}");
-            folder.ends(0, &show).stdout
-        };
-        let head = csv("").lines().next().unwrap().to_owned() + "\n";
-        assert_eq!(csv(" --where frequency<0"), head);
-    }
     // Each column stands once, whether it is asked for or goes with another.
     let ends = "show out --csv --columns tau_sd_high,tau_sd,tau_sd_low";
     assert!(
@@ -136,12 +127,16 @@ fn sets_are_chosen_sorted_and_computed_with() {
         "{by_heading}"
     );
     assert!(by_heading.contains(",tau_mean,") && by_heading.lines().count() == 3);
-    let none = folder.ends(0, "show out --where ⟨τ⟩>90").stdout;
-    assert!(
-        none.starts_with("none of 3 sets matches; tau_mean nearest to 90: 0.")
-            && none.ends_with(" s\n"),
-        "{none}"
-    );
+    // As in figures.
+    for form in ["", "--json", "--csv"] {
+        let none = folder.ends(2, &format!("show out {form} --where ⟨τ⟩>90"));
+        let problem = "error: --where ⟨τ⟩>90: none of 3 sets matches; tau_mean nearest to 90: 0.";
+        assert!(
+            none.stdout.is_empty() && none.stderr.starts_with(problem),
+            "{}",
+            none.stderr
+        );
+    }
     for (arguments, problem) in [
         (
             "--columns tau_men",
@@ -159,6 +154,32 @@ fn sets_are_chosen_sorted_and_computed_with() {
             "{}",
             ended.stderr
         );
+    }
+}
+
+#[test]
+fn columns_of_rounds_are_columns_and_values_are_told_apart() {
+    let folder = Folder::new();
+    let sweep = "name = \"rounds\"\n[model]\nN = 3\nNs = 4\n[axes]\nKd = [10025, 10027, 22540]\n[precision]\nof = \"tau_mean\"\n\
+                 relative = 0.5\nseeds = { from = 2, to = 4 }\n[record]\nslips = 6\n";
+    folder.write("rounds.toml", sweep);
+    folder.ends(0, "run rounds.toml --out out");
+    let columns = "seeds,target_met,first_round,last_round";
+    let shown = folder.ends(
+        0,
+        &format!("show out --columns {columns} --where seeds>=2 --sort -seeds"),
+    );
+    for word in ["10025", "10027", "22540", "seeds", "target met"] {
+        assert!(shown.stdout.contains(word), "{word}: {}", shown.stdout);
+    }
+    let all = folder.file("out/reduced/sets.parquet");
+    let names = all.schema.as_ref().unwrap().fields().iter();
+    let names: Vec<String> = names.map(|field| field.name().clone()).collect();
+    folder.ends(0, &format!("show out --json --columns {}", names.join(",")));
+    folder.ends(0, "plot out --x V0 --y tau_mean --colour Kd -o own.svg");
+    let svg = std::fs::read_to_string(folder.path("own.svg")).unwrap();
+    for value in ["10025", "10027", "22540"] {
+        assert!(svg.contains(&format!(" = {value} N/m<")), "{value}");
     }
 }
 
@@ -184,7 +205,9 @@ fn directories_are_compared_seed_by_seed_where_all_that_varies_agrees() {
     let pairs = sets("show a b --json");
     assert_eq!(pairs.len(), 2, "without modulation, and 58 Hz");
     for pair in &pairs {
-        assert_eq!(pair["seeds"].as_u64(), Some(4), "a whole number");
+        for seeds in ["seeds_a", "seeds_b"] {
+            assert_eq!(pair[seeds].as_u64(), Some(4), "a whole number");
+        }
         let [a, b, difference, low, high] =
             ["a", "b", "difference", "difference_low", "difference_high"]
                 .map(|end| number(pair, &format!("tau_mean_{end}")).unwrap());
@@ -192,6 +215,29 @@ fn directories_are_compared_seed_by_seed_where_all_that_varies_agrees() {
             (b - a - difference).abs() < 1e-12 && low < difference && difference < high,
             "{pair}"
         );
+    }
+    let differences = &json(&folder.ends(0, "show a b --json").stdout)["differences"];
+    assert_eq!(differences, &serde_json::json!({ "Kd": [4e7, 1e7] }));
+    let shown = folder.ends(0, "show a b");
+    let head = "A is a: K_d = 4·10⁷ N/m\nB is b: K_d = 10⁷ N/m\n";
+    assert!(
+        shown.stdout.starts_with(head) && shown.stderr.is_empty(),
+        "{}",
+        shown.stdout
+    );
+    let csv = folder.ends(0, "show a b --csv");
+    assert_eq!(csv.stderr, head);
+    // The values and differences of a row have one unit.
+    for statistic in ["⟨τ⟩", "⟨Fₛ⟩"] {
+        let heads = [", A", ", B", ", B − A"].map(|end| {
+            let head = shown
+                .stdout
+                .split(&format!("{statistic}{end} ("))
+                .nth(1)
+                .unwrap();
+            head.split(')').next().unwrap().to_owned()
+        });
+        assert!(heads.iter().all(|unit| *unit == heads[0]), "{heads:?}");
     }
     let frequencies: Vec<_> = pairs.iter().map(|pair| number(pair, "frequency")).collect();
     assert!(frequencies.contains(&Some(58.0)), "{frequencies:?}");
