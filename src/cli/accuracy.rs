@@ -103,7 +103,8 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
     study.slips = arguments.slips.unwrap_or(study.slips);
     let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?.count;
-    let threads = threads.map_or(0, NonZeroUsize::get);
+    let threads = limits::or_all_cores(threads);
+    limits::check_threads(threads)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool =
         pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;

@@ -3,7 +3,6 @@
 use super::output::{self, quoted};
 use super::sweep::{self, PresetFlag};
 use super::{Exit, UsageError};
-use crate::results::layout::Layout;
 use crate::run::limits;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
@@ -30,12 +29,12 @@ pub struct Arguments {
     /// Batch system
     #[arg(value_enum)]
     engine: Engine,
-    /// Sweep file
-    #[arg(value_name = "SWEEP.toml", required_unless_present = "preset")]
+    /// Sweep file, or results directory
+    #[arg(value_name = "SWEEP.toml|DIR", required_unless_present = "preset")]
     sweep: Option<PathBuf>,
     #[command(flatten)]
     preset: PresetFlag,
-    /// Results directory [default: results/<name of the sweep>]
+    /// Results directory [default: the one named, or results/<name of the sweep>]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Workers at the same time
@@ -98,10 +97,8 @@ fn script(arguments: &Arguments, program: &Path) -> Result<String> {
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &[])?;
     output::warn(&sweep.warnings());
     arguments.check()?;
-    let root = match &arguments.out {
-        Some(out) => whole_path(out)?,
-        None => whole_path(&Layout::default_root(&sweep))?,
-    };
+    let root = arguments.out.clone();
+    let root = whole_path(&root.unwrap_or_else(|| sweep::root(arguments.sweep.as_deref(), &sweep)))?;
     let logs = format!("{root}/run/batch");
     let mut command = vec![whole_path(program)?, "run".to_owned()];
     match (&arguments.sweep, arguments.preset.preset) {

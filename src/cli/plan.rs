@@ -8,7 +8,7 @@ use crate::results::{ErrorKind, Results};
 use crate::run::limits::{self, Threads};
 use crate::run::{MAX_FAILURES, Overview, status};
 use crate::sets::Digits;
-use crate::sweep::{Bounds, Extension, Plan, Sweep};
+use crate::sweep::{Bounds, Extension, LARGE, Plan, Sweep};
 use crate::table::shown::{serialize_path, shown, shown_bytes};
 use crate::table::storage::{Disk, Storage};
 use crate::table::value::floored;
@@ -28,14 +28,14 @@ Examples:
   stickslip plan sweeps/fig3.toml --set slips=100 --axis V0=log:1e-5:1e-3:9")]
 pub struct Arguments {
     /// Sweep file, or results directory
-    #[arg(value_name = "SWEEP.toml", required_unless_present = "preset")]
+    #[arg(value_name = "SWEEP.toml|DIR", required_unless_present = "preset")]
     sweep: Option<PathBuf>,
     #[command(flatten)]
     preset: PresetFlag,
     #[command(flatten)]
     variation: Variation,
-    /// Results directory to compare with, if it is there [default: results/<name of the sweep>; none with --set or
-    /// --axis]
+    /// Results directory to compare with, if it is there [default: the one named, or results/<name of the sweep>; none
+    /// with --set or --axis]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads [default: those that the batch system grants, else all cores]
@@ -47,9 +47,6 @@ pub struct Arguments {
 }
 
 const JSON_FORMAT: u32 = 2;
-
-/// Bytes that a worker takes beside its jobs, for the program, commits and the reduction: measured, rounded up.
-const MEMORY: f64 = 80e6;
 
 /// What a sweep would run.
 #[derive(Serialize)]
@@ -68,6 +65,8 @@ struct Forecast<'a> {
     longest_job: Option<String>,
     worker_memory_bytes: f64,
     thread_memory_bytes: f64,
+    /// Of all threads.
+    address_space_bytes: f64,
     directory: Option<DirectoryState>,
     /// What all rounds of an adaptive sweep may add up to; the other numbers are those of the first.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -96,8 +95,9 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let changes = sweep::changes(&arguments.variation)?;
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &changes)?;
     output::warn(&sweep.warnings());
-    let default = changes.is_empty().then(|| Layout::default_root(&sweep));
-    let root = arguments.out.clone().or(default);
+    let default = || sweep::root(arguments.sweep.as_deref(), &sweep);
+    let root = arguments.out.clone();
+    let root = root.or_else(|| changes.is_empty().then(default));
     if let Some(root) = &root {
         sweep::warn_of_partitions(root, &sweep);
     }
@@ -119,6 +119,11 @@ impl<'a> Forecast<'a> {
         let axes = sweep.axes();
         let longest = totals.longest.as_ref();
         let longest_cost = longest.map_or(0.0, |job| job.cost);
+        let thread_memory = totals.memory + totals.memory_of_slips;
+        let of_large_jobs = match totals.memory {
+            small if small < LARGE => 0.0,
+            _ => thread_memory * threads as f64,
+        };
         Self {
             name: sweep.name(),
             axes: axes
@@ -133,8 +138,9 @@ impl<'a> Forecast<'a> {
             threads,
             longest_job_cpu_seconds: longest_cost,
             longest_job: longest.map(|job| sweep.command(job)),
-            worker_memory_bytes: MEMORY,
-            thread_memory_bytes: totals.memory + totals.memory_of_slips,
+            worker_memory_bytes: limits::OF_A_WORKER,
+            thread_memory_bytes: thread_memory,
+            address_space_bytes: limits::address_space(threads) + of_large_jobs,
             directory,
             at_most: sweep.bounds(),
         }
@@ -165,6 +171,8 @@ impl<'a> Forecast<'a> {
         let of_worker = shown_bytes(self.worker_memory_bytes);
         let of_thread = shown_bytes(self.thread_memory_bytes);
         let memory = format!("{of_worker} and {of_thread} for each thread");
+        let address_space = shown_bytes(self.address_space_bytes);
+        let address_space = format!("{address_space} on {threads}, where ulimit -v limits it");
         let mut pairs = vec![
             ("sweep", self.name.to_owned()),
             ("axes", axes),
@@ -175,6 +183,7 @@ impl<'a> Forecast<'a> {
             ("predicted CPU time", cpu_time),
             ("predicted wall time", format!("{wall_time} on {threads}")),
             ("worker memory", memory),
+            ("address space", address_space),
         ];
         if let Some(command) = &self.longest_job {
             let time = match self.longest_job_cpu_seconds {

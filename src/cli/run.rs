@@ -116,8 +116,7 @@ impl Arguments {
     fn sweep_and_root(&self) -> Result<(Sweep, PathBuf)> {
         let changes = sweep::changes(&self.variation)?;
         let sweep = sweep::read(self.sweep.as_deref(), self.preset, &changes)?;
-        let own = self.sweep.as_deref().filter(|path| path.is_dir());
-        let root = own.map_or_else(|| Layout::default_root(&sweep), Path::to_owned);
+        let root = sweep::root(self.sweep.as_deref(), &sweep);
         if let Some(out) = &self.out {
             return Ok((sweep, out.clone()));
         }

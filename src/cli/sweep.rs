@@ -2,6 +2,7 @@
 
 use super::{UsageError, layout, output};
 use crate::results::Results;
+use crate::results::layout::Layout;
 use crate::results::tables::{recorded_schema, tables_of};
 use crate::single_job;
 use crate::sweep::{Change, Sweep, SweepError, varied};
@@ -10,7 +11,7 @@ use anyhow::Result;
 use arrow_schema::FieldRef;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A sweep file that the program holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,6 +126,12 @@ pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result
         (None, None) => return of_flags(&single_job::sweep_text(changes)),
     };
     vary(sweep?.computed()?, changes)
+}
+
+/// The results directory that a sweep runs into without `--out`: the one that was named, or the default of the sweep.
+pub fn root(file: Option<&Path>, sweep: &Sweep) -> PathBuf {
+    let own = file.filter(|path| path.is_dir());
+    own.map_or_else(|| Layout::default_root(sweep), Path::to_owned)
 }
 
 /// Warns of a folder in the path of a results directory whose name DuckDB takes for the value of a column in all rows.

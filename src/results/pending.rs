@@ -64,7 +64,9 @@ pub struct Retry {
     pub memory: f64,
 }
 
-/// Parts that [`Pending::marked`] lists, at most.
+/// Deaths from which on [`Pending::marked`] lists a part, as a kill or a power cut leaves one at many.
+const MIN_DEATHS: usize = 2;
+/// Parts that it lists, at most.
 const MAX_MARKED: usize = 10;
 
 /// The beginning of the reason of a job that failed for lack of memory.
@@ -259,10 +261,15 @@ impl<'a> Pending<'a> {
         Ok(())
     }
 
+    /// The missing parts with this number of deaths or more.
+    pub fn with_deaths(&self, min: usize) -> impl Iterator<Item = &'a Outline> {
+        let parts = self.parts.iter();
+        parts.filter(move |part| self.deaths(part) >= min && self.may_run(part))
+    }
+
     /// The missing parts with the most deaths.
     pub fn marked(&self) -> Vec<Marked> {
-        let is_marked = |part: &&Outline| self.deaths(part) > 0 && self.may_run(part);
-        let mut parts: Vec<&Outline> = self.parts.iter().filter(is_marked).collect();
+        let mut parts: Vec<&Outline> = self.with_deaths(MIN_DEATHS).collect();
         parts.sort_by_key(|part| Reverse(self.deaths(part)));
         parts.truncate(MAX_MARKED);
         let marked = parts.into_iter().map(|outline| {

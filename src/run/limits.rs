@@ -6,7 +6,7 @@
 //! that takes longer is interrupted at the end, and its finished jobs are kept.
 
 use crate::sweep::LARGE;
-use crate::table::shown::shown;
+use crate::table::shown::{shown, shown_bytes};
 use std::cell::Cell;
 use std::ffi::OsString;
 use std::fs;
@@ -100,20 +100,60 @@ pub fn timed<T>(compute: impl FnOnce() -> T) -> (f64, T) {
 }
 
 const KILOBYTE: f64 = 1024.0;
-/// Address space of a thread: its stack, and what the C library reserves for it.
+/// Bytes that a worker takes beside its jobs, for the program, commits and the reduction: measured, rounded up.
+pub const OF_A_WORKER: f64 = 80e6;
+/// What the program has of these when a run begins.
+const AT_FIRST: f64 = 30e6;
+/// Address space of a thread: its stack, and the arena of 64 MiB that the C library reserves for it.
 const OF_A_THREAD: f64 = 68e6;
+/// Of this, what counts as data.
+const DATA_OF_A_THREAD: f64 = 8e6;
 
-/// Bytes that hard limits leave for jobs: of control groups, of the address space and of data; infinite if unknown.
-pub(super) fn allowed_memory() -> f64 {
+/// Most address space that a worker takes beside large jobs, in bytes. The thread of its beats has an arena, too.
+pub fn address_space(threads: usize) -> f64 {
+    OF_A_WORKER + OF_A_THREAD * (threads + 1) as f64
+}
+
+/// Refuses threads for which hard limits leave too little. The C library ends a program whose allocation fails, so this
+/// is asked before.
+pub fn check_threads(threads: usize) -> Result<(), ThreadsError> {
+    let [address_space_left, data_left] = left();
+    let data = OF_A_WORKER + DATA_OF_A_THREAD * threads as f64;
+    for (what, flag, most, left) in [
+        ("address space", "-v", address_space(threads), address_space_left),
+        ("data", "-d", data, data_left),
+    ] {
+        if left < most - AT_FIRST {
+            return Err(ThreadsError(format!(
+                "too little memory for --threads {threads}: needs {} of {what}, of which `ulimit {flag}` leaves {}; \
+                 take fewer threads, or raise the limit",
+                shown_bytes(most - AT_FIRST),
+                shown_bytes(left)
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Bytes that hard limits leave of the address space, and of data; infinite if unknown.
+fn left() -> [f64; 2] {
     let limits = text_of("/proc/self/limits");
     let status = text_of("/proc/self/status");
-    let left = |limit: &str, taken: &str| {
+    let left = |[limit, taken]: [&str; 2]| {
         let taken = KILOBYTE * number_after(&status, taken).unwrap_or(0.0);
         number_after(&limits, limit).map_or(f64::INFINITY, |limit| (limit - taken).max(0.0))
     };
-    of_groups(&text_of("/proc/self/cgroup"), Path::new("/sys/fs/cgroup"))
-        .min(left("Max address space", "VmSize:"))
-        .min(left("Max data size", "VmData:"))
+    [
+        ["Max address space", "VmSize:"],
+        ["Max data size", "VmData:"],
+    ]
+    .map(left)
+}
+
+/// Bytes that hard limits leave for jobs: of control groups, of the address space and of data; infinite if unknown.
+pub(super) fn allowed_memory() -> f64 {
+    let of_groups = of_groups(&text_of("/proc/self/cgroup"), Path::new("/sys/fs/cgroup"));
+    left().into_iter().fold(of_groups, f64::min)
 }
 
 /// Bytes that this process has or could get now without taking them from others; infinite if unknown.

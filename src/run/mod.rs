@@ -99,6 +99,8 @@ pub fn join<T, E: From<ResultsError>>(
 ) -> Result<T, E> {
     let begin = Instant::now();
     let threads = limits::or_all_cores(options.threads);
+    limits::check_threads(threads)
+        .map_err(|error| ResultsError::refused(layout.root(), error.to_string()))?;
     if sweep.rounds().is_some() && options.shard != Shard::default() {
         let problem = "a sweep with [precision] or [refine] has no shards: each round needs all results of the one before; \
                        run it on a common disk, started as often as you like";

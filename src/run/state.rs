@@ -30,6 +30,8 @@ pub struct Status {
     pub failures: Vec<Failure>,
     pub failure_reasons: Reasons,
     pub cut: Cut,
+    /// Missing parts at which workers died.
+    pub parts_with_deaths: usize,
     pub marked: Vec<Marked>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rounds: Option<RoundsSoFar>,
@@ -153,6 +155,7 @@ pub fn status(results: &Results<'_>, max_failures: u64) -> Result<Status, Result
         failures,
         failure_reasons,
         cut: Cut::read(results)?,
+        parts_with_deaths: pending.with_deaths(1).count(),
         marked: pending.marked(),
         rounds: results.rounds_so_far(),
     })
