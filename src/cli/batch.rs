@@ -98,7 +98,8 @@ fn script(arguments: &Arguments, program: &Path) -> Result<String> {
     output::warn(&sweep.warnings());
     arguments.check()?;
     let root = arguments.out.clone();
-    let root = whole_path(&root.unwrap_or_else(|| sweep::root(arguments.sweep.as_deref(), &sweep)))?;
+    let root =
+        whole_path(&root.unwrap_or_else(|| sweep::root(arguments.sweep.as_deref(), &sweep)))?;
     let logs = format!("{root}/run/batch");
     let mut command = vec![whole_path(program)?, "run".to_owned()];
     match (&arguments.sweep, arguments.preset.preset) {

@@ -197,7 +197,7 @@ pub fn rounds(rounds: &RoundsSoFar) -> String {
     let mut text = format!("{round} ({over}): {done} done, {open} open");
     if standing.sets_capped > 0 {
         let sets = count(standing.sets_capped, "set");
-        text = format!("{text}; {sets} with all seeds allowed, above the target");
+        text = format!("{text}; {sets} too uncertain, at the limit of seeds or jobs");
     }
     if standing.edges_capped > 0 {
         let edges = count(standing.edges_capped, "edge");

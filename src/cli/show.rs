@@ -422,6 +422,9 @@ fn is_on_line(row: &SetRow, edge: &EdgeRow) -> bool {
 
 /// On which side of the threshold all sets lie, where nothing crosses it.
 fn side(edge: &EdgeRow, rows: &[SetRow]) -> &'static str {
+    if let Some(way_out) = edge.way_out() {
+        return way_out;
+    }
     let of_edge = rows.iter().filter(|row| is_on_line(row, edge));
     let values: Vec<f64> = of_edge
         .filter_map(|row| row.number(&edge.statistic))

@@ -1,14 +1,14 @@
 //! Edges with their intervals against the one other quantity in which rows differ, a colour for each statistic.
 
 use super::axis::Axis;
-use super::frame::{Ends, Layout};
+use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{axis_of, distinct};
-use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, REFERENCE, Stroke};
+use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, Stroke};
 use crate::model::{Selection as _, Symbol};
-use crate::reduce::{EdgeRow, FREQUENCY, Interval, ascending};
+use crate::reduce::{EdgeRow, Ended, FREQUENCY, Interval, ascending};
 use crate::sets::{AllButSeed, column_of};
 
 pub(super) const NAME: &str = "edges";
@@ -46,26 +46,30 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
         .iter()
         .filter_map(bar)
         .flat_map(|(_, ends)| [ends.0, ends.1]);
-    // Rows without an edge are seen over all that was searched.
-    let without = edges.iter().filter(|edge| edge.edge.is_none());
-    let searched = without.filter_map(|edge| {
+    // What has no edge is seen over all that was searched, or where it is unclear.
+    let searched = |edge: &EdgeRow| {
         let ends = (y_factor * edge.bracket_low, y_factor * edge.bracket_high);
         Some((x_factor * value(key, edge)?, ends))
-    });
-    let searched: Vec<(f64, Ends)> = searched.collect();
-    let known = places().map(|place| place.0);
-    let x = Axis::of_data(&x_label, known.chain(searched.iter().map(|row| row.0)))?;
+    };
+    let rows = edges.iter().filter_map(|edge| value(key, edge));
+    let x = Axis::of_data(&x_label, rows.map(|value| x_factor * value))?;
     let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
     let statistics = distinct(edges.iter().map(|edge| &*edge.statistic));
     let mut legend = Vec::new();
     let mut layers = Vec::new();
-    if !searched.is_empty() {
-        legend.push(entry(Mark::Line(REFERENCE), "no crossing"));
-        layers.push(Layer::Inside(vec![Layer::Bars(searched, REFERENCE)]));
-    }
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
-        let text = format!("{}, 95 %", of_it().next()?.crossed());
+        let crossed = of_it().next()?.crossed();
+        let without = || of_it().filter(|edge| edge.edge.is_none());
+        for ended in distinct(without().map(|edge| edge.ended.word())) {
+            let is_clear = ended == Ended::NoCrossing.word();
+            let stroke = Stroke::dashed(ink, 1.4, if is_clear { (6.0, 4.0) } else { (2.0, 2.0) });
+            legend.push(entry(Mark::Line(stroke), format!("{crossed}: {ended}")));
+            let ended_so = without().filter(|edge| edge.ended.word() == ended);
+            let bars = Layer::Bars(ended_so.filter_map(searched).collect(), stroke);
+            layers.push(Layer::Inside(vec![bars]));
+        }
+        let text = format!("{crossed}, 95 %");
         legend.push(entry(Mark::Bar(Dot::solid(ink, RADIUS)), text));
         let stroke = Stroke::solid(ink, BAR_WIDTH);
         layers.push(Layer::Bars(of_it().filter_map(bar).collect(), stroke));
@@ -109,10 +113,16 @@ mod tests {
             edge(1e-5, drive, Some(2e-6)),
             edge(2e-5, seen, Some(2e-6)),
             edge(2e-5, drive, None),
+            EdgeRow {
+                ended: Ended::UnclearEnd,
+                ..edge(2e-5, seen, None)
+            },
         ];
         let svg = edges(&rows, &Look::default()).unwrap().svg();
         assert!(svg.contains("Drive velocity") && svg.contains("Amplitude Δ"));
-        assert!(svg.contains(">no crossing<"));
+        for without in [">R, drive = 0.5: no crossing<", ">R = 0.5: unclear end<"] {
+            assert!(svg.contains(without), "{without}");
+        }
         assert!(svg.contains(">R = 0.5, 95 %<") && svg.contains(">R, drive = 0.5, 95 %<"));
         assert!(
             [INKS[0], INKS[1]]
@@ -123,7 +133,7 @@ mod tests {
             edges(&rows[..2], &Look::default()).is_none(),
             "nothing to draw it against"
         );
-        assert!(edges(&rows[3..], &Look::default()).is_none(), "no edge");
+        assert!(edges(&rows[3..4], &Look::default()).is_none(), "no edge");
         assert!(edges(&[], &Look::default()).is_none());
     }
 }

@@ -7,6 +7,9 @@
 //! (E. C. Fieller, J. R. Stat. Soc. B 16, 175 (1954)); where that has no end, as the line may be level, with the
 //! bracket of clear sets.
 //!
+//! Beyond the last clear set, and between two on the same side, an unclear set may hide edges, so a row says that
+//! nothing crosses only if all its sets are clear.
+//!
 //! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is one
 //! realisation of the disorder in all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal
 //! size). Places on the axis are rows of the grid and fractions of them.
@@ -22,6 +25,7 @@ use crate::table::columns::{Interval, columns};
 use crate::table::tables;
 use crate::table::value::{floored, words};
 use std::collections::BTreeMap;
+use std::iter::once;
 
 /// Groups of seeds, so that the cost of leaving them out is bounded.
 pub const GROUPS: usize = 30;
@@ -41,6 +45,8 @@ words! {
         Seeds = "seeds",
         Jobs = "jobs",
         Open = "open",
+        UnclearEnd = "unclear end",
+        Unclear = "unclear",
         #[default]
         NoCrossing = "no crossing",
     }
@@ -57,11 +63,11 @@ columns! {
         edge: Option<f64> = "", "where it is crossed; null if it is not";
         edge_interval as "edge": Option<Interval> = "", "lower end of its 95 % confidence interval";
         rises: Option<bool> = "", "whether the statistic is above the threshold above the edge";
-        jobs: u64 = "", "jobs of the sets that say where the edge is; of all of the row if it has none";
-        bracket_low: f64 = "", "the nearest value clearly on one side; the least of the row if it has no edge";
-        bracket_high: f64 = "", "the nearest clearly on the other; the largest of the row if it has no edge";
+        jobs: u64 = "", "jobs of the sets that say where the edge is, or of those that are unclear; of all of the row if nothing crosses";
+        bracket_low: f64 = "", "the nearest value that is clearly on one side, or the end of the row";
+        bracket_high: f64 = "", "the nearest above it that is clearly on the other side, or on the same if `ended` is `unclear`, or the end of the row";
         ended: Ended = "",
-            "`width`: the interval is as narrow as is wanted; `seeds`: its sets have the most; `jobs`: no more may run; `open`: the rounds go on; `no crossing` between the values of the row";
+            "`width`: the interval is as narrow as is wanted; `seeds`: its sets have the most; `jobs`: no more may run; `open`: the rounds go on; `unclear end`: with all seeds or jobs, the interval of the set at an end of the row still has the threshold within it, so it may be crossed there or beyond; `unclear`: the same of a set between two on the same side; `no crossing`: all sets of the row are clearly on one side";
     }
 }
 
@@ -75,6 +81,15 @@ impl EdgeRow {
             None => format!("{} =", label(&self.statistic).symbol),
         };
         format!("{what} {}", Digits::THREE.number(self.threshold))
+    }
+
+    /// What finds the edge that may be there, if a set is not clear.
+    pub fn way_out(&self) -> Option<&'static str> {
+        match self.ended {
+            Ended::UnclearEnd => Some("unclear: raise seeds.to, or widen the axis"),
+            Ended::Unclear => Some("unclear: raise seeds.to"),
+            Ended::Width | Ended::Seeds | Ended::Jobs | Ended::Open | Ended::NoCrossing => None,
+        }
     }
 }
 
@@ -119,15 +134,23 @@ impl Sample {
         self.concentration = self.concentration.max(other.concentration);
     }
 
+    fn half_width(&self) -> f64 {
+        let variance = product(&self.influences, &self.influences);
+        (quantile(self.concentration) * variance).sqrt()
+    }
+
     /// Below the threshold, above it, or equal if that is not clear.
     pub(crate) fn side(&self) -> f64 {
-        let variance = product(&self.influences, &self.influences);
-        let half = (quantile(self.concentration) * variance).sqrt();
-        if self.excess.abs() > half {
+        if self.excess.abs() > self.half_width() {
             self.excess.signum()
         } else {
             0.0
         }
+    }
+
+    /// The half-width of its interval over its distance from the threshold: at least 1 if it is not clear.
+    fn error(&self) -> f64 {
+        self.half_width() / self.excess.abs()
     }
 }
 
@@ -161,6 +184,53 @@ pub struct Placed<'a> {
     pub set: &'a SetOfEdges,
 }
 
+impl Placed<'_> {
+    /// See [`Sample::error`].
+    pub fn error(&self) -> f64 {
+        self.sample.error()
+    }
+}
+
+/// Sets next to each other that are not clear, and lie between no two that are on opposite sides.
+#[derive(Clone, Debug)]
+pub struct Stretch<'a> {
+    /// Those that decide whether an edge is hidden there: at an end of the line the last one, else all.
+    pub sets: Vec<Placed<'a>>,
+    /// The clear sets beside them, or the ends of the line.
+    bracket: [Placed<'a>; 2],
+    is_at_end: bool,
+}
+
+impl<'a> Stretch<'a> {
+    /// Between two sets of a line that are clear, or beyond the last; `None` if all there are clear.
+    fn between(all: &[Placed<'a>], first: Option<usize>, last: Option<usize>) -> Option<Self> {
+        let unclear = &all[first.map_or(0, |first| first + 1)..last.unwrap_or(all.len())];
+        let [low, high] = [unclear.first()?, unclear.last()?];
+        let sets = match (first, last) {
+            (None, Some(_)) => vec![*low],
+            (Some(_), None) => vec![*high],
+            (None, None) if unclear.len() > 1 => vec![*low, *high],
+            (None, None) | (Some(_), Some(_)) => unclear.to_vec(),
+        };
+        Some(Self {
+            sets,
+            bracket: [
+                first.map_or(*low, |first| all[first]),
+                last.map_or(*high, |last| all[last]),
+            ],
+            is_at_end: first.is_none() || last.is_none(),
+        })
+    }
+
+    fn ended(&self, is_over: bool) -> Ended {
+        match (is_over, self.is_at_end) {
+            (false, _) => Ended::Open,
+            (true, true) => Ended::UnclearEnd,
+            (true, false) => Ended::Unclear,
+        }
+    }
+}
+
 /// Sets that differ in the refined axis alone, and the edges of one statistic.
 #[derive(Clone, Debug)]
 pub struct Line<'a> {
@@ -169,6 +239,7 @@ pub struct Line<'a> {
     statistic: Statistic,
     sets: Vec<(u64, &'a SetOfEdges)>,
     pub edges: Vec<Edge<'a>>,
+    pub unclear: Vec<Stretch<'a>>,
 }
 
 #[derive(Clone, Debug)]
@@ -365,18 +436,25 @@ pub fn lines<'a>(
             };
             let known: Vec<Placed<'_>> = sets.iter().filter_map(placed).collect();
             let is_clear = |index: &usize| known[*index].side != 0.0;
-            let clear: Vec<usize> = (0..known.len()).filter(is_clear).collect();
-            let opposite = clear
-                .windows(2)
-                .filter(|pair| known[pair[0]].side != known[pair[1]].side);
-            let edges = opposite
-                .filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window));
-            lines.push(Line {
+            let clear = (0..known.len()).filter(is_clear).map(Some);
+            let bounds: Vec<Option<usize>> = once(None).chain(clear).chain([None]).collect();
+            let mut line = Line {
                 rows: rows.clone(),
                 statistic,
                 sets: sets.clone(),
-                edges: edges.collect(),
-            });
+                edges: Vec::new(),
+                unclear: Vec::new(),
+            };
+            for pair in bounds.windows(2) {
+                match (pair[0], pair[1]) {
+                    (Some(first), Some(last)) if known[first].side != known[last].side => {
+                        let edge = Edge::between(&known, [first, last], width, window);
+                        line.edges.extend(edge);
+                    }
+                    (first, last) => line.unclear.extend(Stretch::between(&known, first, last)),
+                }
+            }
+            lines.push(line);
         }
     }
     lines
@@ -438,7 +516,16 @@ pub(super) fn edge_rows(
                 ..row_between(sweep, refinement, key, (low.row, low.set), high.row)
             });
         }
+        for stretch in &line.unclear {
+            let [low, high] = &stretch.bracket;
+            rows.push(EdgeRow {
+                jobs: stretch.sets.iter().map(|set| set.set.seeds).sum(),
+                ended: stretch.ended(is_over),
+                ..row_between(sweep, refinement, key, (low.row, low.set), high.row)
+            });
+        }
         if line.edges.is_empty()
+            && line.unclear.is_empty()
             && let Some((first, last)) = line.sets.first().zip(line.sets.last())
         {
             rows.push(EdgeRow {

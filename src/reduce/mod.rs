@@ -27,7 +27,7 @@ pub(crate) use confidence::mean_of;
 pub(crate) use confidence::student_at;
 #[cfg(test)]
 pub(crate) use crossings::{Edge, GROUPS, Sample};
-pub use crossings::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
+pub use crossings::{EdgeRow, Ended, Line, SetOfEdges, lines, sets_of_edges};
 pub use differences::Difference;
 pub use gather::{Point, RampStage, reduce_chosen};
 #[cfg(test)]

@@ -13,11 +13,13 @@
 //! Looking again and again until an interval is short prefers those that are short by chance: the more so, the fewer
 //! seeds it is when a set may end, and the more skewed its values are. So no set ends with fewer than [`MIN_SEEDS`].
 
-use crate::reduce::{SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges};
+use crate::reduce::{
+    Line, SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges,
+};
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Goal, MIN_SEEDS, Precision, Refinement, Round, Standing, Sweep};
 use crate::table::value::floored;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 #[cfg(test)]
 mod coverage;
@@ -86,9 +88,30 @@ fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEd
     let had = |set: u64| sets.get(&set).map_or(0, |set| set.seeds);
     let jobs = sets.values().map(|set| set.seeds).sum();
     let mut room = refinement.max_jobs.saturating_sub(jobs);
-    let mut wanted = BTreeMap::new();
+    let mut wanted: BTreeMap<u64, u64> = BTreeMap::new();
     let mut standing = Standing::default();
-    for mut line in lines(sweep, refinement, sets) {
+    let lines = lines(sweep, refinement, sets);
+    let set_of = |line: &Line<'_>, row: u64| {
+        let mut rows = line.rows.clone();
+        rows[refinement.axis] = row;
+        sweep.set_at(&rows)
+    };
+    // Whether these sets get jobs up to this number of seeds: none of them if there is too little room.
+    let mut ask = |sets: Vec<u64>, seeds: u64| {
+        let new: Vec<u64> = sets.into_iter().filter(|&set| had(set) < seeds).collect();
+        let known = |set: &u64| wanted.get(set).copied().unwrap_or_else(|| had(*set));
+        let jobs: u64 = new.iter().map(|set| seeds.saturating_sub(known(set))).sum();
+        if new.is_empty() || jobs > room {
+            return false;
+        }
+        room -= jobs;
+        for set in new {
+            let known = wanted.entry(set).or_default();
+            *known = seeds.max(*known);
+        }
+        true
+    };
+    for line in &lines {
         for edge in line.edges.iter().filter(|edge| !edge.is_done()) {
             let [fewest, most] = edge.seeds();
             let seeds = match edge.wanted_row {
@@ -100,29 +123,29 @@ fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEd
                 Some(row) => vec![row],
                 None => edge.sets.iter().map(|set| set.row).collect(),
             };
-            let set = |row: u64| {
-                line.rows[refinement.axis] = row;
-                sweep.set_at(&line.rows).filter(|&set| had(set) < seeds)
-            };
-            let new: Vec<u64> = at.into_iter().filter_map(set).collect();
-            let more = |set: &u64| {
-                let known = wanted.get(set).copied();
-                seeds.saturating_sub(known.unwrap_or_else(|| had(*set)))
-            };
-            let jobs: u64 = new.iter().map(more).sum();
-            if new.is_empty() || jobs > room {
+            let sets = at.into_iter().filter_map(|row| set_of(line, row));
+            if !ask(sets.collect(), seeds) {
                 standing.edges_capped += 1;
-                continue;
-            }
-            room -= jobs;
-            for set in new {
-                let known = wanted.entry(set).or_default();
-                *known = seeds.max(*known);
             }
         }
     }
+    // After the edges, which are there for certain.
+    let mut capped = BTreeSet::new();
+    for line in &lines {
+        for unclear in line.unclear.iter().flat_map(|stretch| &stretch.sets) {
+            let most = sweep.seed_count();
+            let seeds = seeds_for(unclear.set.seeds, unclear.error(), MIN_SEEDS, most);
+            let set = set_of(line, unclear.row);
+            if !ask(set.into_iter().collect(), seeds.unwrap_or(most)) {
+                capped.extend(set);
+            }
+        }
+    }
+    capped.retain(|set| !wanted.contains_key(set));
+    standing.sets_capped = capped.len() as u64;
     standing.sets_open = wanted.len() as u64;
-    standing.sets_done = sets.keys().filter(|set| !wanted.contains_key(set)).count() as u64;
+    let is_done = |set: &&u64| !wanted.contains_key(set) && !capped.contains(set);
+    standing.sets_done = sets.keys().filter(is_done).count() as u64;
     let points = wanted.iter();
     let points = points.flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds));
     Round {

@@ -321,6 +321,57 @@ fn edges_up_and_down_are_found_and_sets_without_a_value_are_no_side() {
 }
 
 #[test]
+fn sets_that_are_not_clear_get_seeds_before_a_row_is_said_to_have_no_edge() {
+    let sweep = sweep(
+        DELTA,
+        "to = 1e-7\nseeds = { from = 24, to = 500 }\njobs = 20000",
+    );
+    // At the first set and at the one in the middle, or anywhere.
+    let ended = |mean: fn(f64) -> f64| {
+        let (rounds, sets) = noisy(|amplitude, _| Some(mean(1e6 * amplitude))).rounds(&sweep);
+        let lines = lines(&sweep, sweep.refinement().unwrap(), &sets);
+        let line = lines[0].clone();
+        let seeds = line.unclear.iter().flat_map(|stretch| &stretch.sets);
+        let seeds: Vec<u64> = seeds.map(|set| set.set.seeds).collect();
+        let edges: Vec<_> = found(&sweep, &sets)[0].clone();
+        let most = sets.values().map(|set| set.seeds).max().unwrap();
+        (rounds.last().unwrap().standing, edges, seeds, most)
+    };
+    // Below the threshold by a fifth of the noise, at one end or at the other: too little for 24 seeds.
+    for mean in [|x: f64| x - 0.52, |x: f64| 4.48 - x] {
+        let (standing, edges, unclear, _) = ended(mean);
+        assert_eq!(
+            (edges.len(), unclear.len(), standing.sets_capped),
+            (1, 0, 0)
+        );
+        let place = 1e6 * edges[0].0[1];
+        assert!(mean(place).abs() < 0.1, "{place}");
+    }
+    for mean in [|x: f64| x - 0.5, |x: f64| x - 4.5] {
+        let (standing, edges, unclear, _) = ended(mean);
+        assert!(edges.is_empty() && unclear == [500], "{unclear:?}");
+        assert_eq!((standing.sets_capped, standing.edges_capped), (1, 0));
+        assert_eq!(standing.sets_done, 8);
+    }
+    // In the middle, between sets that are above.
+    let touches = |x: f64| (x - 2.5) * (x - 2.5);
+    let (standing, edges, unclear, _) = ended(touches);
+    assert!(edges.is_empty() && unclear == [500], "{unclear:?}");
+    assert_eq!(standing.sets_capped, 1);
+    let (_, edges, unclear, most) = ended(|x| (x - 2.5) * (x - 2.5) + 0.02);
+    assert!(
+        edges.is_empty() && unclear.is_empty() && most > 24,
+        "{most}"
+    );
+    let (_, edges, unclear, _) = ended(|x| (x - 2.5) * (x - 2.5) - 0.02);
+    assert!(edges.len() == 2 && unclear.is_empty(), "{edges:?}");
+    // All of them: the sets at both ends, and no others.
+    let (standing, edges, unclear, _) = ended(|_| 0.0);
+    assert!(edges.is_empty() && unclear == [500, 500], "{unclear:?}");
+    assert_eq!((standing.sets_capped, standing.sets_done), (2, 7));
+}
+
+#[test]
 fn what_ends_an_edge_too_early_is_counted_and_no_more_jobs_run_than_are_allowed() {
     let mean = |amplitude: f64, _: f64| Some(1e6 * (amplitude - 2.345e-6));
     let ended = |seeds: u64, jobs: u64| {

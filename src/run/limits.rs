@@ -120,13 +120,18 @@ pub fn check_threads(threads: usize) -> Result<(), ThreadsError> {
     let [address_space_left, data_left] = left();
     let data = OF_A_WORKER + DATA_OF_A_THREAD * threads as f64;
     for (what, flag, most, left) in [
-        ("address space", "-v", address_space(threads), address_space_left),
+        (
+            "address space",
+            "-v",
+            address_space(threads),
+            address_space_left,
+        ),
         ("data", "-d", data, data_left),
     ] {
         if left < most - AT_FIRST {
             return Err(ThreadsError(format!(
-                "too little memory for --threads {threads}: needs {} of {what}, of which `ulimit {flag}` leaves {}; \
-                 take fewer threads, or raise the limit",
+                "too little memory: --threads {threads} may take {} more of {what}, `ulimit {flag}` leaves {}; take \
+                 fewer threads, or raise the limit",
                 shown_bytes(most - AT_FIRST),
                 shown_bytes(left)
             )));

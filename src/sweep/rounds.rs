@@ -90,7 +90,7 @@ pub struct Standing {
     pub sets_done: u64,
     /// Sets that get jobs in this round.
     pub sets_open: u64,
-    /// Sets that have the most seeds and miss the target.
+    /// Sets that miss the target, or are not clear, but get no more jobs: they or the sweep have the most.
     pub sets_capped: u64,
     /// Edges that are less precise than wanted, but get no more jobs: their sets or the sweep have the most.
     pub edges_capped: u64,

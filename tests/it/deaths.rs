@@ -82,7 +82,7 @@ fn assert_named(folder: &Folder, directory: &str) {
     let status = folder.ends(0, &format!("status {directory}")).stdout;
     let lines: Vec<_> = status
         .lines()
-        .filter(|line| line.starts_with("deaths"))
+        .filter(|line| line.starts_with("deaths  part-"))
         .collect();
     assert!(!lines.is_empty(), "{status}");
     for line in lines {
@@ -149,11 +149,14 @@ fn jobs_that_end_their_process_for_lack_of_memory_stop_no_others_and_are_named()
         5,
         "the last is marked by the next run: {dead:?}"
     );
-    let workers: Vec<_> = (0..3)
-        .map(|_| start_within(&folder, TOO_LITTLE, "run big.toml --out shared --threads 2"))
-        .collect();
-    let ended: Vec<_> = workers.into_iter().map(wait).collect();
-    assert!(ended.iter().all(|(code, ..)| code.is_none()), "{ended:?}");
+    // Six deaths at four parts, of which a second one is named.
+    for _ in 0..2 {
+        let workers: Vec<_> = (0..3)
+            .map(|_| start_within(&folder, TOO_LITTLE, "run big.toml --out shared --threads 2"))
+            .collect();
+        let ended: Vec<_> = workers.into_iter().map(wait).collect();
+        assert!(ended.iter().all(|(code, ..)| code.is_none()), "{ended:?}");
+    }
     for directory in ["r", "shared"] {
         assert_named(&folder, directory);
         assert!(
@@ -161,6 +164,33 @@ fn jobs_that_end_their_process_for_lack_of_memory_stop_no_others_and_are_named()
             "{directory}"
         );
     }
+}
+
+#[test]
+fn a_run_ends_in_order_under_any_hard_limit_and_what_plan_says_is_enough() {
+    let folder = Folder::new();
+    let small = BIG.replace("N = [3, 20000, ", "N = [3, ");
+    folder.write("small.toml", &small);
+    for threads in [1, 3] {
+        let plan = format!("plan small.toml --json --threads {threads}");
+        let plan = json(&folder.ends(0, &plan).stdout);
+        let enough = plan["address_space_bytes"].as_f64().unwrap();
+        for (share, code) in [(1.0, 0), (0.75, 2), (0.3, 2)] {
+            let limit = format!("ulimit -v {:.0}", (share * enough / 1024.0).ceil());
+            let command = format!("run small.toml --out r{threads} --threads {threads}");
+            let ended = run_within(&folder, &limit, &command);
+            assert_eq!(ended.code, Some(code), "{limit}: {ended:?}");
+            let problem = format!("too little memory: --threads {threads} may take ");
+            assert_eq!(ended.stderr.contains(&problem), code == 2, "{ended:?}");
+        }
+    }
+    let ended = run_within(&folder, "ulimit -d 60000", "run small.toml --threads 3");
+    assert!(
+        ended.stderr.contains(" more of data, `ulimit -d`"),
+        "{ended:?}"
+    );
+    let ended = run_within(&folder, "ulimit -v 150000", "accuracy --threads 2");
+    assert!(ended.stderr.contains("too little memory"), "{ended:?}");
 }
 
 /// A control group with a limit of memory, where this process may make one.
@@ -259,7 +289,7 @@ fn a_part_whose_process_is_killed_each_time_stops_no_others_and_is_done_once_non
         })
     };
     let begin = Instant::now();
-    for _ in 0..6 {
+    for death in 1..=6 {
         let mut child = folder.start("run long.toml --no-reduce --out r --threads 1");
         while !is_at_the_first(child.id()) {
             assert!(child.try_wait().unwrap().is_none());
@@ -268,6 +298,11 @@ fn a_part_whose_process_is_killed_each_time_stops_no_others_and_is_done_once_non
         }
         child.kill().unwrap();
         assert_eq!(wait(child).0, None);
+        let status = folder.ends(0, "status r").stdout;
+        let lines = status.lines().filter(|line| line.starts_with("deaths"));
+        let expected = if death == 1 { 1 } else { 2 };
+        assert_eq!(lines.count(), expected, "{status}");
+        assert!(status.contains("at 1 missing part"), "{status}");
     }
     assert_eq!(counts(&folder, "r"), [31, 0, 1]);
     let status = folder.ends(0, "status r").stdout;

@@ -193,7 +193,7 @@ fn a_target_that_cannot_be_met_ends_at_the_cap_and_says_so() {
     assert!(
         ended
             .stdout
-            .contains("2 sets with all seeds allowed, above the target"),
+            .contains("2 sets too uncertain, at the limit of seeds or jobs"),
         "{}",
         ended.stdout
     );
@@ -286,6 +286,41 @@ fn edges_have_intervals_and_say_how_they_ended_and_rows_without_one_say_so() {
         none.texts("ended")
             .iter()
             .all(|ended| *ended == "no crossing")
+    );
+}
+
+#[test]
+fn a_row_whose_end_is_not_clear_says_so_and_what_to_do() {
+    let folder = Folder::new();
+    let (axes, _) = MAP.split_once("[refine]").unwrap();
+    let axes = axes.replace("[29, 58]", "[29, 58, 87]");
+    let seeds = "seed = { first = 5, count = 24 }\n[record]";
+    folder.write("plain.toml", &axes.replace("[record]", seeds));
+    folder.ends(0, "run plain.toml --out plain");
+    let sets = folder.file("plain/reduced/sets.parquet");
+    // The value of a set with its first seeds, so that a few more leave it unclear.
+    let at_threshold = |set: usize| {
+        let refine = "[refine]\naxis = \"Delta\"\nby = \"resultant_length\"\nto = 0.5\n\
+                      seeds = { first = 5, from = 24, to = 32 }\njobs = 3000\nthreshold = ";
+        format!("{axes}{refine}{}\n", sets.reals("resultant_length")[set])
+    };
+    folder.write("end.toml", &at_threshold(2));
+    folder.ends(0, "run end.toml --out r");
+    let edges = folder.file("r/reduced/edges.parquet");
+    let ended = edges.texts("ended");
+    let unclear = ended.iter().position(|ended| *ended == "unclear end");
+    let unclear = unclear.unwrap_or_else(|| panic!("{ended:?}"));
+    assert_eq!(edges.counts("jobs")[unclear], 32, "it got all seeds");
+    assert_eq!(edges.reals("bracket_high")[unclear], 1.6e-6);
+    let shown = folder.ends(0, "show r").stdout;
+    assert!(
+        shown.contains("unclear: raise seeds.to, or widen the axis"),
+        "{shown}"
+    );
+    let status = folder.ends(0, "status r").stdout;
+    assert!(
+        status.contains("too uncertain, at the limit of seeds or jobs"),
+        "{status}"
     );
 }
 

@@ -720,6 +720,25 @@ fn a_plan_says_what_of_the_sweep_is_in_its_directory() {
 }
 
 #[test]
+fn a_directory_that_is_named_is_the_one_that_plan_and_batch_are_about() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    folder.ends(0, "run tiny.toml --no-reduce --out elsewhere");
+    let plan = json(&folder.ends(0, "plan elsewhere --json").stdout);
+    let directory = &plan["directory"];
+    assert_eq!(
+        (&directory["path"], &directory["jobs_missing"]),
+        (&"elsewhere".into(), &0.into())
+    );
+    let script = "batch slurm elsewhere --workers 2 --threads 1 --time 1h";
+    let script = folder.ends(0, script).stdout;
+    assert!(script.contains("/elsewhere --worker"), "{script}");
+    assert!(!script.contains("results/tiny"), "{script}");
+    let varied = json(&folder.ends(0, "plan elsewhere --set slips=9 --json").stdout);
+    assert!(varied["directory"].is_null(), "{varied}");
+}
+
+#[test]
 fn an_extension_with_a_value_that_differs_in_the_last_digits_is_refused() {
     let folder = Folder::new();
     let sweep = |values: &str| TINY.replace("[29, 58]", values);

@@ -327,6 +327,12 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
     let shown = census["tau_off"].as_f64().unwrap();
     assert_eq!(census["jobs_cut"], 6);
     assert!((shown / off - 1.0).abs() < 1e-12);
+    folder.ends(0, "run cut.toml --set max_time=0.01 --out early");
+    let status = folder.ends(0, "status early").stdout;
+    assert!(
+        status.contains("6, with 0.0 slips each: too few for tau_mean; make max_time longer"),
+        "{status}"
+    );
     // Those that end at a time are whole.
     folder.ends(
         0,

@@ -169,7 +169,13 @@ pub fn fifo(path: &Path) {
 fn a_fifo_makes_no_command_wait() {
     let folder = folder();
     fifo(&folder.path("fifo.toml"));
-    for command in ["plan fifo.toml", "run fifo.toml"] {
+    for command in [
+        "plan fifo.toml",
+        "run fifo.toml",
+        "simulate fifo.toml",
+        "accuracy fifo.toml",
+        "batch slurm fifo.toml --workers 1 --threads 1 --time 1h",
+    ] {
         let ended = folder.ends(2, command);
         assert!(
             ended

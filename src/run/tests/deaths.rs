@@ -44,8 +44,10 @@ fn parts_at_which_workers_died_come_last_and_after_three_deaths_alone_on_one_thr
         let layout = Layout::new(&Disk, root.path());
         let results = open(&layout, &sweep(SEEDS, "")).unwrap();
         let parts: Vec<_> = results.plan().parts().collect();
-        leave_marks(root.path(), &[(0, 4), (1, 3), (2, 2)]);
-        let found = marked(root.path());
+        leave_marks(root.path(), &[(0, 4), (1, 3), (2, 2), (3, 1)]);
+        let status = status(&Results::read(&layout).unwrap(), MAX_FAILURES).unwrap();
+        assert_eq!(status.parts_with_deaths, 4);
+        let found = status.marked;
         let deaths: Vec<_> = found.iter().map(|marked| marked.deaths).collect();
         assert_eq!(deaths, [4, 3, 2]);
         assert_eq!(found[0].commands.len(), 2, "{found:?}");
@@ -83,7 +85,7 @@ fn parts_at_which_workers_died_come_last_and_after_three_deaths_alone_on_one_thr
         order.dedup();
         let last = order.len() - 2;
         assert_eq!(order[last..], [1, 0]);
-        let plan_order: Vec<usize> = (3..parts.len()).chain([2, 1, 0]).collect();
+        let plan_order: Vec<usize> = (4..parts.len()).chain([3, 2, 1, 0]).collect();
         assert!(threads > 1 || order == plan_order, "{order:?}");
         assert!(tables_of(root.path()) == expected_tables());
         assert_eq!(marks(root.path()), Vec::<String>::new(), "all are done");
