@@ -149,7 +149,7 @@ impl Sample {
     }
 
     /// The half-width of its interval over its distance from the threshold: at least 1 if it is not clear.
-    fn error(&self) -> f64 {
+    pub fn error(&self) -> f64 {
         self.half_width() / self.excess.abs()
     }
 }
@@ -180,15 +180,8 @@ pub struct SetOfEdges {
 pub struct Placed<'a> {
     pub row: u64,
     side: f64,
-    sample: &'a Sample,
+    pub sample: &'a Sample,
     pub set: &'a SetOfEdges,
-}
-
-impl Placed<'_> {
-    /// See [`Sample::error`].
-    pub fn error(&self) -> f64 {
-        self.sample.error()
-    }
 }
 
 /// Sets next to each other that are not clear, and lie between no two that are on opposite sides.
@@ -198,36 +191,30 @@ pub struct Stretch<'a> {
     pub sets: Vec<Placed<'a>>,
     /// The clear sets beside them, or the ends of the line.
     bracket: [Placed<'a>; 2],
-    is_at_end: bool,
+    ended: Ended,
 }
 
 impl<'a> Stretch<'a> {
     /// Between two sets of a line that are clear, or beyond the last; `None` if all there are clear.
     fn between(all: &[Placed<'a>], first: Option<usize>, last: Option<usize>) -> Option<Self> {
         let unclear = &all[first.map_or(0, |first| first + 1)..last.unwrap_or(all.len())];
-        let [low, high] = [unclear.first()?, unclear.last()?];
-        let sets = match (first, last) {
-            (None, Some(_)) => vec![*low],
-            (Some(_), None) => vec![*high],
-            (None, None) if unclear.len() > 1 => vec![*low, *high],
-            (None, None) | (Some(_), Some(_)) => unclear.to_vec(),
-        };
+        let [low, high] = [*unclear.first()?, *unclear.last()?];
+        let ends = [
+            first.is_none().then_some(low),
+            last.is_none().then_some(high),
+        ];
+        let mut sets: Vec<Placed<'_>> = ends.into_iter().flatten().collect();
+        sets.dedup_by_key(|set| set.row);
+        let mut ended = Ended::UnclearEnd;
+        if sets.is_empty() {
+            (sets, ended) = (unclear.to_vec(), Ended::Unclear);
+        }
+        let beside = |clear: Option<usize>, end| clear.map_or(end, |clear| all[clear]);
         Some(Self {
             sets,
-            bracket: [
-                first.map_or(*low, |first| all[first]),
-                last.map_or(*high, |last| all[last]),
-            ],
-            is_at_end: first.is_none() || last.is_none(),
+            bracket: [beside(first, low), beside(last, high)],
+            ended,
         })
-    }
-
-    fn ended(&self, is_over: bool) -> Ended {
-        match (is_over, self.is_at_end) {
-            (false, _) => Ended::Open,
-            (true, true) => Ended::UnclearEnd,
-            (true, false) => Ended::Unclear,
-        }
     }
 }
 
@@ -520,7 +507,7 @@ pub(super) fn edge_rows(
             let [low, high] = &stretch.bracket;
             rows.push(EdgeRow {
                 jobs: stretch.sets.iter().map(|set| set.set.seeds).sum(),
-                ended: stretch.ended(is_over),
+                ended: if is_over { stretch.ended } else { Ended::Open },
                 ..row_between(sweep, refinement, key, (low.row, low.set), high.row)
             });
         }

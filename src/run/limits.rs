@@ -144,15 +144,14 @@ pub fn check_threads(threads: usize) -> Result<(), ThreadsError> {
 fn left() -> [f64; 2] {
     let limits = text_of("/proc/self/limits");
     let status = text_of("/proc/self/status");
-    let left = |[limit, taken]: [&str; 2]| {
+    [
+        ("Max address space", "VmSize:"),
+        ("Max data size", "VmData:"),
+    ]
+    .map(|(limit, taken)| {
         let taken = KILOBYTE * number_after(&status, taken).unwrap_or(0.0);
         number_after(&limits, limit).map_or(f64::INFINITY, |limit| (limit - taken).max(0.0))
-    };
-    [
-        ["Max address space", "VmSize:"],
-        ["Max data size", "VmData:"],
-    ]
-    .map(left)
+    })
 }
 
 /// Bytes that hard limits leave for jobs: of control groups, of the address space and of data; infinite if unknown.
