@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy
 import pandas
 
-from stickslip.statistics import Estimate, jackknife
+from stickslip.statistics import Estimate, jackknife, share
 from stickslip.tables import Sweep
 
 from .document import Section
@@ -37,7 +37,7 @@ def pulses(results: Path) -> Section:
         section.rows.append(
             {
                 "pulse": f"{1e6 * amplitude:.1f} µm, {frequency:.0f} Hz",
-                "triggered": of_mean(mine, "triggered").text(),
+                "triggered": share(mine["triggered"], mine["seed"]).text(),
                 "by the drive": f"{mine['triggered_drive'].mean():.3f}",
                 "advance/⟨τ⟩, middle third": of_mean(middle, "advance").text(2),
                 "last third": of_mean(late, "advance").text(3),
@@ -84,7 +84,7 @@ def pulses(results: Path) -> Section:
         " 2015](https://doi.org/10.1002/2014JB011611)), responses of either sign of block chains ([Franović et al."
         " 2016](https://arxiv.org/abs/1606.03079)).",
         f"The slip after the next keeps {kept.text(2)} of the advance.",
-        f"Pulses of no size advance slips by up to {1e3 * all_rows['noise'].iloc[0]:.1f} ms, by the error of the solver.",
+        f"Pulses of no size advance slips by up to {1e3 * all_rows['noise'].max():.1f} ms, by the error of the solver.",
     )
     section.why = "what weak pulses do is the drive's; strong ones trigger more late in the cycle, and hold slips up in its middle"
     return section

@@ -384,14 +384,11 @@ fn table_of_pulses(triggers: &[TriggerRow]) -> String {
     let parameters = pulses.iter().map(|pulses| pulses.parameters.clone());
     let mut columns = parameters_but(Symbol::PulseStart, parameters);
     columns.numbers("pulses", &pulses, |pulses| pulses.rows.len().to_string());
-    let quantities = [
-        ("advance/⟨τ⟩", TriggerRow::advances as fn(&TriggerRow) -> _),
-        ("triggered", TriggerRow::triggers),
-    ];
-    for (name, quantity) in quantities {
+    let found = |pulses: &Pulses<'_>| [pulses.advances(), pulses.triggered()];
+    for (place, name) in ["advance/⟨τ⟩", "triggered"].into_iter().enumerate() {
         for (head, which) in [(name, 0), ("by the drive", 1), ("excess", 2)] {
             columns.numbers(head, &pulses, |pulses| {
-                match pulses.means(quantity).map(|means| means[which]) {
+                match found(pulses)[place].map(|means| means[which]) {
                     // Exact for the control's slips, whose error the excess has.
                     Some((value, Some(Interval { low, high }))) if which != 1 => {
                         with_interval(value, low, high)
@@ -403,7 +400,8 @@ fn table_of_pulses(triggers: &[TriggerRow]) -> String {
         }
     }
     let silent = triggers.iter().filter(|row| row.advance.is_none()).count();
-    let noise = triggers[0].noise.map(|noise| {
+    let noise = triggers.iter().filter_map(|row| row.noise);
+    let noise = noise.reduce(f64::max).map(|noise| {
         format!("; pulses of 1e-12 m at most advance slips by up to {noise:.1e} s, by the error of the solver")
     });
     let noise = noise.unwrap_or_default();

@@ -51,15 +51,20 @@ impl Series {
             means.map(|(x, means)| (*x, means[which].0)).collect()
         };
         let bars = self.bars().collect();
+        let by_drive = match self.means[..] {
+            // A curve through one point is none.
+            [(_, [_, (value, _), _])] => Layer::Level(value, drive_alone(self.ink)),
+            _ => Layer::Curve(places(1), drive_alone(self.ink)),
+        };
         [
-            Layer::Curve(places(1), drive_alone(self.ink)),
+            by_drive,
             Layer::Bars(bars, Stroke::solid(self.ink, BAR_WIDTH)),
             Layer::Dots(places(0), Dot::solid(self.ink, RADIUS)),
         ]
     }
 }
 
-/// `None` if no job says what its pulse did, or they differ in the velocity or in the number of periods.
+/// `None` if no job says what its pulse did, or they differ in more than where it begins, amplitude and period.
 pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let all = Pulses::of(rows);
     let value = |pulses: &Pulses<'_>, symbol| pulses.parameters.get(symbol).number();
@@ -67,7 +72,10 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let amplitudes = values(Symbol::Delta);
     // High frequencies first.
     let periods = values(Symbol::T);
-    let is_one = values(Symbol::V0).len() == 1 && values(Symbol::PulseCycles).len() <= 1;
+    let control = |pulses: &Pulses<'_>| pulses.parameters.without_modulation();
+    let mut pairs = all.iter().zip(all.iter().skip(1));
+    let is_one = values(Symbol::PulseCycles).len() == 1
+        && pairs.all(|(one, next)| control(one) == control(next));
     if !is_one || periods.len() > INKS.len() || amplitudes.len() > MAX_AMPLITUDES {
         return None;
     }
@@ -83,7 +91,7 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
             let bins = (0..BINS).filter_map(|bin| {
                 let [low, high] = [bin, bin + 1].map(|edge| f64::from(edge) / f64::from(BINS));
                 let pulses = of(amplitude, period)?.between(low, high);
-                Some((0.5 * (low + high), pulses.means(TriggerRow::advances)?))
+                Some((0.5 * (low + high), pulses.advances()?))
             });
             let means = bins.collect();
             Series { ink, means }
@@ -107,7 +115,7 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let shares = inks().map(|(period, ink)| {
         let places = amplitudes.iter();
         let shares = places.filter_map(|&amplitude| {
-            let means = of(amplitude, period)?.means(TriggerRow::triggers)?;
+            let means = of(amplitude, period)?.triggered()?;
             Some((factor * amplitude, means))
         });
         let means = shares.collect();
@@ -134,4 +142,28 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     };
     let look = look.with_note("bars: 95 % over seeds");
     Some(panel::draw(NAME, &look, layout, &legend, panels))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_drive_alone_is_drawn_for_one_amplitude_too() {
+        for amplitudes in 1..4 {
+            let mean = |value: f64| (value, None);
+            let means = [mean(0.4), mean(0.1), mean(0.3)];
+            let series = Series {
+                ink: INKS[0],
+                means: (0..amplitudes)
+                    .map(|number| (f64::from(number), means))
+                    .collect(),
+            };
+            match &series.layers()[0] {
+                Layer::Level(value, _) => assert_eq!((*value, amplitudes), (0.1, 1)),
+                Layer::Curve(places, _) => assert!(places.len() > 1, "no line"),
+                _ => panic!("the drive alone is a line"),
+            }
+        }
+    }
 }

@@ -36,6 +36,9 @@ const CANCELLED: f64 = 1e-9;
 /// Values of which a standard deviation or a resultant length has an error: of two, both are as far from their mean.
 pub(super) const MIN_VALUES: u64 = 3;
 
+/// A mean and its interval.
+pub type Mean = (f64, Option<Interval>);
+
 /// What a slip of a kind that was not seen would take from a sum, or add to it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Unseen {
@@ -74,6 +77,28 @@ impl Estimate<1> {
         Some(Interval {
             low: mean - error(skew < 0.0, unseen.below),
             high: mean + error(skew > 0.0, unseen.above),
+        })
+    }
+
+    /// Of a share, the mean of flags (Wilson, J. Am. Stat. Assoc. 22, 209 (1927)), with the number of independent flags
+    /// that had its variance; where nothing varies, of jobs. `None` for fewer than two.
+    pub(super) fn share_interval(&self) -> Option<Interval> {
+        let share = self.value()?;
+        let freedom = self.freedom()?;
+        let variance = self.variance(&[1.0]);
+        let spread = share * (1.0 - share);
+        let number = if variance > 0.0 {
+            (spread / variance).min(self.count as f64)
+        } else {
+            freedom + 1.0
+        };
+        let t = student(freedom);
+        let square = t * t / number;
+        let middle = (share + 0.5 * square) / (1.0 + square);
+        let half = t / (1.0 + square) * ((spread + 0.25 * square) / number).sqrt();
+        Some(Interval {
+            low: (middle - half).max(0.0),
+            high: (middle + half).min(1.0),
         })
     }
 
@@ -351,6 +376,40 @@ pub(super) mod tests {
     }
 
     /// Ends of mid-P intervals of the Poisson distribution, from its probabilities.
+    /// A quarter of the flags of a job are one draw.
+    #[test]
+    fn shares_are_covered_also_rare_ones_in_few_jobs() {
+        const REPETITIONS: u64 = 1000;
+        for (share, jobs, length) in [
+            (0.0024, 8, 20),
+            (0.0024, 64, 20),
+            (0.05, 8, 20),
+            (0.3, 16, 20),
+        ] {
+            let holds = |repetition: &u64| {
+                let mut draws = Draws::new(*repetition);
+                let mut flag = |chance: f64| f64::from(u8::from(draws.uniform() < chance));
+                let mut job = || {
+                    let half = flag(share);
+                    let flags = (0..length).map(|number| {
+                        let own = flag(share);
+                        [if number % 4 == 0 { half } else { own }]
+                    });
+                    flags.collect::<Vec<_>>()
+                };
+                let flags = Sequences::of((0..jobs).map(|_| job()).collect::<Vec<_>>());
+                let Interval { low, high } = flags.estimate().share_interval().unwrap();
+                assert!(0.0 <= low && low < high && high <= 1.0);
+                low <= share && share <= high
+            };
+            let held = (0..REPETITIONS).filter(holds).count();
+            assert!(
+                held > 910,
+                "{share} in {jobs} jobs: {held} of {REPETITIONS}"
+            );
+        }
+    }
+
     #[test]
     fn counts_of_rare_events_have_the_intervals_of_the_poisson_distribution() {
         let exact = [

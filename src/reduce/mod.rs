@@ -22,6 +22,7 @@ pub use crate::sets::{FREQUENCY, SetRow, is_same};
 pub use crate::table::columns::Interval;
 pub use backbone::BackboneBin;
 pub use compare::{Comparison, compare};
+pub use confidence::Mean;
 #[cfg(test)]
 pub(crate) use confidence::mean_of;
 pub(crate) use confidence::student_at;
@@ -41,7 +42,7 @@ pub use reduction::{
 };
 pub use sequence::quantile;
 pub use slips::{SlipOfSet, means_of_slips, sample_of_slips};
-pub use triggers::{Mean, Pulses, TriggerRow};
+pub use triggers::{Pulses, TriggerRow};
 pub use values::{Condition, Values, ascending, differing, has_even_steps, is_spread, swept};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

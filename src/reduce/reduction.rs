@@ -8,7 +8,7 @@
 use super::backbone::{Backbone, BackboneBin};
 use super::crossings::edge_rows;
 use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
-use super::triggers::{note_delays, trigger_rows};
+use super::triggers::{note_noise, trigger_rows};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::tables::{JOBS, gaps};
@@ -146,7 +146,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     summary.points = kept.len() as u64;
     staged.write(kept.into_iter().map(|(_, point)| point))?;
     if results.plan().sweeps().any(Sweep::has_pulses) {
-        note_delays(&mut triggers);
+        note_noise(&mut triggers);
         staged.write(triggers)?;
     }
     if let Some(refinement) = results.sweep().refinement() {

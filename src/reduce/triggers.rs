@@ -1,14 +1,16 @@
 //! Triggering: how much earlier a slip comes after a pulse than without it.
 //!
-//! The control of a pulsed job is the same run until the pulse begins, so that its next onset is that of the same slip
-//! without the pulse. By the drive alone that slip comes when the pulsed drive first gets as far as the control's had
-//! at its onset. Without an exact counterfactual, experiments compare catalogues before and after waves (van der Elst
+//! The control of a pulsed job is the same run until the pulse begins, so that its next slip has the same number: its
+//! onset may lie just before the pulse that makes it. By the drive alone it comes when the pulsed drive first gets as
+//! far as the control's had at its onset. Without an exact counterfactual, experiments compare catalogues before and after waves (van der Elst
 //! and Savage, J. Geophys. Res. 120 (2015), 10.1002/2014JB011611).
 
+use super::confidence::{Mean, Unseen};
 use super::drive_alone::{Explained, Times};
 use super::gather::Gathered;
-use super::sequence::Sequences;
-use crate::model::{Drive, Parameters, Selected, Selection, Symbol};
+use super::sequence::{Estimate, Sequences};
+use crate::model::{Drive, Parameters, Selected};
+use crate::results::tables::All;
 use crate::table::columns::{Interval, columns};
 use crate::table::tables;
 use crate::table::value::words;
@@ -19,21 +21,6 @@ const NO_PULSE: f64 = 1e-12;
 
 /// Seeds that a mean needs for an interval.
 const MIN_SEEDS: usize = 8;
-
-/// The parameters of a row: those of the pulse, and of the drive.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct OfPulse;
-
-impl Selection for OfPulse {
-    const SYMBOLS: &'static [Symbol] = &[
-        Symbol::V0,
-        Symbol::Delta,
-        Symbol::T,
-        Symbol::PulseStart,
-        Symbol::PulseCycles,
-        Symbol::Seed,
-    ];
-}
 
 words! {
     /// Why a job does not say what its pulse did.
@@ -51,17 +38,16 @@ columns! {
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct TriggerRow {
         set_id: String = "", "hash of all that defines the job but the seed";
-        parameters: Selected<OfPulse>;
+        parameters: Selected<All>;
         tau_control: Option<f64> = "s", "mean interval of the control";
         cycle: Option<f64> = "s", "interval of the control in which the pulse begins";
         place: Option<f64> = "", "share of it that is over then";
-        advance: Option<f64> = "s", "how much earlier the next onset comes";
+        advance: Option<f64> = "s", "how much earlier the next slip comes, by its onset";
         advance_drive: Option<f64> = "s", "the same by the drive alone";
         next_advance: Option<f64> = "s", "how much earlier the one after it comes";
-        triggered: Option<bool> = "", "whether the next onset lies within the pulse, and without it after";
+        triggered: Option<bool> = "", "whether the next onset comes by the end of the pulse, and without it after";
         triggered_drive: Option<bool> = "", "the same by the drive alone";
-        delayed: Option<bool> = "", "whether it is not triggered, and `advance` above `noise`";
-        noise: Option<f64> = "s", "largest advance, of either sign, by pulses up to 1e-12 m here";
+        noise: Option<f64> = "s", "largest advance, of either sign, by pulses up to 1e-12 m of the same slider and drive";
         excluded: Option<Excluded> = "",
             "why these are null: `no control`, or the pulse begins `before the first slip`, `within a slip` or `after the last slip`";
     }
@@ -75,6 +61,8 @@ pub(super) struct Cycle {
     /// Onsets before and after the pulse begins, and the one after, if there is one.
     last: f64,
     free: f64,
+    /// How many slips are recorded before that.
+    number: usize,
     following: Option<f64>,
     passage: f64,
     pulse: [f64; 2],
@@ -96,18 +84,19 @@ impl Cycle {
         Ok(Self {
             last: last.onset,
             free: free.onset,
+            number,
             following: control.get(number + 1).map(|slip| slip.onset),
             passage: drive.first_passage(free.onset),
             pulse,
         })
     }
 
-    /// The row of a pulse with these onsets after its start.
+    /// The row of a pulse with these onsets in its run.
     fn row(&self, onsets: &[f64]) -> Result<TriggerRow, Excluded> {
-        let next = *onsets.first().ok_or(Excluded::AfterLast)?;
+        let next = *onsets.get(self.number).ok_or(Excluded::AfterLast)?;
         let [start, end] = self.pulse;
         let interval = self.free - self.last;
-        let following = self.following.zip(onsets.get(1));
+        let following = self.following.zip(onsets.get(self.number + 1));
         let is_triggered = |onset: f64| Some(onset <= end && self.free > end);
         Ok(TriggerRow {
             cycle: Some(interval),
@@ -122,18 +111,18 @@ impl Cycle {
     }
 }
 
-/// The rows of a set, in the order of its seeds, before [`note_delays`]; none without a pulse.
+/// The rows of a set, in the order of its seeds, before [`note_noise`]; none without a pulse.
 pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<TriggerRow> {
     let Gathered { jobs, slips, .. } = set;
-    let Some(start) = jobs.parameters.pulse_start else {
+    if jobs.parameters.pulse_start.is_none() {
         return Vec::new();
-    };
+    }
     let row = |&seed: &u64| {
         let onsets = slips.of_job(seed).iter().map(|slip| slip.onset);
-        let after: Vec<f64> = onsets.filter(|onset| *onset > start).collect();
+        let onsets = onsets.collect::<Vec<_>>();
         let cycle = explained.cycles.get(&seed).copied();
         let cycle = cycle.unwrap_or(Err(Excluded::NoControl));
-        let row = cycle.and_then(|cycle| cycle.row(&after));
+        let row = cycle.and_then(|cycle| cycle.row(&onsets));
         let parameters = jobs.parameters.with_seed(seed);
         TriggerRow {
             set_id: jobs.set_id.clone(),
@@ -145,15 +134,21 @@ pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<Trigger
     jobs.finished.iter().map(row).collect()
 }
 
-/// Says which advances are larger than those by no pulse at all.
-pub(super) fn note_delays(rows: &mut [TriggerRow]) {
-    let without = rows.iter().filter(|row| row.is_nothing());
-    let noise = without.filter_map(|row| row.advance).map(f64::abs);
-    let noise = noise.reduce(f64::max);
+/// Notes how large advances by no pulse at all are, for each slider and drive.
+pub(super) fn note_noise(rows: &mut [TriggerRow]) {
+    let control = |row: &TriggerRow| row.parameters.without_modulation().with_seed(0);
+    let nothing = rows.iter().filter(|row| row.is_nothing());
+    let noise = |pulses: Pulses<'_>| {
+        let advances = pulses.rows.iter().filter_map(|row| row.advance);
+        let noise = advances.map(f64::abs).reduce(f64::max);
+        (pulses.parameters, noise)
+    };
+    let noises = Pulses::grouped(nothing, control).into_iter().map(noise);
+    let noises: Vec<(Parameters, Option<f64>)> = noises.collect();
     for row in rows {
-        row.noise = noise;
-        let advance = row.advance.zip(row.triggered).zip(noise);
-        row.delayed = advance.map(|((advance, triggered), noise)| !triggered && advance > noise);
+        let control = control(row);
+        let noise = noises.iter().find(|(of, _)| *of == control);
+        row.noise = noise.and_then(|(_, noise)| *noise);
     }
 }
 
@@ -171,20 +166,17 @@ impl TriggerRow {
     }
 
     /// The advance as seen and by the drive alone, over the mean interval.
-    pub fn advances(&self) -> Option<[f64; 2]> {
+    fn advances(&self) -> Option<[f64; 2]> {
         let mean = self.tau_control?;
         Some([self.advance? / mean, self.advance_drive? / mean])
     }
 
     /// Whether the slip is triggered as seen and by the drive alone: 1 or 0.
-    pub fn triggers(&self) -> Option<[f64; 2]> {
+    fn triggers(&self) -> Option<[f64; 2]> {
         let number = |is_so: bool| f64::from(u8::from(is_so));
         Some([number(self.triggered?), number(self.triggered_drive?)])
     }
 }
-
-/// A mean and its interval.
-pub type Mean = (f64, Option<Interval>);
 
 /// The pulses that differ in their start and seed alone, and say something.
 #[derive(Clone, Debug)]
@@ -196,14 +188,20 @@ pub struct Pulses<'a> {
 impl<'a> Pulses<'a> {
     /// All but those that move nothing, in the order of the rows.
     pub fn of(rows: &'a [TriggerRow]) -> Vec<Self> {
-        let mut all: Vec<Self> = Vec::new();
         let says = |row: &&TriggerRow| row.advance.is_some() && !row.is_nothing();
-        for row in rows.iter().filter(says) {
-            let parameters = Parameters {
-                pulse_start: None,
-                seed: 0,
-                ..row.parameters.parameters.clone()
-            };
+        Self::grouped(rows.iter().filter(says), |row| Parameters {
+            pulse_start: None,
+            ..row.parameters.with_seed(0)
+        })
+    }
+
+    fn grouped(
+        rows: impl Iterator<Item = &'a TriggerRow>,
+        parameters: impl Fn(&TriggerRow) -> Parameters,
+    ) -> Vec<Self> {
+        let mut all: Vec<Self> = Vec::new();
+        for row in rows {
+            let parameters = parameters(row);
             let mut known = all.iter_mut();
             match known.find(|pulses| pulses.parameters == parameters) {
                 Some(pulses) => pulses.rows.push(row),
@@ -216,9 +214,29 @@ impl<'a> Pulses<'a> {
         all
     }
 
-    /// Means of a quantity: as seen, by the drive alone, and of the difference; `None` without values. Pulses of a seed
-    /// meet the same slip, so intervals need `MIN_SEEDS` of them.
-    pub fn means(&self, quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>) -> Option<[Mean; 3]> {
+    /// The mean advance over the mean interval: as seen, by the drive alone, and of the difference.
+    pub fn advances(&self) -> Option<[Mean; 3]> {
+        self.means(TriggerRow::advances, Estimate::interval)
+    }
+
+    /// The share of slips that are triggered, likewise.
+    pub fn triggered(&self) -> Option<[Mean; 3]> {
+        let [seen, by_drive, _] = self.means(TriggerRow::triggers, Estimate::share_interval)?;
+        let unseen = Unseen {
+            below: 1.0,
+            above: 1.0,
+        };
+        let of_excess = |mean: &Estimate<1>| mean.interval_with(unseen);
+        let [.., excess] = self.means(TriggerRow::triggers, of_excess)?;
+        Some([seen, by_drive, excess])
+    }
+
+    /// `None` without values. Pulses of a seed meet the same slip, so intervals need `MIN_SEEDS` of them.
+    fn means(
+        &self,
+        quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>,
+        interval: impl Fn(&Estimate<1>) -> Option<Interval>,
+    ) -> Option<[Mean; 3]> {
         let mut seeds: BTreeMap<u64, Vec<[f64; 2]>> = BTreeMap::new();
         for row in &self.rows {
             if let Some(values) = quantity(row) {
@@ -229,8 +247,7 @@ impl<'a> Pulses<'a> {
         let all = Sequences::of(seeds.into_values());
         let mean = |direction: [f64; 2]| {
             let mean = all.along(&direction).estimate();
-            let interval = mean.interval().filter(|_| has_interval);
-            Some((mean.value()?, interval))
+            Some((mean.value()?, interval(&mean).filter(|_| has_interval)))
         };
         Some([mean([1.0, 0.0])?, mean([0.0, 1.0])?, mean([1.0, -1.0])?])
     }
@@ -260,20 +277,35 @@ mod tests {
         parameters.validated().unwrap()
     }
 
-    fn row(start: f64, amplitude: f64, after: &[f64]) -> TriggerRow {
+    const CONTROL: [f64; 4] = [1.0, 1.1, 1.21, 1.3];
+
+    /// Of a run with these onsets after those that its control has before the pulse.
+    fn row(start: f64, amplitude: f64, later: &[f64]) -> TriggerRow {
+        let before = CONTROL.iter().filter(|onset| **onset <= start);
+        let onsets: Vec<f64> = before.chain(later).copied().collect();
         let slip = |onset: f64| Times {
             onset,
             interval: None,
             nucleation: onset - 0.001,
             duration: 0.006,
         };
-        let control = [1.0, 1.1, 1.21, 1.3].map(slip);
         let parameters = pulsed(start, amplitude);
-        let row = Cycle::of(&parameters, &control).and_then(|cycle| cycle.row(after));
+        let cycle = Cycle::of(&parameters, &CONTROL.map(slip));
+        let row = cycle.and_then(|cycle| cycle.row(&onsets));
         TriggerRow {
             parameters: Selected::new(parameters),
             ..row.unwrap_or_else(TriggerRow::excluded)
         }
+    }
+
+    #[test]
+    fn the_next_slip_is_that_with_the_number_of_the_controls_though_its_onset_lies_before_the_pulse()
+     {
+        let made = row(1.205, 1e-6, &[1.2049, 1.29, 1.41]);
+        assert!((made.advance.unwrap() - 0.0051).abs() < 1e-12);
+        assert!((made.next_advance.unwrap() - 0.01).abs() < 1e-12);
+        assert_eq!(made.triggered, Some(false));
+        assert_eq!(row(1.185, 1e-6, &[1.1849, 1.29]).triggered, Some(true));
     }
 
     #[test]
@@ -307,20 +339,49 @@ mod tests {
     }
 
     #[test]
-    fn what_pulses_of_nothing_advance_is_noise() {
+    fn what_pulses_of_nothing_advance_is_noise_of_the_same_slider_alone() {
         let mut rows = [
             row(1.13, 1e-15, &[1.21 + 2e-9]),
-            row(1.13, 1e-7, &[1.21 - 1e-9]),
+            row(1.15, 1e-15, &[1.21 - 1e-9]),
+            row(1.13, 1e-7, &[1.2]),
+            row(1.13, 1e-15, &[1.23]),
+            row(1.13, 1e-7, &[1.2]),
             row(1.13, 1e-7, &[1.2]),
         ];
-        note_delays(&mut rows);
-        assert!(
-            rows.iter()
-                .all(|row| (row.noise.unwrap() - 2e-9).abs() < 1e-15)
-        );
-        let [none, small, large] = rows;
-        assert_eq!([none.delayed, small.delayed], [Some(false); 2]);
-        assert_eq!(large.delayed, Some(true));
+        rows[1].parameters.parameters.seed = 3;
+        for row in &mut rows[3..5] {
+            row.parameters.parameters.damping_rate = 30.0;
+        }
+        rows[5].parameters.parameters.drive_velocity = 1e-5;
+        note_noise(&mut rows);
+        for (row, noise) in rows.iter().zip([2e-9, 2e-9, 2e-9, 0.02, 0.02]) {
+            assert!((row.noise.unwrap() - noise).abs() < 1e-15);
+        }
+        assert_eq!(rows[5].noise, None);
+    }
+
+    #[test]
+    fn a_share_of_which_none_is_seen_has_an_interval_and_none_reaches_below_0() {
+        let rows = |triggered: usize| -> Vec<TriggerRow> {
+            let row = |number: usize| TriggerRow {
+                parameters: Selected::new(pulsed(1.15, 1e-7).with_seed(number as u64 % 8)),
+                advance: Some(0.0),
+                triggered: Some(number < triggered),
+                triggered_drive: Some(false),
+                ..TriggerRow::default()
+            };
+            (0..80).map(row).collect()
+        };
+        for triggered in [0, 1, 3, 80] {
+            let rows = rows(triggered);
+            let [seen, by_drive, excess] = Pulses::of(&rows)[0].triggered().unwrap();
+            let share = triggered as f64 / 80.0;
+            let Interval { low, high } = seen.1.unwrap();
+            assert!(0.0 <= low && low <= share && share <= high && high <= 1.0);
+            assert!(high - low > 0.03, "{low} {high}");
+            let Interval { low, high } = excess.1.unwrap();
+            assert!(low < share && share < high && by_drive.0 == 0.0);
+        }
     }
 
     #[test]
@@ -337,7 +398,7 @@ mod tests {
         let pulses = Pulses::of(&rows);
         let counts: Vec<usize> = pulses.iter().map(|pulses| pulses.rows.len()).collect();
         assert_eq!(counts, [1, 20]);
-        let [seen, by_drive, excess] = pulses[1].means(TriggerRow::advances).unwrap();
+        let [seen, by_drive, excess] = pulses[1].advances().unwrap();
         assert!(
             (seen.0 - 0.1095).abs() < 1e-9 && by_drive.0 == 0.0,
             "{seen:?}"
@@ -345,7 +406,7 @@ mod tests {
         let interval = excess.1.unwrap();
         assert!(interval.low < seen.0 && seen.0 < interval.high);
         assert!(interval.high - interval.low < 0.01);
-        let [(mean, interval), ..] = pulses[0].means(TriggerRow::advances).unwrap();
+        let [(mean, interval), ..] = pulses[0].advances().unwrap();
         assert!((mean - 0.2).abs() < 1e-9 && interval.is_none());
         assert_eq!(pulses[1].between(0.0, 0.3).rows.len(), 0);
     }

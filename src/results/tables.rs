@@ -29,9 +29,9 @@ impl JobOutcome {
     /// The outcome of a job that did not fail.
     pub fn of(measured: &Measurements) -> Self {
         match measured.summary.satisfied {
-            _ if measured.has_given_up => Self::NoSlips,
-            true => Self::Done,
             false => Self::TimeLimit,
+            true if measured.has_given_up => Self::NoSlips,
+            true => Self::Done,
         }
     }
 }
@@ -71,7 +71,7 @@ impl Selection for DriveAndSeed {
     const SYMBOLS: &'static [Symbol] = &[Symbol::V0, Symbol::Delta, Symbol::T, Symbol::Seed];
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct All;
 
 impl Selection for All {

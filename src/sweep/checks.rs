@@ -210,7 +210,10 @@ impl Sweep {
                 Shortest(velocity)
             )
         });
-        let unusual = values(Quantity::Eta).find(|eta| *eta != 0.0 && !USUAL_ETA.contains(eta));
+        let etas = points.iter().zip(values(Quantity::Eta));
+        let unusual = etas.filter(|(point, _)| point.parameters.pulse_start.is_none());
+        let mut unusual = unusual.map(|(_, eta)| eta);
+        let unusual = unusual.find(|eta| *eta != 0.0 && !USUAL_ETA.contains(eta));
         let unusual = unusual.map(|eta| {
             let low = USUAL_ETA.start();
             let high = USUAL_ETA.end();

@@ -111,6 +111,9 @@ fn read(source: &Source<'_>, is_new: bool) -> Result<Sweep, Refused> {
         let unknown = Symbol::ALL.into_iter().filter(|symbol| !is_known(symbol));
         sweep.base.unknown = unknown.collect();
     }
+    if sweep.has_pulses() {
+        sweep.base.pulse_cycles.get_or_insert(1);
+    }
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places, is_new)?;
     checks::rounds(&sweep, &file)?;

@@ -104,3 +104,56 @@ fn a_sweep_without_controls_or_pulses_says_so() {
     let refused = folder.ends(2, "simulate --set Delta=1e-6 --set T=0.03 --set pulse_start=1 --set ramp_time=1 --set T_to=0.1");
     assert!(refused.stderr.contains("pulse_start"), "{}", refused.stderr);
 }
+
+#[test]
+fn noise_is_that_of_a_slider_whatever_lies_beside_it() {
+    let folder = Folder::new();
+    folder.write(
+        "pulses.toml",
+        &SWEEP.replace("[0.5, 0.51, 0.52, 0.53, 0.54, 9]", "[0.5, 0.53]"),
+    );
+    let of = |gammas: &str| -> Vec<(f64, f64)> {
+        folder.ends(
+            0,
+            &format!("run pulses.toml --axis gamma={gammas} --out {gammas}"),
+        );
+        let triggers = folder.file(&format!("{gammas}/reduced/triggers.parquet"));
+        let noise = triggers.reals("noise");
+        assert_eq!(noise.len(), triggers.cells.len());
+        triggers.reals("gamma").into_iter().zip(noise).collect()
+    };
+    let alone = [of("6462"), of("30")].concat();
+    let mut beside = of("6462,30");
+    beside.sort_by(|a, b| b.0.total_cmp(&a.0));
+    assert_eq!(alone, beside);
+    assert!(alone[0].1 != alone[alone.len() - 1].1, "{alone:?}");
+}
+
+#[test]
+fn one_cycle_is_the_default_and_the_same_job() {
+    let folder = Folder::new();
+    folder.write(
+        "pulses.toml",
+        &SWEEP.replace("[0.5, 0.51, 0.52, 0.53, 0.54, 9]", "[0.5]"),
+    );
+    folder.ends(0, "run pulses.toml --out out");
+    for flags in ["--set pulse_cycles=1", "--axis pulse_cycles=1,2"] {
+        let again = folder.ends(0, &format!("run pulses.toml {flags} --out out"));
+        let said = again.stderr.contains("27 there already");
+        assert!(said, "{flags}: {}", again.stderr);
+    }
+}
+
+#[test]
+fn a_pulse_that_moves_nothing_warns_of_nothing_and_a_lasting_modulation_does() {
+    let folder = Folder::new();
+    for (set, warns) in [("--set seed=1", false), ("--set pulse_start=none", true)] {
+        let planned = folder.ends(0, &format!("plan --preset triggering {set}"));
+        assert_eq!(
+            planned.stderr.contains("warning"),
+            warns,
+            "{}",
+            planned.stderr
+        );
+    }
+}

@@ -59,7 +59,7 @@ fields! {
         PulseStart("pulse_start", "t_p", "Start of the pulse") pulse_start: Option<f64> = None, "s", NOT_NEGATIVE and "given only with Delta > 0 and without a ramp",
             "start of the modulation as a pulse; null: it lasts";
         PulseCycles("pulse_cycles", "", "Periods of the pulse") pulse_cycles: Option<u64> = None, "", COUNT and "given only with pulse_start",
-            "periods of the pulse; null: 1";
+            "periods of the pulse, 1 if not given";
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
         L("L", "L") slider_length: f64 = 0.15, "m", POSITIVE,
             "slider length, enters positions and front speeds only";
@@ -105,8 +105,8 @@ impl Parameters {
         })
     }
 
-    /// Checks every range and rule and brings the values into canonical form: without modulation there is no period,
-    /// and no negative zero.
+    /// Checks every range and rule and brings the values into canonical form: without modulation there is no period, a
+    /// pulse has periods, and no zero is negative.
     pub fn validated(mut self) -> Result<Self, ParameterError> {
         for symbol in Symbol::ALL {
             if self.unknown.contains(&symbol) {
@@ -122,6 +122,9 @@ impl Parameters {
         self.check_rules()?;
         if !self.is_modulated() {
             self.modulation_period = None;
+        }
+        if self.pulse_start.is_some() {
+            self.pulse_cycles.get_or_insert(1);
         }
         Ok(self)
     }
@@ -202,8 +205,12 @@ impl Parameters {
         self.modulation_period.map_or(0.0, |period| TAU / period)
     }
 
-    /// The largest angular frequency of the modulation on its ramp, in rad/s; 0 when it is off.
+    /// The largest angular frequency of the modulation on its ramp, in rad/s; 0 when it is off, or a pulse: steps before
+    /// one are those without.
     pub fn largest_modulation_frequency(&self) -> f64 {
+        if self.pulse_start.is_some() {
+            return 0.0;
+        }
         self.turning_period
             .map_or(0.0, |period| TAU / period)
             .max(self.modulation_frequency())

@@ -2,7 +2,8 @@
 
 use super::{Limits, Resolve, Solver, simulate, simulate_audited};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
-use crate::observe::ContactLog;
+use crate::observe::{ContactLog, Recording, Slip, measure};
+use std::sync::atomic::AtomicBool;
 
 const GRID: Solver = Solver::event_driven(1e-3);
 const EXACT: Solver = Solver::event_driven(1e-10);
@@ -42,29 +43,90 @@ fn which(event: &ContactEvent) -> (usize, usize, u32, bool) {
 }
 
 #[test]
-fn a_run_and_its_control_agree_until_the_pulse_begins() {
-    for solver in [GRID, taylor(), Solver::fixed_step(1e-6)] {
-        for start in [0.0, 0.0413, 0.17, 0.2213] {
-            let parameters = pulsed(start);
-            let control = events(&parameters.without_modulation(), solver, 0.3);
-            let run = events(&parameters, solver, 0.3);
-            let before = control.iter().filter(|event| event.time < start).count();
-            assert!(before > 0 || start == 0.0);
-            for (event, other) in run.iter().zip(&control[..before]) {
-                assert_eq!(which(event), which(other), "{solver:?} {start}");
-                // The last leap before the pulse ends with it, and leaves out free motion of a part of the tolerance.
-                let allowed = if other.time < start - 0.02 { 0.0 } else { 1e-7 };
-                let late = (event.time - other.time).abs();
-                assert!(
-                    late <= allowed,
-                    "{solver:?} {start}: {late:e} at {}",
-                    other.time
-                );
+fn events_before_a_pulse_are_those_of_the_control_at_every_period() {
+    for blocks in [5, 70] {
+        let of = |start: f64, period: f64, cycles: u64| Parameters {
+            blocks,
+            modulation_period: Some(period),
+            pulse_cycles: Some(cycles),
+            ..pulsed(start)
+        };
+        for solver in [GRID, taylor(), Solver::fixed_step(1e-6)] {
+            let control = events(&of(0.0, 1.0, 1).without_modulation(), solver, 0.3);
+            let slip = control.iter().find(|event| event.generation > 3);
+            let slip = slip.expect("a slip").time;
+            // The last of these starts between two events of a step of the grid.
+            for start in [0.0, 0.0413, 0.17, slip, slip + 7e-7] {
+                for frequency in [1.0, 29.0, 2.5e3, 1e4, 1e5, 1e6] {
+                    let cycles = 1 + (1e-4 * frequency) as u64;
+                    let parameters = of(start, 1.0 / frequency, cycles);
+                    let run = events(&parameters, solver, start + 1e-3);
+                    let before = |events: &[ContactEvent]| {
+                        let before = events.iter().filter(|event| event.time < start);
+                        before.copied().collect::<Vec<_>>()
+                    };
+                    let expected = before(&control);
+                    assert!(!expected.is_empty() || start < 0.05);
+                    assert!(
+                        before(&run) == expected,
+                        "N = {blocks}, {solver:?}, from {start} s on at {frequency} Hz"
+                    );
+                }
             }
-            let after = control.iter().zip(&run).skip(before);
-            let first = after.into_iter().find(|(event, _)| event.time > start);
-            let (free, moved) = first.expect("events after the pulse began");
-            assert!(free.time - moved.time > -1e-7, "{solver:?} {start}");
+        }
+    }
+}
+
+#[test]
+fn a_job_that_is_done_is_the_same_whatever_its_longest_time() {
+    for (blocks, amplitude) in [(1, 6e-7), (5, 0.0), (5, 1e-6), (12, 6e-7)] {
+        for solver in [GRID, taylor(), Solver::fixed_step(1e-6)] {
+            let parameters = Parameters {
+                blocks,
+                contacts_per_block: 5,
+                modulation_amplitude: amplitude,
+                modulation_period: Some(1.0 / 58.0),
+                seed: 289,
+                ..Parameters::default()
+            };
+            let parameters = parameters.validated().unwrap();
+            let measured = |max_time: Option<f64>| {
+                let recording = Recording {
+                    slips: Some(3),
+                    discard: 1,
+                    precursors: true,
+                    drop_size: Some(2.0),
+                    max_time,
+                    ..Recording::default()
+                };
+                measure(&parameters, &recording, solver, &AtomicBool::new(false)).unwrap()
+            };
+            let free = measured(None);
+            let last = free.slips[2];
+            let begin = last.onset - 1e-3;
+            let done = (0..60).filter(|&step| {
+                let max_time =
+                    begin + (free.summary.end_time + 1e-3 - begin) * f64::from(step) / 59.0;
+                let found = measured(Some(max_time));
+                assert!(found.summary.end_time <= max_time + 1.1e-6);
+                assert!(
+                    !found.summary.satisfied || found == free,
+                    "{blocks} {solver:?} {max_time}"
+                );
+                for (one, other) in found.slips.iter().zip(&free.slips) {
+                    // The end may cut a drop.
+                    let drops = other.drops;
+                    assert_eq!(
+                        Slip {
+                            drops,
+                            ..one.clone()
+                        },
+                        *other
+                    );
+                }
+                found.summary.satisfied
+            });
+            assert!((1..60).contains(&done.count()), "{blocks} {solver:?}");
         }
     }
 }

@@ -65,6 +65,9 @@ pub const GRID_TOLERANCE: f64 = 1e-7;
 const WORTHWHILE_LEAP: f64 = 6.0;
 const WORTHWHILE_GRID_LEAP: f64 = 80.0;
 
+/// Turn of a pulse in the longest Taylor step from which on it is resolved in such steps, in rad.
+const MAX_PULSE_TURN: f64 = 0.5;
+
 pub(super) fn check(tolerance: f64) -> Result<(), SimulationError> {
     match SolverKey::Tolerance.checked(tolerance.value()) {
         Some(_) => Ok(()),
@@ -109,6 +112,8 @@ struct Integration<'a> {
     /// Whether motion is resolved on the grid, and not in Taylor steps.
     takes_grid: bool,
     grid: Grid,
+    /// Time in the frame at which a pulse begins or ends, or the run, in s: the step in which it comes is cut there.
+    cut: f64,
     /// Time before which no leap is tried, in s.
     next_leap: f64,
     /// Largest shear force at the last break and at the ends of steps since, in N.
@@ -145,6 +150,7 @@ impl<'a> Integration<'a> {
             slider,
             control: StepControl::new(tolerances.max_step),
             step: Step::new(layout),
+            cut: f64::INFINITY,
             next_leap: 0.0,
             largest_force: 0.0,
             summary: Summary::default(),
@@ -160,30 +166,41 @@ impl<'a> Integration<'a> {
         for event in self.slider.interface.initial_attachments() {
             observer.contact(&event);
         }
-        while !observer.is_satisfied() {
+        loop {
+            // Asked first, so that no job is done by what a step shows that the end has cut.
             let until_end = self.frame.until(self.limits.end_time);
-            if self.frame.has_come(until_end) {
-                return self.finish(false, observer);
+            let is_over = self.frame.has_come(until_end);
+            if is_over || observer.is_satisfied() {
+                return self.finish(!is_over, observer);
             }
-            let mut until_cycle_end = self.frame.until(self.frame.drive.cycle_end);
-            if self.frame.has_come(until_cycle_end) {
+            let mut until_change = self.frame.until(self.frame.drive.cycle_end);
+            if self.frame.has_come(until_change) {
+                self.leave_grid(observer);
                 self.frame.next_cycle();
-                until_cycle_end = self.frame.until(self.frame.drive.cycle_end);
+                until_change = self.frame.until(self.frame.drive.cycle_end);
             }
-            let until_change = until_cycle_end.min(until_end);
+            self.cut = self.frame.time + until_end;
+            if self.frame.drive.pulse().is_some() {
+                // Steps before a pulse, and before the end, are those of a run without it.
+                self.cut = self.frame.time + until_change.min(until_end);
+                until_change = f64::INFINITY;
+            }
+            // The step of the grid is not that of a pulse.
+            let turn = self.frame.drive.angular_frequency * self.tolerances.max_step;
+            let takes_grid =
+                self.takes_grid && (self.frame.drive.lift == 0.0 || turn < MAX_PULSE_TURN);
             let until_attach = self.slider.interface.next_reattachment() - self.frame.time;
             let horizon = until_attach.min(until_change);
             // Leaps from the grid pass reattachments.
-            let is_worthwhile = if self.takes_grid {
+            let is_worthwhile = if takes_grid {
                 until_change > WORTHWHILE_GRID_LEAP * self.grid.step.length
             } else {
                 horizon > WORTHWHILE_LEAP * self.tolerances.max_step
             };
             let leapt = is_worthwhile
                 && self.frame.time >= self.next_leap
-                && self.try_leap(horizon, [until_change, until_cycle_end], observer);
-            let moved =
-                leapt || (self.takes_grid && self.take_grid_steps(until_change, observer)?);
+                && self.try_leap(horizon, until_change, observer);
+            let moved = leapt || (takes_grid && self.take_grid_steps(until_change, observer)?);
             if !moved {
                 self.take_step(until_change, observer)?;
             }
@@ -209,7 +226,6 @@ impl<'a> Integration<'a> {
                 });
             }
         }
-        self.finish(true, observer)
     }
 
     #[inline(never)]
@@ -246,15 +262,10 @@ impl<'a> Integration<'a> {
         Ok(self.summary)
     }
 
-    /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next change of the drive or the
-    /// end. The cycle of the modulation lasts for another `until_cycle_end` s. False if none is allowed yet.
+    /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next cycle of a ramp. False if
+    /// none is allowed yet.
     #[inline(never)]
-    fn try_leap(
-        &mut self,
-        horizon: f64,
-        [until_change, until_cycle_end]: [f64; 2],
-        observer: &mut dyn Observer,
-    ) -> bool {
+    fn try_leap(&mut self, horizon: f64, until_change: f64, observer: &mut dyn Observer) -> bool {
         self.update_velocities(observer);
         let drive = self.frame.drive_motion();
         let start = self.frame.now();
@@ -263,7 +274,8 @@ impl<'a> Integration<'a> {
         let bounds = Bounds {
             start: began,
             horizon,
-            until_cycle_end,
+            until_cycle_end: until_change,
+            until_cut: self.cut - began,
             error: self.tolerances.leap_error,
             largest_force: self.largest_force,
             passing: self.takes_grid.then_some([least, until_change]),

@@ -192,6 +192,8 @@ impl Path {
 pub(super) struct StepEvents {
     /// Whether attachments are collected, too.
     pub wants_attachments: bool,
+    /// Time in the frame up to which anything happens, in s.
+    pub cut: f64,
     /// What has happened, in the order of time, in the frame; and how often in this run of steps.
     pub changes: Vec<ContactChange>,
     pub breaks: u64,
@@ -257,7 +259,8 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
         events,
         ..
     } = grid;
-    while let Some((due, block)) = slider.interface.next_reattachment_by(start + step.length) {
+    let end = events.cut.min(start + step.length);
+    while let Some((due, block)) = slider.interface.next_reattachment_by(end) {
         let mut path = Path::new(slider, step, drive, block);
         let s = (due - start) * step.inverse_length;
         let interface = &mut slider.interface;
@@ -288,6 +291,7 @@ fn break_along<S: Simd>(
         interface.reached(simd, block, end, &mut events.contacts);
         let own = step.by_mass * (path.bare + interface.block_stiffness[block]);
         let mut until = interface.next_reattachment_at(block, start + step.length);
+        until = until.min(events.cut);
         let mut broken = 0;
         for &(level, contact) in &events.contacts {
             let s = first.take().unwrap_or_else(

@@ -195,10 +195,9 @@ pub(super) fn advance<S: Simd, const R: usize>(
 }
 
 impl Integration<'_> {
-    /// Takes the motion on the grid, from the state.
-    fn enter_grid(&mut self) -> Result<(), SimulationError> {
+    /// Writes the state s steps from the present one, from -1 to 0, into that before.
+    fn look_back(&mut self, s: f64) -> Result<(), SimulationError> {
         let length = self.grid.step.length;
-        self.frame.check_resolution(length)?;
         let drive = self.frame.drive_derivatives(length);
         let input = StepInput {
             length,
@@ -216,9 +215,17 @@ impl Integration<'_> {
                 time: self.frame.now(),
             });
         }
-        let grid = &mut self.grid;
         self.kernels
-            .evaluate(&self.step.series, -1.0, length, &mut grid.before);
+            .evaluate(&self.step.series, s, length, &mut self.grid.before);
+        Ok(())
+    }
+
+    /// Takes the motion on the grid, from the state.
+    fn enter_grid(&mut self) -> Result<(), SimulationError> {
+        self.frame.check_resolution(self.grid.step.length)?;
+        self.look_back(-1.0)?;
+        let Slider { chain, state, .. } = &self.slider;
+        let grid = &mut self.grid;
         for ((increment, now), before) in grid
             .step
             .increment
@@ -263,7 +270,20 @@ impl Integration<'_> {
         self.grid.is_on = false;
     }
 
-    /// Takes steps of the grid, to the end of the next that holds an event, within `horizon` s. False if none has room.
+    /// Leaves the grid at the cut, in the last step: up to there all is as in a run without it.
+    fn step_back(&mut self, observer: &mut dyn Observer) -> Result<(), SimulationError> {
+        let s = (self.cut - self.frame.time) * self.grid.step.inverse_length;
+        self.report_force(1.0 + s, observer);
+        self.grid.history.restart(self.cut);
+        self.leave_grid(observer);
+        self.look_back(s)?;
+        self.slider.state.clone_from(&self.grid.before);
+        self.frame.set_time(self.cut);
+        Ok(())
+    }
+
+    /// Takes steps of the grid, to the end of the next that holds an event, within `horizon` s, or to the cut. False
+    /// if none has room.
     pub(super) fn take_grid_steps(
         &mut self,
         horizon: f64,
@@ -282,12 +302,13 @@ impl Integration<'_> {
             // Casts saturate: nothing need be due.
             floored((time - self.frame.time) * self.grid.step.inverse_length).saturating_add(1)
         };
-        // To the next reattachment, and to where a leap may be tried.
-        let mut steps = steps_until(self.slider.interface.next_reattachment());
+        // To the next reattachment, the cut, and where a leap may be tried.
+        let mut steps = steps_until(self.slider.interface.next_reattachment().min(self.cut));
         if self.next_leap > self.frame.time {
             steps = steps.min(steps_until(self.next_leap));
         }
         let steps = steps.min(floored(room));
+        self.grid.events.cut = self.cut;
         let done = self
             .kernels
             .advance(&mut self.slider, &mut self.grid, self.frame.time, steps);
@@ -303,6 +324,10 @@ impl Integration<'_> {
                 .max(self.frame.time + WORTHWHILE_GRID_LEAP * length);
         }
         self.report_changes(start, observer);
+        if self.frame.time >= self.cut {
+            self.step_back(observer)?;
+            return Ok(true);
+        }
         self.largest_force = self.largest_force.max(self.grid.force);
         if self.grid.history.count > MAX_HISTORY {
             self.report_force(1.0, observer);

@@ -52,6 +52,8 @@ pub(super) struct Bounds {
     pub horizon: f64,
     /// Time to the next cycle of a ramped modulation, in s; not before the horizon.
     pub until_cycle_end: f64,
+    /// Time to where a longer leap is cut, in s.
+    pub until_cut: f64,
     /// Displacement that may be left out, in m.
     pub error: f64,
     /// Largest shear force on record since the last break, in N. Every observer has seen it.
@@ -250,7 +252,15 @@ pub(super) fn leap<S: Simd>(
         bounds.horizon =
             passing_horizon(split, (chain, interface), drive, bounds, passing, largest)?;
     }
-    let plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
+    let mut plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
+    if bounds.until_cut < plan.duration {
+        // As long as more free motion is left, no contact changes, and steps can follow it.
+        if largest * libm::exp(-split.decay_rate * bounds.until_cut) > LOOSE * bounds.error {
+            return Err(bounds.until_cut);
+        }
+        plan.duration = bounds.until_cut;
+        plan.reached = None;
+    }
     if let Some(audit) = audit {
         let left_out = chain.mass * free_energy(chain, drive, split, state);
         audit.left_out.update(|sum| sum + left_out);

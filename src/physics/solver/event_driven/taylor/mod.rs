@@ -159,7 +159,7 @@ impl Step {
 }
 
 impl Integration<'_> {
-    /// Takes one Taylor step of at most `horizon` s, to its end or soon after its first events.
+    /// Takes one Taylor step of at most `horizon` s, to its end or soon after its first events, or to the cut.
     pub(super) fn take_step(
         &mut self,
         horizon: f64,
@@ -173,6 +173,7 @@ impl Integration<'_> {
         self.frame.check_resolution(length)?;
         self.summary.steps += 1;
         let mut done = 0.0;
+        let cut = (self.cut - start) / length;
         let mut end = (horizon / length).min(1.0);
         let mut merged = 0;
         let mut force = ForceAt {
@@ -181,8 +182,8 @@ impl Integration<'_> {
         };
         end = self.look_for_breaks(end);
         loop {
-            let event = self.next_event(done, end);
-            let s = event.map_or(end, |(_, _, s)| s);
+            let event = self.next_event(done, end.min(cut));
+            let s = event.map_or(end.min(cut), |(_, _, s)| s);
             force = self.report([done, s], force, observer);
             done = s;
             self.frame.time = start + s * length;
