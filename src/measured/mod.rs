@@ -267,11 +267,19 @@ impl Reading {
         hexadecimal(&hasher.finalize())
     }
 
-    /// Refuses series that are the same slips twice; those that are regular are equal without that.
+    /// Refuses series that are the same slips twice, as onsets and drops say. Without drops they may be others, read
+    /// with the same coarse clock, and regular ones are equal anyway.
     fn refuse_twins(&self) -> Result<()> {
         let mut seen = HashMap::new();
         for series in &self.series {
-            if series.rows.len() < MIN_TWIN || series.is_regular(&self.slips.onsets) {
+            let drops = self
+                .slips
+                .drops
+                .get(series.rows.clone())
+                .unwrap_or_default();
+            let has_drops = drops.iter().any(|drop| !drop.is_nan());
+            let is_short = series.rows.len() < MIN_TWIN;
+            if is_short || !has_drops || series.is_regular(&self.slips.onsets) {
                 continue;
             }
             let onsets = Slips::bits(&self.slips.onsets, series);

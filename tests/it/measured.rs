@@ -770,7 +770,12 @@ fn table(head: &str, rows: impl Iterator<Item = String>) -> String {
 fn the_same_slips_twice_are_refused_with_both_places() {
     let folder = Folder::new();
     let onsets = irregular(12, 0);
-    let text = table("onset", onsets.iter().map(f64::to_string));
+    let rows = || {
+        onsets
+            .iter()
+            .map(|onset| format!("{onset},{}", 300.0 + onset))
+    };
+    let text = table("onset,drop", rows());
     folder.write("a.csv", &text);
     folder.write("b.csv", &format!("# another byte\n{text}"));
     let unmodulated = "--set V0=1e-4 --set Delta=0";
@@ -779,24 +784,36 @@ fn the_same_slips_twice_are_refused_with_both_places() {
         "b.csv, line 3: a series begins with the onsets and drops of that at a.csv, line 2";
     assert!(twice.stderr.contains(expected), "{}", twice.stderr);
     // Within a table, under other parameters.
-    let both = onsets.iter().map(|onset| format!("{onset},a,1e-4"));
-    let both = both.chain(onsets.iter().map(|onset| format!("{onset},b,2e-4")));
-    folder.write("both.csv", &table("onset,run,V0", both));
+    let both = rows().map(|row| format!("{row},a,1e-4"));
+    let both = both.chain(rows().map(|row| format!("{row},b,2e-4")));
+    folder.write("both.csv", &table("onset,drop,run,V0", both));
     let twice = folder.ends(2, "measured both.csv -o out --set Delta=0");
     assert!(
         twice.stderr.contains("both.csv, line 14"),
         "{}",
         twice.stderr
     );
-    // A clock is as regular as another, and few slips may be equal by rounding.
-    let few = onsets[..9].iter().map(f64::to_string);
-    folder.write("c.csv", &table("onset", few.clone()));
-    folder.write("d.csv", &format!("\n{}", table("onset", few)));
-    folder.ends(0, &format!("measured c.csv d.csv -o few {unmodulated}"));
-    let regular = || (1..20).map(|n: u32| format!("{}", f64::from(n)));
-    folder.write("e.csv", &table("onset", regular()));
-    folder.write("f.csv", &format!("\n{}", table("onset", regular())));
-    folder.ends(0, &format!("measured e.csv f.csv -o regular {unmodulated}"));
+    // Few slips, regular ones, and those of which only the times are known may be equal and others.
+    let few = || rows().take(9);
+    let regular = || (1..20).map(|n: u32| format!("{n},3"));
+    let times = || onsets.iter().map(f64::to_string);
+    for (name, first, second) in [
+        (
+            "few",
+            table("onset,drop", few()),
+            table("onset,drop", few()),
+        ),
+        (
+            "regular",
+            table("onset,drop", regular()),
+            table("onset,drop", regular()),
+        ),
+        ("times", table("onset", times()), table("onset", times())),
+    ] {
+        folder.write("c.csv", &first);
+        folder.write("d.csv", &format!("\n{second}"));
+        folder.ends(0, &format!("measured c.csv d.csv -o {name} {unmodulated}"));
+    }
 }
 
 #[test]
