@@ -217,12 +217,11 @@ impl Reading {
         let mut known = self.columns.iter_mut();
         let widen = |range: [f64; 2], number: &f64| [range[0].min(*number), range[1].max(*number)];
         let unbounded = [f64::INFINITY, f64::NEG_INFINITY];
-        match known.find(|(known, _)| known.key == given.key) {
-            Some((_, range)) => *range = numbers.iter().fold(*range, widen),
-            None => {
-                let range = numbers.iter().fold(unbounded, widen);
-                self.columns.push((given.clone(), range));
-            }
+        if let Some((_, range)) = known.find(|(known, _)| known.key == given.key) {
+            *range = numbers.iter().fold(*range, widen);
+        } else {
+            let range = numbers.iter().fold(unbounded, widen);
+            self.columns.push((given.clone(), range));
         }
     }
 

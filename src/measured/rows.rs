@@ -136,7 +136,9 @@ impl Rows {
                 numbers.push(number * given.factor);
             }
         }
-        run.into_iter().for_each(|run| self.push_run(run));
+        if let Some(run) = run {
+            self.push_run(run);
+        }
         self.lines.push(line);
         self.count += 1;
         Ok(())
@@ -168,7 +170,9 @@ impl Rows {
             }
             numbers.extend(found.into_iter().map(|number| number * given.factor));
         }
-        runs.iter().for_each(|run| self.push_run(run));
+        for run in runs {
+            self.push_run(&run);
+        }
         self.count += batch.num_rows();
         Ok(())
     }

@@ -420,11 +420,43 @@ fn files_of_other_programs_just_work() {
     );
 }
 
-#[test]
-fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
+/// Tables and flags with which they are refused for this reason, and nothing is written.
+fn refuse(cases: &[(String, &str, &str)]) {
     let folder = Folder::new();
+    for (text, options, expected) in cases {
+        folder.write("slips.csv", text);
+        let speed = if options.contains("V0") {
+            ""
+        } else {
+            "--set V0=1e-4"
+        };
+        // What a tide has, or a table of its own amplitudes.
+        let amplitude = if ["T=", "Delta"]
+            .iter()
+            .any(|word| options.contains(word) || text.contains("Delta"))
+            || text.contains(",T")
+        {
+            ""
+        } else {
+            "--set Delta=0"
+        };
+        let refused = folder.ends(
+            2,
+            &format!("measured slips.csv -o out {speed} {amplitude} {options}"),
+        );
+        assert!(
+            refused.stderr.starts_with("error: ") && refused.stderr.contains(expected),
+            "{expected}: {}",
+            refused.stderr
+        );
+        assert!(!folder.path("out").exists(), "{expected}");
+    }
+}
+
+#[test]
+fn columns_and_units_that_are_not_understood_are_refused() {
     let good = lines("onset,drop", |n| format!("{n},3"));
-    let cases = [
+    refuse(&[
         (good.replace("onset", "t"), "", "has no column onset"),
         (good.clone(), "--column onset=time", "has no column time"),
         (good.clone(), "--column drop=size", "has no column size"),
@@ -482,6 +514,13 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
             "line 5: 1 cells for 2 columns",
         ),
         (good.replace("\n4,3", "\n4,0,3,1"), "", "decimal commas"),
+    ]);
+}
+
+#[test]
+fn numbers_that_are_not_understood_are_refused_with_their_lines() {
+    let good = lines("onset,drop", |n| format!("{n},3"));
+    refuse(&[
         (
             good.replace("\n4,3", "\nonset,drop"),
             "",
@@ -565,6 +604,13 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
             "",
             "line 8: Delta is missing",
         ),
+    ]);
+}
+
+#[test]
+fn what_a_key_lacks_and_what_parameters_cannot_be_is_refused() {
+    let good = lines("onset,drop", |n| format!("{n},3"));
+    refuse(&[
         (
             lines("onset,Kd", |n| {
                 format!("{n},{}", if n == 7 { "NA" } else { "4e7" })
@@ -635,35 +681,7 @@ fn what_makes_no_sense_is_refused_with_its_line_and_nothing_is_written() {
             "Delta > 0: needs T or frequency",
         ),
         (good.clone(), "--set Kd=0", "Kd = 0: must be"),
-    ];
-    for (text, options, expected) in cases {
-        folder.write("slips.csv", &text);
-        let speed = if options.contains("V0") {
-            ""
-        } else {
-            "--set V0=1e-4"
-        };
-        // What a tide has, or a table of its own amplitudes.
-        let amplitude = if ["T=", "Delta"]
-            .iter()
-            .any(|word| options.contains(word) || text.contains("Delta"))
-            || text.contains(",T")
-        {
-            ""
-        } else {
-            "--set Delta=0"
-        };
-        let refused = folder.ends(
-            2,
-            &format!("measured slips.csv -o out {speed} {amplitude} {options}"),
-        );
-        assert!(
-            refused.stderr.starts_with("error: ") && refused.stderr.contains(expected),
-            "{expected}: {}",
-            refused.stderr
-        );
-        assert!(!folder.path("out").exists(), "{expected}");
-    }
+    ]);
 }
 
 #[test]

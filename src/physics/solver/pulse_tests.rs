@@ -57,8 +57,14 @@ fn events_before_a_pulse_are_those_of_the_control_at_every_period() {
             let slip = slip.expect("a slip").time;
             // The last of these starts between two events of a step of the grid.
             for start in [0.0, 0.0413, 0.17, slip, slip + 7e-7] {
-                for frequency in [1.0, 29.0, 2.5e3, 1e4, 1e5, 1e6] {
-                    let cycles = 1 + (1e-4 * frequency) as u64;
+                for (frequency, cycles) in [
+                    (1.0, 1),
+                    (29.0, 1),
+                    (2.5e3, 1),
+                    (1e4, 2),
+                    (1e5, 11),
+                    (1e6, 101),
+                ] {
                     let parameters = of(start, 1.0 / frequency, cycles);
                     let run = events(&parameters, solver, start + 1e-3);
                     let before = |events: &[ContactEvent]| {
@@ -116,13 +122,7 @@ fn a_job_that_is_done_is_the_same_whatever_its_longest_time() {
                 for (one, other) in found.slips.iter().zip(&free.slips) {
                     // The end may cut a drop.
                     let drops = other.drops;
-                    assert_eq!(
-                        Slip {
-                            drops,
-                            ..one.clone()
-                        },
-                        *other
-                    );
+                    assert_eq!(Slip { drops, ..*one }, *other);
                 }
                 found.summary.satisfied
             });
