@@ -182,7 +182,7 @@ impl<'a> Forecast<'a> {
             ("slips to record", self.slips.to_string()),
             ("predicted CPU time", cpu_time),
             ("predicted wall time", format!("{wall_time} on {threads}")),
-            ("worker memory", memory),
+            ("resident memory", memory),
             ("address space", address_space),
         ];
         if let Some(command) = &self.longest_job {

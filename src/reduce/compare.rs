@@ -157,9 +157,9 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsEr
     let both = [&sets_of_a, &sets_of_b];
     let parameters = both.map(|sets| sets.iter().map(|set| &set.parameters).collect());
     let mut differences = Difference::all(&parameters);
-    differences.retain(Difference::is_constant);
     let is_varied = |key: &Symbol| both.iter().any(|sets| varies(sets, *key));
     let varied: Vec<Symbol> = Symbol::ALL.into_iter().filter(is_varied).collect();
+    differences.retain(|found| found.is_constant() && !varied.contains(&found.symbol));
     let unknown = |key: &Symbol| {
         let mut sets = both.iter().filter_map(|sets| sets.first());
         sets.any(|set| set.parameters.unknown.contains(key))

@@ -57,7 +57,12 @@ struct Held(Option<Value>);
 
 impl Held {
     fn of(sets: &[&Parameters], symbol: Symbol) -> Option<Self> {
+        // Sets without modulation stand beside any, as their control.
+        let is_control =
+            |set: &Parameters| symbol.is_of_modulation() && set.modulation_amplitude == 0.0;
+        let all_are_controls = sets.iter().all(|set| is_control(set));
         let known = sets.iter().filter(|set| !set.unknown.contains(&symbol));
+        let known = known.filter(|set| all_are_controls || !is_control(set));
         let mut values = known.map(|set| set.get(symbol));
         let first = values.next()?;
         let is_constant = values.all(|value| is_same_value(first, value));
@@ -111,6 +116,12 @@ mod tests {
         assert_eq!(
             said(&[&sweep[..1], &[at(1e-4, 0.0)]]),
             ["Δ = 1 µm, T = 20 ms", "Δ = 0"]
+        );
+        let with_control = [at(1e-4, 0.0), at(1e-4, 1e-6)];
+        assert_eq!(said(&[&with_control, &sweep[..1]]), ["", ""]);
+        assert_eq!(
+            said(&[&with_control, &[at(1e-4, 3e-7)]]),
+            ["Δ = 1 µm", "Δ = 0.3 µm"]
         );
         let mut soft = at(1e-4, 1e-6);
         soft.drive_stiffness = 1002.0;
