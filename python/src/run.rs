@@ -8,7 +8,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
-use stickslip::figure::{Format, Look, draw_all};
+use stickslip::figure::{Beside, Format, Look, draw_all};
 use stickslip::observe::measure;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
@@ -77,7 +77,12 @@ impl Progress {
 /// Reduces the tables of a directory and draws its figures.
 pub fn reduce_and_draw(layout: &Layout<'_>, name: &str) -> Result<(), Error> {
     stickslip::reduce::reduce(&Results::read(layout)?)?;
-    draw_all(layout, &[], &Look::of_sweep(name), &Format::DEFAULT)?;
+    draw_all(
+        layout,
+        &Beside::default(),
+        &Look::of_sweep(name),
+        &Format::DEFAULT,
+    )?;
     Ok(())
 }
 
