@@ -18,11 +18,13 @@ pub use files::{Compared, compare_files};
 pub use keys::{Given, Sources};
 
 use crate::model::Symbol;
+use crate::model::theory::to_twelve_digits;
 use crate::observe::{MakesSlips, Measurements, Modulation, Slip, phase};
 use crate::solver::Summary;
 use crate::sweep::{Job, MAX_NAME, SourceFile, Sweep};
 use crate::table::checksum::hexadecimal;
 use crate::table::shown::shown;
+use crate::table::value::Shortest;
 use anyhow::{Context, Result, bail};
 use keys::Key;
 use rows::Rows;
@@ -339,6 +341,7 @@ impl Reading {
                 key, from, unit, ..
             } = given;
             let si = key.unit();
+            let [low, high] = [low, high].map(|end| Shortest(to_twelve_digits(*end)));
             let range = format!(" ({unit}), {low} to {high} {si}");
             let range = if *key == Key::Run {
                 String::new()

@@ -247,7 +247,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("frobnicate", &["frobnicate", "Usage"]),
         ("--frobnicate", &["--frobnicate", "Usage"]),
         // Files that cannot be read.
-        ("plan", &["<SWEEP.toml>"]),
+        ("plan", &["<SWEEP.toml|DIR>"]),
         (
             "plan missing.toml",
             &["missing.toml: cannot be read", "check the path"],

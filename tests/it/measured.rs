@@ -1007,7 +1007,7 @@ fn what_is_read_is_said_before_anything_is_written() {
     let said = command("--dry-run");
     for line in [
         "onset     column t (ms) (ms), 0.0015 to 0.1005 s",
-        "Delta     column amp (um), 0.0000006 to 0.0000006 m",
+        "Delta     column amp (um), 6e-7 to 6e-7 m",
         "V0        100 um/s",
         "not used  note, rig",
         "series    1",
