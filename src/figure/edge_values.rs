@@ -57,6 +57,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let statistics = distinct(edges.iter().map(|edge| &*edge.statistic));
     let mut legend = Vec::new();
     let mut layers = Vec::new();
+    let mut without_edge = Vec::new();
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
         let crossed = of_it().next()?.crossed();
@@ -67,7 +68,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
             legend.push(entry(Mark::Line(stroke), format!("{crossed}: {ended}")));
             let ended_so = without().filter(|edge| edge.ended.word() == ended);
             let bars = Layer::Bars(ended_so.filter_map(searched).collect(), stroke);
-            layers.push(Layer::Inside(vec![bars]));
+            without_edge.push(bars);
         }
         let text = format!("{crossed}, 95 %");
         legend.push(entry(Mark::Bar(Dot::solid(ink, RADIUS)), text));
@@ -75,6 +76,9 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
         layers.push(Layer::Bars(of_it().filter_map(bar).collect(), stroke));
         let dot = Dot::solid(ink, 0.7 * RADIUS);
         layers.push(Layer::Dots(of_it().filter_map(place).collect(), dot));
+    }
+    if !without_edge.is_empty() {
+        layers.insert(0, Layer::Inside(without_edge));
     }
     let layout = Layout::column(490.0);
     let panels = vec![Panel::new(300.0, x, y, layers)];
