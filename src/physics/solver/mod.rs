@@ -168,7 +168,7 @@ pub enum SimulationError {
     NotFinite { time: f64 },
     #[error(
         "at t = {time} s: a step of {step:e} s is lost in the resolution of the time; the shortest time scale of these \
-         parameters, 1/omega_max, 1/gamma or T, is too short"
+         parameters, 1/omega_max, 1/gamma, T or that of the load, is too short"
     )]
     StepTooShort { time: f64, step: f64 },
     #[error(
