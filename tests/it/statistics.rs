@@ -262,7 +262,7 @@ fn a_job_that_is_cut_before_the_end_of_its_last_slip_is_not_done_and_whatever_is
         let last_break = last.nucleation + last.duration;
         let mut done = 0;
         for step in 0..=40 {
-            let share = f64::from(step) / 40.0;
+            let share = f64::from(step) / 32.0;
             let end = last.onset + share * (whole.summary.end_time - last.onset);
             let cut = until(Some(end));
             assert_eq!(cut.running_interval, None);
