@@ -9,7 +9,7 @@ use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::style::{
-    BAR_WIDTH, BLUE, Dot, Fill, Ink, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
+    BAR_WIDTH, BLUE, Dot, Fill, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
 };
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point};
@@ -27,10 +27,12 @@ const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
 const ASYMPTOTE: Stroke = Stroke::solid(RED, 2.4);
 const EXACT: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
 const CURVE_POINTS: usize = 400;
-/// Columns a decade: those of the bins of the averages, or under a ramp, where there are none.
-const PER_DECADE: [f64; 2] = [4.0, 20.0];
+/// Bins of the averages in a decade.
+const BINS: f64 = 4.0;
+/// Columns of the density in a decade.
+const COLUMNS: f64 = 20.0;
 /// Largest ratio of a column's edge to the η of its slips. A wider column would show phases far from the curves there.
-const WIDEST: f64 = 1.5;
+const WIDEST: f64 = 1.2;
 /// Rows of the density in half a turn.
 const ROWS: f64 = 36.0;
 
@@ -54,13 +56,13 @@ pub(super) fn phase_eta(
     look: &Look,
 ) -> Option<Picture> {
     let slips = phases(points);
-    let means_of = |other: &Other| averages(&other.bins, &columns(&phases(&other.points), 4.0));
+    let means_of = |other: &Other| averages(&other.bins, &columns(&phases(&other.points), BINS));
     let of_others: Vec<_> = beside.others.iter().map(means_of).collect();
-    let columns = columns(&slips, PER_DECADE[usize::from(bins.is_empty())]);
+    let averages = averages(bins, &columns(&slips, BINS));
+    let columns = columns(&slips, COLUMNS);
     let cells: Vec<(Cell, f64)> = columns.iter().flat_map(cells).collect();
     let (least, most) = bounds(cells.iter().map(|cell| cell.1))?;
     let shades = Axis::logarithmic("density (1/rad)", least, most.max(10.0 * least));
-    let averages = averages(bins, &columns);
     let etas = of_others.iter().flatten().map(|mean| mean.0);
     let ends = [columns.first()?.edges.0, columns.last()?.edges.1];
     let (low, high) = bounds(etas.chain(ends))?;
@@ -70,7 +72,7 @@ pub(super) fn phase_eta(
         (
             !averages.is_empty(),
             Mark::Bar(AVERAGE),
-            "mean of all slips of a column, 95 %",
+            "mean of all slips in a bin of η, 95 %",
         ),
         (has_curves, Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         (has_curves, Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
@@ -90,10 +92,7 @@ pub(super) fn phase_eta(
     let coloured = cells
         .iter()
         .map(|&(cell, density)| (cell, cell_shade(shades.place(density))));
-    let mut layers = vec![
-        Layer::Cells(coloured.collect(), OVERLAP),
-        Layer::Cells(below_curve(&x, low, &columns), 0.0),
-    ];
+    let mut layers = vec![Layer::Cells(coloured.collect(), OVERLAP)];
     let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
     let bars = averages.iter().map(|&(eta, _, ends)| (eta, ends));
     layers.extend([
@@ -158,22 +157,6 @@ fn cells(column: &Column) -> Vec<(Cell, f64)> {
     counts.into_iter().map(cell).collect()
 }
 
-/// Paper from the lower end of an axis to φ_min, over the parts of cells where no slip can lie at this η, and none lies.
-fn below_curve(x: &Axis, low: f64, columns: &[Column]) -> Vec<(Cell, Ink)> {
-    let etas = x.evenly_placed(CURVE_POINTS);
-    let part = |pair: &[f64]| {
-        let start = pair[0];
-        let end = pair[1];
-        let holds_slips = |column: &Column| {
-            column.least.is_none() && start < column.edges.1 && end > column.edges.0
-        };
-        let least = minimum_phase(end).filter(|least| *least > low);
-        let least = least.filter(|_| !columns.iter().any(holds_slips));
-        Some((((start, end), (low, least?)), WHITE))
-    };
-    etas.windows(2).filter_map(part).collect()
-}
-
 /// Slips in columns along η.
 fn columns(slips: &[Place], per_decade: f64) -> Vec<Column> {
     let mut bins: BTreeMap<i32, Vec<Place>> = BTreeMap::new();
@@ -231,6 +214,17 @@ mod tests {
     }
 
     #[test]
+    fn a_column_of_one_eta_is_narrow_and_begins_at_the_least_phase_there() {
+        let at = |eta: f64| [(eta, -0.5), (eta, -0.4)];
+        let slips: Vec<Place> = [2.0, 4.0, 8.0].into_iter().flat_map(at).collect();
+        for (column, eta) in columns(&slips, COLUMNS).iter().zip([2.0, 4.0, 8.0]) {
+            assert_eq!(column.values, (eta, eta));
+            assert_eq!(column.edges, (eta / WIDEST, eta * WIDEST));
+            assert_eq!(column.least, minimum_phase(eta));
+        }
+    }
+
+    #[test]
     fn the_density_of_a_column_integrates_to_one_and_nothing_is_seen_below_the_least_phase() {
         for (eta, lowest) in [(0.5, -3.0), (1.0, -4.6), (2.0, -2.2), (30.0, -0.6)] {
             let slips = (0..3000).map(|step| (eta, lowest * 1e-3 * f64::from(step % 1000)));
@@ -243,21 +237,7 @@ mod tests {
                 minimum_phase(eta).is_none_or(|least| lowest >= least),
                 "{eta}"
             );
-            let x = Axis::logarithmic("", columns[0].edges.0, columns[0].edges.1);
-            let parts = below_curve(&x, -5.0, &columns);
-            assert_eq!(parts.len(), if eta < 1.0 { 0 } else { CURVE_POINTS - 1 });
-            assert!(
-                parts
-                    .iter()
-                    .all(|((x, y), _)| Some(y.1) == minimum_phase(x.1))
-            );
         }
-        let columns = columns(&[(30.0, -3.0), (30.0, -0.5)], 4.0);
-        let x = Axis::logarithmic("", 20.0, 40.0);
-        assert!(
-            below_curve(&x, -5.0, &columns).is_empty(),
-            "a slip is shown wherever it lies"
-        );
     }
 
     #[test]

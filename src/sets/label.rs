@@ -216,11 +216,9 @@ impl Digits {
         let all = distinct(MAX_DIGITS);
         let enough = (self.usual..MAX_DIGITS).find(|digits| distinct(*digits) == all);
         let usual = enough.unwrap_or(MAX_DIGITS);
-        // A single value has no other to be told from.
-        let least = if values.len() > 1 { WRITTEN_DIGITS } else { 0 };
         Self {
             usual,
-            whole: usual.max(least),
+            whole: usual.max(WRITTEN_DIGITS),
         }
     }
 

@@ -18,8 +18,8 @@ pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
 /// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits. A third deviate needs words
 /// beyond those of all redraws, or another `RNG_SCHEME`: a wider draw would change every contact.
 const WORDS_PER_DRAW: u128 = 4;
-/// Generations in one refill of 64 words, the four blocks that the generator makes at a time.
-const DRAWS_PER_REFILL: u32 = 16;
+/// Generations in one refill. More would take memory and no less time.
+const DRAWS_PER_REFILL: u32 = 4;
 type Draws = [Draw; DRAWS_PER_REFILL as usize];
 /// Distance of the words of a redrawn threshold: beyond those of any generation.
 const REDRAW_STRIDE: u128 = 1 << 40;

@@ -7,7 +7,7 @@
 //! displacement, and at s = 0, backwards, the increment.
 
 use super::Grid;
-use super::step::{Correction, GridStep, Place};
+use super::step::{Correction, GridStep, add};
 use crate::model::simd::Simd;
 use crate::model::{ContactChange, Interface, Row};
 use crate::solver::event_driven::moving_frame::GridDrive;
@@ -42,29 +42,15 @@ impl Path {
     fn new(slider: &Slider, step: &GridStep, drive: &GridDrive, block: usize) -> Self {
         let x = &slider.state.displacement;
         let q = &step.increment;
-        let Place {
-            slot: (row, lane),
-            before,
-            after,
-            shares,
-        } = step.places[block];
+        let place = step.places[block];
+        let (row, lane) = place.slot;
         let end = x[row][lane];
         let rise = q[row][lane];
-        let beside = |rows: &[Row]| {
-            shares[0].mul_add(rows[before.0][before.1], shares[1] * rows[after.0][after.1])
-        };
-        let beside_end = beside(x);
-        let beside_rise = beside(q);
-        let pulls = if block == 0 { step.pulling } else { 0.0 };
-        let last_force = pulls.mul_add(
-            drive.displacement(),
-            step.force_on(row, lane, beside_end, end),
-        );
-        let beside_start = beside_end - beside_rise;
-        let first_force = pulls.mul_add(
-            drive.displacement_before(),
-            step.force_on(row, lane, beside_start, end - rise),
-        );
+        let beside = place.beside(x);
+        let beside_start = beside - place.beside(q);
+        let last_force = step.force_on(&place, end, beside, drive.displacement());
+        let driven_before = drive.displacement_before();
+        let first_force = step.force_on(&place, end - rise, beside_start, driven_before);
         // x'' = φ - γh x' at both ends, with the slopes of this very path.
         let damping = step.damping;
         let from = damping.mul_add(-rise, first_force);
@@ -76,7 +62,7 @@ impl Path {
         let coefficients = [end - rise, slope, 0.5 * first, (last - first) * SIXTH, 0.0];
         Self {
             block,
-            slot: (row, lane),
+            slot: place.slot,
             bare: slider.chain.bare[row][lane],
             coefficients,
             from: 0.0,
@@ -261,11 +247,52 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
     } = grid;
     let end = events.cut.min(start + step.length);
     while let Some((due, block)) = slider.interface.next_reattachment_by(end) {
-        let mut path = Path::new(slider, step, drive, block);
-        let s = (due - start) * step.inverse_length;
+        let s = ((due - start) * step.inverse_length).clamp(0.0, 1.0);
+        let left = 1.0 - s;
+        let place = step.places[block];
+        let (row, lane) = place.slot;
+        let x = &slider.state.displacement;
+        let end = x[row][lane];
+        let rise = step.increment[row][lane];
+        let force = step.force_on(&place, end, place.beside(x), drive.displacement());
+        // A parabola is enough, as the force of an unstressed contact only grows.
+        let bend = step.damping.mul_add(-rise, force);
         let interface = &mut slider.interface;
-        attach(simd, interface, step, events, &mut path, s);
-        break_along(simd, interface, step, events, &mut path, None, start);
+        let change = interface.reattach_running(simd, end - left * (rise + 0.5 * s * bend));
+        if events.wants_attachments {
+            events.changes.push(change);
+        } else {
+            events.attachments.push(change.time);
+        }
+        events.reattachments += 1;
+        let slope = rise + (s - 0.5) * bend;
+        let third = -SIXTH * step.by_mass * change.stiffness * slope;
+        let [ahead, back] = [left, s].map(|part| third * (part * part * part));
+        add(simd, &mut slider.state.displacement, place.slot, ahead);
+        add(simd, &mut step.increment, place.slot, ahead + back);
+        let levels = [interface.block_upper[block], interface.block_lower[block]];
+        if end + ahead < levels[0] && end + ahead > levels[1] {
+            let diagonal = slider.chain.bare[row][lane] + interface.block_stiffness[block];
+            step.update(
+                simd,
+                place.slot,
+                diagonal,
+                interface.block_pull[block],
+                levels,
+            );
+            continue;
+        }
+        let mut path = Path::new(slider, step, drive, block);
+        path.from = s;
+        break_along(
+            simd,
+            &mut slider.interface,
+            step,
+            events,
+            &mut path,
+            None,
+            start,
+        );
         settle(simd, slider, step, &path);
     }
 }
@@ -326,31 +353,6 @@ fn break_along<S: Simd>(
         events.breaks += broken;
         interface.gather(simd, block);
     }
-}
-
-/// Attaches the contact that is due next, at s: unstressed there, so that its force only grows.
-#[inline(always)]
-fn attach<S: Simd>(
-    simd: S,
-    interface: &mut Interface,
-    step: &GridStep,
-    events: &mut StepEvents,
-    path: &mut Path,
-    s: f64,
-) {
-    let s = s.clamp(0.0, 1.0);
-    let [x, slope, half_curvature] = path.at(s);
-    let change = interface.reattach_running(simd, x);
-    if events.wants_attachments {
-        events.changes.push(change);
-    } else {
-        events.attachments.push(change.time);
-    }
-    events.reattachments += 1;
-    let stiffened = step.by_mass * change.stiffness;
-    let third = -SIXTH * stiffened * slope;
-    let fourth = -0.5 * SIXTH * stiffened * half_curvature - 0.25 * step.damping * third;
-    path.change_by(s, [0.0, third, fourth]);
 }
 
 /// Enters what has happened to a block into the motion.

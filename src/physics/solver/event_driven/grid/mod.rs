@@ -133,11 +133,11 @@ impl Grid {
     ) {
         let step = &self.step;
         let drive = &self.drive;
-        let here = chain.at(&state.displacement, 0);
-        // Padding beside a single block is at rest and not coupled.
-        let beside = chain.at(&state.displacement, 1);
+        let place = &step.places[0];
+        let here = state.displacement[0][0];
         let rise = step.increment[0][0];
-        let own = step.force_on(0, 0, beside, here) + step.pulling * drive.displacement();
+        let beside = place.beside(&state.displacement);
+        let own = step.force_on(place, here, beside, drive.displacement());
         // h² x'' at the start of the step and, from the law of motion, at its end.
         let first = start_bend - bend * step.inverse_stiffness;
         let last = (own - step.damping * (rise + first / 6.0)) * step.inverse_end;

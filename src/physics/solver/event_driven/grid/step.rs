@@ -43,6 +43,18 @@ impl Place {
             shares: [share(before), share(after)],
         }
     }
+
+    /// The sum of what both blocks beside have.
+    #[inline(always)]
+    pub fn beside(&self, rows: &[Row]) -> f64 {
+        let Self {
+            before,
+            after,
+            shares,
+            ..
+        } = self;
+        shares[0].mul_add(rows[before.0][before.1], shares[1] * rows[after.0][after.1])
+    }
 }
 
 /// Displacement at the end of a step and increment from its start, or what events add to them, in m.
@@ -220,13 +232,17 @@ impl GridStep {
         }
     }
 
-    /// φ of the block in a slot at the displacements of it and of both blocks beside together, but for the drive, in m.
+    /// φ of a block at the displacements of it, of both blocks beside together, and of the drive, in m.
     #[inline(always)]
-    pub fn force_on(&self, row: usize, lane: usize, beside: f64, here: f64) -> f64 {
-        self.coupling.mul_add(
-            beside,
-            self.diagonal[row][lane].mul_add(here, self.pull[row][lane]),
-        )
+    pub fn force_on(&self, place: &Place, here: f64, beside: f64, driven: f64) -> f64 {
+        let (row, lane) = place.slot;
+        let own = self.diagonal[row][lane].mul_add(here, self.pull[row][lane]);
+        let pulls = if place.slot == (0, 0) {
+            self.pulling
+        } else {
+            0.0
+        };
+        pulls.mul_add(driven, self.coupling.mul_add(beside, own))
     }
 }
 
@@ -244,7 +260,7 @@ fn weights(half: f64) -> [f64; 2] {
 }
 
 #[inline(always)]
-fn add<S: Simd>(simd: S, rows: &mut [Row], (row, lane): (usize, usize), value: f64) {
+pub(super) fn add<S: Simd>(simd: S, rows: &mut [Row], (row, lane): (usize, usize), value: f64) {
     let sum = rows[row][lane] + value;
     simd.set(&mut rows[row], lane, sum);
 }
