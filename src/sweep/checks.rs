@@ -16,7 +16,6 @@ use crate::model::theory::typical_interval;
 use crate::model::{Symbol, Value};
 use crate::observe::Recording;
 use crate::sets::Statistic;
-use crate::solver::Resolve;
 use crate::table::value::Shortest;
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -157,10 +156,6 @@ fn recording(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
             Shortest(time),
             Shortest(max_time)
         );
-        return Err(file.source.refuse(file.place_of("record"), problem));
-    }
-    if sweep.recording.energies && sweep.solver.resolve == Resolve::Grid {
-        let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
         return Err(file.source.refuse(file.place_of("record"), problem));
     }
     Ok(())

@@ -26,6 +26,8 @@ const STEP_OVERHEAD: f64 = 45e-9;
 const GRID_EVENT: f64 = 250e-9;
 const GRID_STEP_OF_A_BLOCK: f64 = 0.22e-9;
 const GRID_STEP_OVERHEAD: f64 = 10e-9;
+/// How many times as long a ledger makes that.
+const GRID_WITH_LEDGER: f64 = 2.0;
 
 /// CPU time in Taylor steps, in s: of a job beside its motion, a break with its reattachment, a step, and a step on one
 /// block. A ledger sets up a quadrature for each job.
@@ -61,12 +63,17 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
     let fourth_root = |ratio: f64| ratio.sqrt().sqrt();
     let setting = solver.setting();
     let of_motion = match solver.method {
-        Method::EventDriven if solver.resolve.takes_grid(setting) && !recording.energies => {
+        Method::EventDriven if solver.resolve.takes_grid(setting) => {
             let step = step_length(parameters) * fourth_root(setting / 1e-3);
             let steps = motion.resolved / step + motion.steps_of_periods;
             let steps = steps.min(motion.time / step);
-            motion.breaks * GRID_EVENT
-                + steps * (GRID_STEP_OVERHEAD + GRID_STEP_OF_A_BLOCK * blocks)
+            let of_a_step = GRID_STEP_OVERHEAD + GRID_STEP_OF_A_BLOCK * blocks;
+            let with_ledger = if recording.energies {
+                GRID_WITH_LEDGER
+            } else {
+                1.0
+            };
+            with_ledger * (motion.breaks * GRID_EVENT + steps * of_a_step)
         }
         Method::EventDriven => {
             let finer = fourth_root(fourth_root(1e-3 / setting));

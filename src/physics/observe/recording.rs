@@ -27,7 +27,7 @@ fields! {
         DropSize("drop_size") drop_size: Option<f64> = None, "N", POSITIVE,
             "Minimum drop of the shear force to look for; none: drops are not looked for";
         Energies("energies") energies: bool = false, "", FLAG,
-            "Whether the work of the drive and its losses are recorded for each slip; resolves in Taylor steps, at some ten times the cost";
+            "Whether the work of the drive and its losses are recorded for each slip, at some twice the cost";
         Control("control") control: bool = false, "", FLAG,
             "Whether each modulated set is also run without modulation, for what the drive alone explains";
         GiveUpAfter("give_up_after") give_up_after: Option<f64> = None, "m", POSITIVE,

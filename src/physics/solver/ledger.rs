@@ -10,7 +10,7 @@
 //! again for its damping and for the work on it, which the segment of the leap does not show.
 
 use super::harmonic::Harmonic;
-use super::segment::{ForcePath, PolynomialPath, Segment};
+use super::segment::{CubicStep, ForcePath, PolynomialPath, Segment};
 use super::{Observer, SimulationError, Summary};
 use crate::model::{Change, ContactEvent, Drive, Interface, Parameters};
 use std::cell::Cell;
@@ -18,6 +18,9 @@ use std::f64::consts::PI;
 
 /// Nodes beyond those that a polynomial needs: exact to 1e-13 for a modulation that turns by four radians in a segment.
 const NODES_FOR_DRIVE: usize = 8;
+
+/// Nodes in a step of the grid, in which a modulation turns by a third of a radian at most: exact to 1e-8 there.
+const NODES_OF_STEP: usize = 3;
 
 /// The energy balance of one simulation, from its start to its end. All in J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -215,7 +218,23 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
             drive.velocity * segment.impulse()
                 + drive.amplitude * (ramp + amplitude * (beat - drift))
         }
-        ForcePath::Grid(_) => unreachable!("a ledger is kept along Taylor steps"),
+        ForcePath::Grid(path) => {
+            let end = path.first + segment.duration / path.spacing;
+            let nodes = quadrature.nodes(NODES_OF_STEP);
+            let of_step = |(begin, step): (usize, &CubicStep)| {
+                let begin = begin as f64;
+                let from = (path.first - begin).max(0.0);
+                let part = (end - begin).min(1.0) - from;
+                let power = |node: f64| {
+                    let s = from + part * node;
+                    let elapsed = (begin + s - path.first) * path.spacing;
+                    step.value(s) * drive.motion(segment.start + elapsed).1
+                };
+                let mean = nodes.iter().map(|&(s, weight)| weight * power(s));
+                part * mean.sum::<f64>()
+            };
+            path.spacing * path.steps.iter().enumerate().map(of_step).sum::<f64>()
+        }
     }
 }
 

@@ -160,10 +160,6 @@ pub struct Summary {
 pub enum SimulationError {
     #[error("{setting}: must be {allowed}")]
     BadSetting { setting: String, allowed: String },
-    #[error(
-        "resolve = \"grid\": an energy ledger is kept along Taylor steps only; leave resolve out or set it to \"taylor\""
-    )]
-    LedgerOnGrid,
     #[error("at t = {time} s: the state is not finite; a smaller dt or tolerance may help")]
     NotFinite { time: f64 },
     #[error(

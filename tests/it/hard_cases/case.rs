@@ -1,9 +1,9 @@
 //! Hard cases: parameters that break a naive code, each run within budgets, so that none hangs.
 //!
-//! Each is run with an audit, the event-driven solver then in Taylor steps; and that solver once more as a job runs it,
-//! on the grid and without a ledger. A case passes if it ends as it must: the simulation reaches its end and its ledger
-//! balances, bad values are refused by name, or it stops and gives the cause. A run as a job must break about as many
-//! contacts as the audited one; where single runs say nothing, the means over many seeds must agree.
+//! Each is run with an audit, the event-driven solver in Taylor steps and as a job runs it, which is on the grid. A case
+//! passes if it ends as it must: the simulation reaches its end and its ledger balances, bad values are refused by
+//! name, or it stops and gives the cause. Both ways must break about as many contacts; where single runs say nothing,
+//! the means over many seeds must agree.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -11,7 +11,7 @@ use std::time::Duration;
 use stickslip::model::{ParameterError, Parameters, Symbol, Value};
 use stickslip::observe::{Recording, SlipObserver};
 use stickslip::solver::{
-    Limits, Method, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited,
+    Limits, Method, Resolve, SimulationError, Solver, Summary, simulate_audited,
 };
 
 /// Contact events after which a case is given up.
@@ -59,7 +59,7 @@ pub struct Outcome {
     pub how: String,
     /// Contacts broken.
     breaks: u64,
-    /// Residual of the energy ledger, relative to the work of the drive; `None` without an audit.
+    /// Residual of the energy ledger, relative to the work of the drive; `None` if it failed.
     pub residual: Option<f64>,
 }
 
@@ -112,13 +112,13 @@ impl HardCase {
         }
     }
 
-    /// Runs it within its budgets: with an audit, and, if it is event-driven and not refused, as a job.
+    /// Runs it within its budgets: if it is event-driven and not refused, in Taylor steps and as a job does.
     pub fn run(&self) -> Vec<Outcome> {
         if self.solver.method != Method::EventDriven {
             return vec![self.row(self.solver, None)];
         }
         let tolerance = self.solver.tolerance;
-        let audited = self.row(
+        let in_taylor_steps = self.row(
             Solver {
                 resolve: Resolve::Taylor,
                 ..Solver::event_driven(tolerance)
@@ -126,14 +126,14 @@ impl HardCase {
             None,
         );
         if self.failure.is_some_and(|(how, _)| how == REFUSED) {
-            return vec![audited];
+            return vec![in_taylor_steps];
         }
-        let as_a_job = self.row(self.solver, Some(&audited));
-        vec![audited, as_a_job]
+        let as_a_job = self.row(self.solver, Some(&in_taylor_steps));
+        vec![in_taylor_steps, as_a_job]
     }
 
-    /// Runs it with this solver: with an audit, or compared with the run that had one.
-    fn row(&self, solver: Solver, audited: Option<&Outcome>) -> Outcome {
+    /// Runs it with this solver, and compares it with another run, if there is one.
+    fn row(&self, solver: Solver, other: Option<&Outcome>) -> Outcome {
         let outcome = |passed, how: &str, breaks, residual| Outcome {
             case: self.name(),
             solver,
@@ -142,15 +142,14 @@ impl HardCase {
             breaks,
             residual,
         };
-        match self.simulate(solver, self.parameters(), audited.is_none()) {
+        match self.simulate(solver, self.parameters()) {
             Ok((summary, residual)) => {
-                let is_balanced =
-                    residual.is_none_or(|residual| residual.abs() <= self.max_residual());
-                let is_alike = audited.is_none_or(|audited| {
+                let is_balanced = residual.abs() <= self.max_residual();
+                let is_alike = other.is_none_or(|other| {
                     if self.is_chaotic {
                         self.means_are_alike()
                     } else {
-                        are_alike(audited.breaks, summary.breaks)
+                        are_alike(other.breaks, summary.breaks)
                     }
                 });
                 let how = match (is_balanced, is_alike) {
@@ -162,7 +161,7 @@ impl HardCase {
                     self.failure.is_none() && is_balanced && is_alike,
                     how,
                     summary.breaks,
-                    residual,
+                    Some(residual),
                 )
             }
             Err(how) => {
@@ -189,7 +188,7 @@ impl HardCase {
                 let parameters = self
                     .parameters()
                     .map(|parameters| Parameters { seed, ..parameters });
-                self.simulate(solver, parameters, false)
+                self.simulate(solver, parameters)
                     .map(|(summary, _)| summary.breaks as f64)
             });
             runs.collect::<Result<Vec<f64>, _>>()
@@ -226,13 +225,12 @@ impl HardCase {
         parameters.validated()
     }
 
-    /// Summary and, with an audit, residual of the ledger; or how it failed, in words.
+    /// Summary and residual of the ledger; or how it failed, in words.
     fn simulate(
         &self,
         solver: Solver,
         parameters: Result<Parameters, ParameterError>,
-        has_audit: bool,
-    ) -> Result<(Summary, Option<f64>), String> {
+    ) -> Result<(Summary, f64), String> {
         let parameters = parameters.map_err(|error| format!("{REFUSED}: {error}"))?;
         let recording = Recording {
             slips: Some(self.slips),
@@ -246,12 +244,8 @@ impl HardCase {
                 events: EVENT_BUDGET,
                 interrupt: Some(interrupt),
             };
-            if has_audit {
-                let audited = simulate_audited(&parameters, solver, limits, &mut observer);
-                audited.map(|(summary, ledger)| (summary, Some(ledger.residual())))
-            } else {
-                simulate(&parameters, solver, limits, &mut observer).map(|summary| (summary, None))
-            }
+            let audited = simulate_audited(&parameters, solver, limits, &mut observer);
+            audited.map(|(summary, ledger)| (summary, ledger.residual()))
         })
         .map_err(|error| match error {
             SimulationError::BadSetting { .. } => {

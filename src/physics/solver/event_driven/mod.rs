@@ -37,8 +37,8 @@ words! {
     /// How motion between leaps is resolved.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Resolve {
-        /// On the grid from a tolerance of [`GRID_TOLERANCE`] on, if the clock resolves its step and no ledger is kept;
-        /// else in Taylor steps.
+        /// On the grid from a tolerance of [`GRID_TOLERANCE`] on, if the clock resolves its step; else in Taylor
+        /// steps.
         Auto = "auto",
         /// On a constant grid of time, corrected for events to fourth order.
         Grid = "grid",
@@ -90,11 +90,8 @@ pub(super) fn run(
         tolerance, resolve, ..
     } = solver;
     let rows = Layout::new(parameters.blocks).rows;
-    if resolve == Resolve::Grid && audit.is_some() {
-        return Err(SimulationError::LedgerOnGrid);
-    }
-    let is_possible = audit.is_none() && Grid::is_resolved(parameters, tolerance);
-    let takes_grid = resolve.takes_grid(tolerance) && (is_possible || resolve == Resolve::Grid);
+    let is_possible = resolve == Resolve::Grid || Grid::is_resolved(parameters, tolerance);
+    let takes_grid = resolve.takes_grid(tolerance) && is_possible;
     let kernels = kernels::fastest(rows);
     Integration::new(parameters, tolerance, takes_grid, limits, kernels, audit).integrate(observer)
 }
@@ -162,7 +159,7 @@ impl<'a> Integration<'a> {
     /// has nothing to drop if an observer panics.
     #[inline(never)]
     fn integrate(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
-        self.grid.set_observed(observer);
+        self.grid.set_observed(observer, self.audit.is_some());
         for event in self.slider.interface.initial_attachments() {
             observer.contact(&event);
         }

@@ -9,10 +9,10 @@
 use super::Grid;
 use super::step::{Correction, GridStep, add};
 use crate::model::simd::Simd;
-use crate::model::{ContactChange, Interface, Row};
+use crate::model::{ContactChange, Interface};
 use crate::solver::event_driven::moving_frame::GridDrive;
 use crate::solver::event_driven::slider::Slider;
-use crate::solver::polynomial::{CUBIC, halley_step, rising_root};
+use crate::solver::polynomial::{CUBIC, halley_step, rising_root, value_and_integral};
 
 const SIXTH: f64 = 1.0 / 6.0;
 /// A step of third order below this leaves an error of its cube: a billionth of a step of the grid.
@@ -34,6 +34,8 @@ struct Path {
     eventless: Correction,
     /// What events add to the blocks beside.
     beside: Correction,
+    /// What events add to ∫ X'² ds over the step, in m².
+    dissipation: f64,
 }
 
 impl Path {
@@ -71,6 +73,7 @@ impl Path {
                 increment: rise,
             },
             beside: Correction::default(),
+            dissipation: 0.0,
         }
     }
 
@@ -114,6 +117,29 @@ impl Path {
         *c3 += (4.0 * fourth).mul_add(-s, third);
         *c4 += fourth;
         self.from = s;
+    }
+
+    /// The same, with the dissipation, which is left out where nobody asks for it.
+    #[cold]
+    #[inline(never)]
+    fn change_audited(&mut self, s: f64, terms: [f64; 3]) {
+        let before = self.dissipation_from(s);
+        self.change_by(s, terms);
+        self.dissipation += self.dissipation_from(s) - before;
+    }
+
+    /// ∫ X'² ds from s to the end of the step, in m².
+    fn dissipation_from(&self, s: f64) -> f64 {
+        let [_, c1, c2, c3, c4] = self.coefficients;
+        let slope = [c1, 2.0 * c2, 3.0 * c3, 4.0 * c4];
+        let mut square = [0.0; 7];
+        for (i, one) in slope.into_iter().enumerate() {
+            for (j, other) in slope.into_iter().enumerate() {
+                square[i + j] += one * other;
+            }
+        }
+        let until = |s| value_and_integral(&square, s).1;
+        until(1.0) - until(s)
     }
 
     /// Where in the rest of the step the block reaches `level` m, which it has passed at the end: Halley's steps from
@@ -257,8 +283,8 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
         let force = step.force_on(&place, end, place.beside(x), drive.displacement());
         // A parabola is enough, as the force of an unstressed contact only grows.
         let bend = step.damping.mul_add(-rise, force);
-        let interface = &mut slider.interface;
-        let change = interface.reattach_running(simd, end - left * (rise + 0.5 * s * bend));
+        let x = end - left * (rise + 0.5 * s * bend);
+        let change = slider.interface.reattach_running(simd, x);
         if events.wants_attachments {
             events.changes.push(change);
         } else {
@@ -267,9 +293,15 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
         events.reattachments += 1;
         let slope = rise + (s - 0.5) * bend;
         let third = -SIXTH * step.by_mass * change.stiffness * slope;
+        if step.end_force.is_some() {
+            let mut path = Path::new(slider, step, drive, block);
+            path.change_audited(s, [0.0, third, 0.0]);
+            step.add_dissipation(path.dissipation);
+        }
         let [ahead, back] = [left, s].map(|part| third * (part * part * part));
         add(simd, &mut slider.state.displacement, place.slot, ahead);
         add(simd, &mut step.increment, place.slot, ahead + back);
+        let interface = &mut slider.interface;
         let levels = [interface.block_upper[block], interface.block_lower[block]];
         if end + ahead < levels[0] && end + ahead > levels[1] {
             let diagonal = slider.chain.bare[row][lane] + interface.block_stiffness[block];
@@ -336,7 +368,12 @@ fn break_along<S: Simd>(
             let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
             let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second)
                 - 0.25 * step.damping * third;
-            path.change_by(s, [second, third, fourth]);
+            let terms = [second, third, fourth];
+            if step.end_force.is_some() {
+                path.change_audited(s, terms);
+            } else {
+                path.change_by(s, terms);
+            }
             let [ahead, back] = [(1.0 - s) * (1.0 - s), s * s];
             let [ahead, back] = [ahead * ahead, back * back];
             let beside = 0.5 * SIXTH * step.coupling * second;
@@ -376,6 +413,7 @@ fn settle<S: Simd>(simd: S, slider: &mut Slider, step: &mut GridStep, path: &Pat
         increment: displacement - path.coefficients[0] - path.eventless.increment,
     };
     step.correct(simd, block, [own, path.beside], &mut state.displacement);
+    step.add_dissipation(path.dissipation);
 }
 
 #[cfg(test)]
@@ -393,6 +431,7 @@ mod tests {
             from,
             eventless: none,
             beside: none,
+            dissipation: 0.0,
         }
     }
 

@@ -54,6 +54,13 @@ impl ForceHistory {
         self.turns = turns;
     }
 
+    /// F_S at s in the last step, in N.
+    pub fn last_force(&self, s: f64) -> f64 {
+        self.steps
+            .last()
+            .map_or(f64::NEG_INFINITY, |step| step.value(s))
+    }
+
     /// The segment up to s in the last step, with `origin` s to add to times in the frame.
     #[inline]
     pub fn segment_to(&self, s: f64, spacing: f64, origin: f64) -> Option<Segment<'_>> {

@@ -19,7 +19,7 @@ use super::taylor::StepInput;
 use super::{Integration, WORTHWHILE_GRID_LEAP};
 use crate::model::equation::largest_frequency;
 use crate::model::simd::Simd;
-use crate::model::{Change, ContactEvent, Parameters};
+use crate::model::{Change, ContactChange, ContactEvent, Parameters};
 use crate::solver::segment::CubicStep;
 use crate::solver::{Observer, SimulationError};
 use crate::value::floored;
@@ -63,6 +63,8 @@ pub(super) struct Grid {
     pause: f64,
     /// The state one step before an entry.
     before: State,
+    /// Where in the last step the dissipation that is entered ends.
+    entered: f64,
 }
 
 impl Grid {
@@ -77,6 +79,7 @@ impl Grid {
             last_break: f64::NEG_INFINITY,
             pause: 0.5 * parameters.wave_crossing_time(),
             before: state.clone(),
+            entered: 1.0,
         }
     }
 
@@ -90,8 +93,9 @@ impl Grid {
         self.events.wants_attachments
     }
 
-    /// Notes what the observer follows.
-    pub fn set_observed(&mut self, observer: &dyn Observer) {
+    /// Notes what the observer follows, and whether the dissipation is kept.
+    pub fn set_observed(&mut self, observer: &dyn Observer, is_audited: bool) {
+        self.step.end_force = is_audited.then(|| self.step.force.clone());
         self.events.wants_attachments = observer.follows_attachments();
         self.history.keeps_all = observer.follows_force();
     }
@@ -277,6 +281,9 @@ impl Integration<'_> {
         self.grid.history.restart(self.cut);
         self.leave_grid(observer);
         self.look_back(s)?;
+        if let Some(audit) = self.audit {
+            self.enter_damping(audit, self.grid.step.length, [0.0, s]);
+        }
         self.slider.state.clone_from(&self.grid.before);
         self.frame.set_time(self.cut);
         Ok(())
@@ -323,7 +330,11 @@ impl Integration<'_> {
                 .next_leap
                 .max(self.frame.time + WORTHWHILE_GRID_LEAP * length);
         }
+        self.grid.entered = 0.0;
+        let [run, last] = self.grid.step.dissipation;
+        self.enter_dissipation(run - last);
         self.report_changes(start, observer);
+        self.enter_dissipation_to(1.0);
         if self.frame.time >= self.cut {
             self.step_back(observer)?;
             return Ok(true);
@@ -335,6 +346,21 @@ impl Integration<'_> {
         Ok(true)
     }
 
+    /// Enters the damping loss that goes with ∫ X'² ds in m².
+    fn enter_dissipation(&self, dissipation: f64) {
+        if let Some(audit) = self.audit {
+            let chain = &self.slider.chain;
+            let by_square = chain.mass * chain.damping_rate * self.grid.step.inverse_length;
+            audit.damping.update(|sum| sum + by_square * dissipation);
+        }
+    }
+
+    /// Enters that of the last step up to s, as if it were even there.
+    fn enter_dissipation_to(&mut self, s: f64) {
+        self.enter_dissipation(self.grid.step.dissipation[1] * (s - self.grid.entered));
+        self.grid.entered = s;
+    }
+
     /// Reports the shear force up to s in the last step.
     fn report_force(&mut self, s: f64, observer: &mut dyn Observer) {
         let length = self.grid.step.length;
@@ -344,7 +370,6 @@ impl Integration<'_> {
             .segment_to(s, length, self.frame.absolute_time(0.0))
         {
             observer.advance(&segment);
-            self.largest_force = self.largest_force.max(segment.end_force());
             grid.history
                 .forget_to(s, self.frame.time - (1.0 - s) * length);
         }
@@ -363,8 +388,11 @@ impl Integration<'_> {
         let changes = std::mem::take(&mut self.grid.events.changes);
         let attachments = std::mem::take(&mut self.grid.events.attachments);
         let mut uncounted = &attachments[..];
-        if self.grid.events.breaks > 0 {
-            self.largest_force = f64::NEG_INFINITY;
+        let inverse_length = self.grid.step.inverse_length;
+        let place = |change: &ContactChange| (change.time - start) * inverse_length;
+        let mut backwards = changes.iter().rev();
+        if let Some(last) = backwards.find(|change| change.change == Change::Break) {
+            self.largest_force = self.grid.history.last_force(place(last));
         }
         let [mean, rise] = self.grid.events.mean;
         let leading = self.slider.chain.layout.blocks - 1;
@@ -378,9 +406,9 @@ impl Integration<'_> {
                 rest.iter().position(|change| change.block == leading)
             };
             let (reported, later) = rest.split_at(last.map_or(rest.len(), |last| last + 1));
-            let until = reported.last().unwrap_or(first).time;
-            let s = (until - start) * self.grid.step.inverse_length;
-            self.report_force(s.clamp(0.0, 1.0), observer);
+            let s = place(reported.last().unwrap_or(first)).clamp(0.0, 1.0);
+            self.report_force(s, observer);
+            self.enter_dissipation_to(s);
             for change in reported {
                 while let [due, later @ ..] = uncounted
                     && *due <= change.time
@@ -389,7 +417,7 @@ impl Integration<'_> {
                     uncounted = later;
                 }
                 let count = self.slider.interface.count(change.change, change.time);
-                let left = 1.0 - (change.time - start) * self.grid.step.inverse_length;
+                let left = 1.0 - place(change);
                 let mean = self.frame.absolute_displacement(mean - left * rise);
                 observer.contact(&ContactEvent::new(
                     self.frame.absolute(*change),

@@ -102,6 +102,10 @@ pub struct GridStep {
     pub force: Vec<Row>,
     /// Shear force at the points of the last run but the first, in N.
     pub trail: [f64; MAX_RUN],
+    /// φ at the end of a step under its own law, in m; `None` unless [`Self::dissipation`] is kept.
+    pub end_force: Option<Vec<Row>>,
+    /// ∫ X'² ds summed over the blocks, in m²: over all steps of the last run, and over its last step.
+    pub dissipation: [f64; 2],
     /// Row and lane of every block that reached a break position in the last step.
     pub reached: Vec<(usize, usize)>,
     pub(super) places: Vec<Place>,
@@ -141,6 +145,8 @@ impl GridStep {
             increment: layout.filled(0.0),
             force: layout.filled(0.0),
             trail: [0.0; MAX_RUN],
+            end_force: None,
+            dissipation: [0.0; 2],
             reached: Vec::new(),
             places: (0..layout.blocks)
                 .map(|block| Place::new(layout, block))
@@ -232,9 +238,15 @@ impl GridStep {
         }
     }
 
+    /// Adds what events change in the dissipation of the last step, in m².
+    #[inline(always)]
+    pub(super) fn add_dissipation(&mut self, change: f64) {
+        self.dissipation = self.dissipation.map(|sum| sum + change);
+    }
+
     /// φ of a block at the displacements of it, of both blocks beside together, and of the drive, in m.
     #[inline(always)]
-    pub fn force_on(&self, place: &Place, here: f64, beside: f64, driven: f64) -> f64 {
+    pub(super) fn force_on(&self, place: &Place, here: f64, beside: f64, driven: f64) -> f64 {
         let (row, lane) = place.slot;
         let own = self.diagonal[row][lane].mul_add(here, self.pull[row][lane]);
         let pulls = if place.slot == (0, 0) {
@@ -277,7 +289,8 @@ pub(super) fn march<S: Simd, const R: usize>(
 ) -> usize {
     let steps = steps.min(MAX_RUN);
     step.reached.clear();
-    if R > 0 && S::HAS_MANY_REGISTERS {
+    step.dissipation = [0.0; 2];
+    if R > 0 && S::HAS_MANY_REGISTERS && step.end_force.is_none() {
         march_in_registers::<S, R>(simd, chain, step, drive, displacement, steps)
     } else {
         march_in_memory::<S, R>(simd, chain, step, drive, displacement, steps)
@@ -397,10 +410,8 @@ fn march_in_memory<S: Simd, const R: usize>(
     let last = rows - 1;
     let q = &mut step.increment[..rows];
     let force = &mut step.force[..rows];
-    let pull = &step.pull[..rows];
-    let diagonal = &step.diagonal[..rows];
+    let law = [&step.pull, &step.diagonal, &step.couplings].map(|rows_of| &rows_of[..rows]);
     let own = &step.own[..rows];
-    let couplings = &step.couplings[..rows];
     let second_couplings = &step.second_couplings[..rows];
     let upper = &step.upper[..rows];
     let lower = &step.lower[..rows];
@@ -408,27 +419,7 @@ fn march_in_memory<S: Simd, const R: usize>(
     let decay = simd.splat(step.decay);
     for done in 1..=steps {
         let [push, correction] = pushes(step.pulling, step.second, step.damping, drive);
-        // φ of every block.
-        let mut before = simd.load(&x[last]).to_next_lane();
-        let mut here = simd.load(&x[0]);
-        let beyond = here.to_lane_before();
-        for r in 0..rows {
-            let after = if r < last {
-                simd.load(&x[r + 1])
-            } else {
-                beyond
-            };
-            let mut own = simd.load(&pull[r]);
-            if r == 0 {
-                own = first_lane.mul_add(simd.splat(push), own);
-            }
-            let own = here.mul_add(simd.load(&diagonal[r]), own);
-            before
-                .plus(after)
-                .mul_add(simd.load(&couplings[r]), own)
-                .store(&mut force[r]);
-            (before, here) = (here, after);
-        }
+        forces(simd, x, law, push, force);
         // The increments, and where they take the blocks.
         let mut before = simd.load(&force[last]).to_next_lane();
         let mut here = simd.load(&force[0]);
@@ -456,12 +447,76 @@ fn march_in_memory<S: Simd, const R: usize>(
         }
         drive.advance();
         step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0][0]);
+        if let Some(end_force) = &mut step.end_force {
+            forces(simd, x, law, step.pulling * drive.displacement(), end_force);
+            let last = dissipation(simd, step.damping, step.damped, [force, end_force], q);
+            step.dissipation = [step.dissipation[0] + last, last];
+        }
         if reached != 0 {
             note_reached(simd, [&step.upper, &step.lower], x, &mut step.reached);
             return done;
         }
     }
     steps
+}
+
+/// φ of every block at these displacements, under a law of pull, diagonal and coupling, with this push of the drive.
+#[inline(always)]
+fn forces<S: Simd>(
+    simd: S,
+    x: &[Row],
+    [pull, diagonal, couplings]: [&[Row]; 3],
+    push: f64,
+    force: &mut [Row],
+) {
+    let last = x.len() - 1;
+    let first_lane = simd.load(&FIRST_BLOCK);
+    let mut before = simd.load(&x[last]).to_next_lane();
+    let mut here = simd.load(&x[0]);
+    let beyond = here.to_lane_before();
+    for r in 0..x.len() {
+        let after = if r < last {
+            simd.load(&x[r + 1])
+        } else {
+            beyond
+        };
+        let mut own = simd.load(&pull[r]);
+        if r == 0 {
+            own = first_lane.mul_add(simd.splat(push), own);
+        }
+        let own = here.mul_add(simd.load(&diagonal[r]), own);
+        before
+            .plus(after)
+            .mul_add(simd.load(&couplings[r]), own)
+            .store(&mut force[r]);
+        (before, here) = (here, after);
+    }
+}
+
+/// ∫ X'² ds over a step, summed over the blocks, in m², from φ at both ends and the increments: with X as in
+/// [`contacts`](super::contacts), each adds q² + (4 a0² + 7 a0 a1 + 4 a1²)/180.
+#[inline(always)]
+fn dissipation<S: Simd>(
+    simd: S,
+    damping: f64,
+    damped: [f64; 3],
+    [first_force, last_force]: [&[Row]; 2],
+    increment: &[Row],
+) -> f64 {
+    let damping = simd.splat(-damping);
+    let [across, along_first, along_last] = damped.map(|weight| simd.splat(weight));
+    let mut sum = simd.splat(0.0);
+    for (r, increment) in increment.iter().enumerate() {
+        let q = simd.load(increment);
+        let from = q.mul_add(damping, simd.load(&first_force[r]));
+        let to = q.mul_add(damping, simd.load(&last_force[r]));
+        let first = across.mul_add(to, along_first.times(from));
+        let last = along_last.times(to).minus(across.times(from));
+        let squares = first.mul_add(first, last.times(last));
+        let bends = squares.mul_add(simd.splat(4.0), first.times(last).times(simd.splat(7.0)));
+        sum = q.mul_add(q, bends.mul_add(simd.splat(1.0 / 180.0), sum));
+    }
+    sum.reduce(|a, b| a + b)
 }
 
 /// What the drive adds to φ of block 1, and to its increment beside, in m.

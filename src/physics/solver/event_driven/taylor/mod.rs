@@ -273,21 +273,22 @@ impl Integration<'_> {
             path: self.step.force_path(first, [force, end_force]),
         });
         if let Some(audit) = self.audit {
-            self.enter_damping(audit, [first, last]);
+            self.enter_damping(audit, length, [first, last]);
         }
         end_force
     }
 
-    /// Enters the damping loss over a part of the step: ∫ mγ Σ v² dt, exact for the polynomial.
-    fn enter_damping(&self, audit: &Audit, [first, last]: [f64; 2]) {
+    /// Enters the damping loss over a part of the present series, a step of `length` s: ∫ mγ Σ v² dt, exact for the
+    /// polynomial.
+    pub(super) fn enter_damping(&self, audit: &Audit, length: f64, [first, last]: [f64; 2]) {
         let Slider { chain, state, .. } = &self.slider;
-        let Step { series, length, .. } = &self.step;
+        let series = &self.step.series;
         let mut probe = state.clone();
         let nodes = audit.quadrature.nodes(series.order).iter();
         let mean_square: f64 = nodes
             .map(|&(s, weight)| {
                 let s = first + s * (last - first);
-                self.kernels.evaluate(series, s, *length, &mut probe);
+                self.kernels.evaluate(series, s, length, &mut probe);
                 let velocities = probe.velocity.iter().flat_map(|row| row.iter());
                 weight * velocities.map(|v| v * v).sum::<f64>()
             })
