@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use stickslip::model::{Change, Parameters};
 use stickslip::observe::{ContactLog, Observers, Trace};
-use stickslip::solver::{Limits, Solver, simulate, simulate_audited};
+use stickslip::solver::{Limits, Resolve, Solver, simulate, simulate_audited};
 
 /// Period and amplitude change a lot before the first break, near 0.06 s.
 fn ramped() -> Parameters {
@@ -140,6 +140,10 @@ fn steep_ramps_balance_their_energy() {
         // The turning point comes and goes within the first cycle.
         ends(Some(1e-4), Some(0.0), 1e-3),
     ];
+    let taylor = |tolerance| Solver {
+        resolve: Resolve::Taylor,
+        ..Solver::event_driven(tolerance)
+    };
     for parameters in cases {
         let limits = Limits {
             end_time: 0.25,

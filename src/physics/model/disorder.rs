@@ -464,12 +464,15 @@ mod tests {
                 (1 << 63) - 1,
                 1 << 63,
             ];
-            let words: [u64; 16] =
-                std::array::from_fn(|i| if i < 8 { words[i] } else { !words[i - 8] });
+            let words = words.map(|word: u64| [word, !word]);
             let disorder = Disorder::new(&Parameters::default());
-            let draws =
-                features.dispatch(SideBySide(&disorder, &words.map(|word| [word.to_le(); 2])));
-            for (word, Draw { threshold, delay }) in words.into_iter().zip(draws) {
+            let (refills, _) = words.as_flattened().as_chunks();
+            let draws = refills.iter().flat_map(|refill| {
+                let words = refill.map(|word: u64| [word.to_le(); 2]);
+                let draws = features.dispatch(SideBySide(&disorder, &words));
+                refill.iter().copied().zip(draws)
+            });
+            for (word, Draw { threshold, delay }) in draws {
                 let alone = disorder.threshold(standard_normal_quantile(uniform(word)));
                 let in_tail = depth(uniform(word)) > 5.0;
                 assert!(

@@ -23,4 +23,4 @@ pub type Value = crate::value::Value<'static>;
 
 /// Version of equations, definitions and defaults; part of every job id. Raised when the same parameters, or a file
 /// that leaves them out, give other results.
-pub const MODEL_VERSION: u32 = 7;
+pub const MODEL_VERSION: u32 = 8;

@@ -2,7 +2,7 @@
 
 use super::grid::{Grid, GridStep, advance, velocity};
 use super::leap::{Bounds, Plan, Split, leap};
-use super::moving_frame::GridDrive;
+use super::moving_frame::StepDrive;
 use super::slider::{Chain, Slider, State};
 use super::taylor::{Series, StepInput, evaluate, expand, reachable};
 use crate::model::simd::Simd;
@@ -41,7 +41,7 @@ kernels! {
     /// Takes up to `steps` steps of the grid; see [`advance`].
     fn advance(slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize = advance::<S, R>;
     /// Writes the velocities of a motion on the grid; see [`velocity`].
-    fn velocity(chain: &Chain, step: &mut GridStep, drive: &GridDrive, state: &mut State) -> () = velocity::<S, R>;
+    fn velocity(chain: &Chain, step: &mut GridStep, drive: &StepDrive, state: &mut State) -> () = velocity::<S, R>;
     /// Tries to leap; see [`leap`].
     fn leap(split: &mut Split, slider: &mut Slider, drive: &Harmonic, bounds: Bounds, audit: Option<&Audit>)
         -> Result<Plan, f64> = leap::<S>;

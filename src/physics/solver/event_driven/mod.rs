@@ -8,11 +8,14 @@
 //!
 //! Displacements and times are kept in a [`moving_frame`], so that neither loses digits in long runs.
 
+mod event;
 mod grid;
 mod kernels;
 mod leap;
 mod moving_frame;
 mod slider;
+#[cfg(test)]
+mod speed_tests;
 mod taylor;
 mod tolerances;
 
@@ -176,30 +179,22 @@ impl<'a> Integration<'a> {
                 self.frame.next_cycle();
                 until_change = self.frame.until(self.frame.drive.cycle_end);
             }
-            self.cut = self.frame.time + until_end;
-            if self.frame.drive.pulse().is_some() {
-                // Steps before a pulse, and before the end, are those of a run without it.
-                self.cut = self.frame.time + until_change.min(until_end);
-                until_change = f64::INFINITY;
-            }
+            // Steps before a change of the drive, and before the end, are those of a run without it.
+            self.cut = self.frame.time + until_change.min(until_end);
             // The step of the grid is not that of a pulse.
             let turn = self.frame.drive.angular_frequency * self.tolerances.max_step;
             let takes_grid =
                 self.takes_grid && (self.frame.drive.lift == 0.0 || turn < MAX_PULSE_TURN);
             let until_attach = self.slider.interface.next_reattachment() - self.frame.time;
-            let horizon = until_attach.min(until_change);
             // Leaps from the grid pass reattachments.
-            let is_worthwhile = if takes_grid {
-                until_change > WORTHWHILE_GRID_LEAP * self.grid.step.length
-            } else {
-                horizon > WORTHWHILE_LEAP * self.tolerances.max_step
-            };
-            let leapt = is_worthwhile
-                && self.frame.time >= self.next_leap
-                && self.try_leap(horizon, until_change, observer);
-            let moved = leapt || (takes_grid && self.take_grid_steps(until_change, observer)?);
-            if !moved {
-                self.take_step(until_change, observer)?;
+            let is_worthwhile =
+                takes_grid || until_attach > WORTHWHILE_LEAP * self.tolerances.max_step;
+            let may_leap = is_worthwhile && self.frame.time >= self.next_leap;
+            let has_leapt = may_leap && self.try_leap(until_attach, observer);
+            match (has_leapt, takes_grid) {
+                (true, _) => {}
+                (false, true) => self.take_grid_steps(observer)?,
+                (false, false) => self.take_step(observer)?,
             }
             if self.summary.breaks + self.summary.reattachments > self.limits.events {
                 return Err(SimulationError::EventBudget {
@@ -259,10 +254,9 @@ impl<'a> Integration<'a> {
         Ok(self.summary)
     }
 
-    /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next cycle of a ramp. False if
-    /// none is allowed yet.
+    /// Tries a leap, up to the next reattachment in `horizon` s, or from the grid further. False if none is allowed yet.
     #[inline(never)]
-    fn try_leap(&mut self, horizon: f64, until_change: f64, observer: &mut dyn Observer) -> bool {
+    fn try_leap(&mut self, horizon: f64, observer: &mut dyn Observer) -> bool {
         self.update_velocities(observer);
         let drive = self.frame.drive_motion();
         let start = self.frame.now();
@@ -271,11 +265,14 @@ impl<'a> Integration<'a> {
         let bounds = Bounds {
             start: began,
             horizon,
-            until_cycle_end: until_change,
+            until_cycle_end: match self.frame.drive.pulse() {
+                Some(_) => f64::INFINITY,
+                None => self.frame.until(self.frame.drive.cycle_end),
+            },
             until_cut: self.cut - began,
             error: self.tolerances.leap_error,
             largest_force: self.largest_force,
-            passing: self.takes_grid.then_some([least, until_change]),
+            passing: self.takes_grid.then_some(least),
         };
         let attempt = self.kernels.leap(
             &mut self.split,

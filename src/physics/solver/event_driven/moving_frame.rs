@@ -1,7 +1,6 @@
 //! The moving frame: time, displacement and drive, counted from an origin that follows the slider, so that neither time
 //! nor displacement loses digits in long runs.
 
-use super::taylor::DriveDerivatives;
 use crate::model::{ContactChange, Drive};
 use crate::solver::SimulationError;
 use crate::solver::harmonic::Harmonic;
@@ -14,42 +13,23 @@ pub(super) const MIN_RESOLUTION: f64 = 1_048_576.0;
 const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
 const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
 
-/// The drive's displacement at a point of the grid, and what takes it to the next.
+/// The drive's displacement at the start of a step of h s: its derivatives times powers of h, and what takes it to the
+/// next step.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct GridDrive {
+pub(super) struct StepDrive {
     /// Displacement of the ramp, in m, and its rise in a step.
     pub ramp: [f64; 2],
     /// Δ cos θ and -Δ sin θ at the phase θ, in m.
     pub swing: [f64; 2],
-    /// Sine and cosine of the turn ωh of a step.
-    pub turn: [f64; 2],
     /// ωh, in rad; 0 if the drive is never modulated.
     pub angle: f64,
 }
 
-impl GridDrive {
+impl StepDrive {
     /// Displacement, in m.
     #[inline(always)]
     pub fn displacement(&self) -> f64 {
         self.ramp[0] + self.swing[0]
-    }
-
-    /// Displacement one step before, in m.
-    #[inline(always)]
-    pub fn displacement_before(&self) -> f64 {
-        (self.ramp[0] - self.ramp[1]) + self.swing_before()
-    }
-
-    /// Δ cos θ one step before, in m.
-    #[inline(always)]
-    fn swing_before(&self) -> f64 {
-        self.swing[0] * self.turn[1] - self.swing[1] * self.turn[0]
-    }
-
-    /// h² u'' one step before, in m.
-    #[inline(always)]
-    pub fn bend_before(&self) -> f64 {
-        -self.angle * self.angle * self.swing_before()
     }
 
     /// h u', in m.
@@ -64,17 +44,43 @@ impl GridDrive {
         -self.angle * self.angle * self.swing[0]
     }
 
+    /// Its derivative, as the displacement of another drive: h^p u^(p) is the displacement after p of them.
     #[inline(always)]
-    pub fn advance(&mut self) {
+    pub fn derivative(&self) -> Self {
+        Self {
+            ramp: [self.ramp[1], 0.0],
+            swing: [self.angle * self.swing[1], -self.angle * self.swing[0]],
+            angle: self.angle,
+        }
+    }
+
+    /// A step later, or before with a negative sine; `turn` is sine and cosine of ωh.
+    #[inline(always)]
+    fn turned(&self, [sine, cosine]: [f64; 2]) -> [f64; 2] {
+        let [along, across] = self.swing;
+        // Δ cos(θ + ωh) and -Δ sin(θ + ωh).
+        [
+            along * cosine + across * sine,
+            across * cosine - along * sine,
+        ]
+    }
+
+    /// Goes on by a step.
+    #[inline(always)]
+    pub fn advance(&mut self, turn: [f64; 2]) {
         self.ramp[0] += self.ramp[1];
         if self.angle != 0.0 {
-            let [sine, cosine] = self.turn;
-            let [along, across] = self.swing;
-            // Δ cos(θ + ωh) and -Δ sin(θ + ωh).
-            self.swing = [
-                along * cosine + across * sine,
-                across * cosine - along * sine,
-            ];
+            self.swing = self.turned(turn);
+        }
+    }
+
+    /// A step before.
+    #[inline(always)]
+    pub fn before(&self, [sine, cosine]: [f64; 2]) -> Self {
+        Self {
+            ramp: [self.ramp[0] - self.ramp[1], self.ramp[1]],
+            swing: self.turned([-sine, cosine]),
+            angle: self.angle,
         }
     }
 }
@@ -225,22 +231,10 @@ impl Frame {
         }
     }
 
-    /// The drive for a grid of steps of `length` s, from the present on.
-    pub fn grid_drive(&self, length: f64) -> GridDrive {
-        let DriveDerivatives { ramp, swing, angle } = self.drive_derivatives(length);
-        let (sine, cosine) = libm::sincos(angle);
-        GridDrive {
-            ramp,
-            swing,
-            turn: [sine, cosine],
-            angle,
-        }
-    }
-
-    /// The derivatives of the drive's displacement, for a step of `length` s.
+    /// The drive for steps of `length` s, from the present on.
     #[inline]
-    pub fn drive_derivatives(&self, length: f64) -> DriveDerivatives {
-        DriveDerivatives {
+    pub fn step_drive(&self, length: f64) -> StepDrive {
+        StepDrive {
             ramp: [self.ramp(), self.drive.velocity * length],
             swing: self.swing,
             angle: self.drive.angular_frequency * length,

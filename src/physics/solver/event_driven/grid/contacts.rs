@@ -1,16 +1,16 @@
 //! Contact events within a step of the grid, without redoing it.
 //!
 //! Within a step, s from 0 to 1, a block moves as X(s) = x + s q + ((r³ - r) a0 + (s³ - s) a1)/6 with r = 1 - s, where
-//! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes the force on its block and so its motion
-//! by δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see
-//! [`taylor`](crate::solver::event_driven::taylor), where the same terms are derived. Added at s = 1 they correct the
-//! displacement, and at s = 0, backwards, the increment.
+//! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes it by terms in ξ = s - s'
+//! ([`event`](super::super::event)). Added at s = 1 they correct the displacement, and at s = 0, backwards, the
+//! increment.
 
 use super::Grid;
 use super::step::{Correction, GridStep, add};
 use crate::model::simd::Simd;
 use crate::model::{ContactChange, Interface};
-use crate::solver::event_driven::moving_frame::GridDrive;
+use crate::solver::event_driven::event::{own_terms, term_beside};
+use crate::solver::event_driven::moving_frame::StepDrive;
 use crate::solver::event_driven::slider::Slider;
 use crate::solver::polynomial::{CUBIC, halley_step, rising_root, value_and_integral};
 
@@ -41,7 +41,7 @@ struct Path {
 impl Path {
     /// The path of a block over the last step, under the present law.
     #[inline(always)]
-    fn new(slider: &Slider, step: &GridStep, drive: &GridDrive, block: usize) -> Self {
+    fn new(slider: &Slider, step: &GridStep, drive: &StepDrive, block: usize) -> Self {
         let x = &slider.state.displacement;
         let q = &step.increment;
         let place = step.places[block];
@@ -51,7 +51,7 @@ impl Path {
         let beside = place.beside(x);
         let beside_start = beside - place.beside(q);
         let last_force = step.force_on(&place, end, beside, drive.displacement());
-        let driven_before = drive.displacement_before();
+        let driven_before = drive.before(step.turn).displacement();
         let first_force = step.force_on(&place, end - rise, beside_start, driven_before);
         // x'' = φ - γh x' at both ends, with the slopes of this very path.
         let damping = step.damping;
@@ -364,11 +364,12 @@ fn break_along<S: Simd>(
             let (change, due) = interface.break_contact(simd, block, contact, time, level);
             let [_, slope, half_curvature] = path.at(s);
             let stiffened = -step.by_mass * change.stiffness;
-            let second = 0.5 * step.by_mass * change.force;
-            let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
-            let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second)
-                - 0.25 * step.damping * third;
-            let terms = [second, third, fourth];
+            let forces = [
+                step.by_mass * change.force,
+                -stiffened * slope,
+                -stiffened * half_curvature,
+            ];
+            let terms = own_terms(forces, step.damping, own);
             if step.end_force.is_some() {
                 path.change_audited(s, terms);
             } else {
@@ -376,7 +377,7 @@ fn break_along<S: Simd>(
             }
             let [ahead, back] = [(1.0 - s) * (1.0 - s), s * s];
             let [ahead, back] = [ahead * ahead, back * back];
-            let beside = 0.5 * SIXTH * step.coupling * second;
+            let beside = term_beside(terms[0], step.coupling);
             path.beside.displacement += beside * ahead;
             path.beside.increment += beside * (ahead - back);
             events.changes.push(change);

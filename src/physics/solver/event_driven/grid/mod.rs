@@ -13,7 +13,7 @@ pub(super) use self::step::{GridStep, velocity};
 use self::contacts::{StepEvents, change_contacts};
 use self::history::ForceHistory;
 use self::step::{MAX_RUN, march};
-use super::moving_frame::{Frame, GridDrive, MIN_RESOLUTION};
+use super::moving_frame::{Frame, MIN_RESOLUTION, StepDrive};
 use super::slider::{Chain, Slider, State};
 use super::taylor::StepInput;
 use super::{Integration, WORTHWHILE_GRID_LEAP};
@@ -51,7 +51,7 @@ pub(super) struct Grid {
     pub step: GridStep,
     /// Whether the motion is on it: displacements are then those of the slider, velocities are not.
     pub is_on: bool,
-    pub drive: GridDrive,
+    pub drive: StepDrive,
     events: StepEvents,
     /// Shear force since the last segment reported.
     history: ForceHistory,
@@ -72,7 +72,7 @@ impl Grid {
         Self {
             step: GridStep::new(parameters, chain, step_length(parameters, tolerance)),
             is_on: false,
-            drive: GridDrive::default(),
+            drive: StepDrive::default(),
             events: StepEvents::default(),
             history: ForceHistory::default(),
             force: 0.0,
@@ -103,7 +103,8 @@ impl Grid {
     /// Takes over a frame that has moved.
     pub fn follow_frame(&mut self, chain: &Chain, frame: &Frame) {
         self.step.update_all(chain);
-        self.drive = frame.grid_drive(self.step.length);
+        self.drive = frame.step_drive(self.step.length);
+        self.step.turn = libm::sincos(self.drive.angle).into();
         self.history.restart(frame.time);
         self.last_break = f64::NEG_INFINITY;
     }
@@ -166,7 +167,7 @@ pub(super) fn advance<S: Simd, const R: usize>(
 ) -> usize {
     let Slider { chain, state, .. } = slider;
     let before = chain.drive_stiffness
-        * (grid.drive.displacement_before()
+        * (grid.drive.before(grid.step.turn).displacement()
             - (state.displacement[0][0] - grid.step.increment[0][0]));
     let done = march::<S, R>(
         simd,
@@ -177,7 +178,7 @@ pub(super) fn advance<S: Simd, const R: usize>(
         steps,
     );
     let at_start = grid.follow_run(done, before);
-    let start_bend = grid.drive.bend_before();
+    let start_bend = grid.drive.before(grid.step.turn).bend();
     let start = time + (done - 1) as f64 * grid.step.length;
     grid.events.changes.clear();
     grid.events.attachments.clear();
@@ -202,7 +203,7 @@ impl Integration<'_> {
     /// Writes the state s steps from the present one, from -1 to 0, into that before.
     fn look_back(&mut self, s: f64) -> Result<(), SimulationError> {
         let length = self.grid.step.length;
-        let drive = self.frame.drive_derivatives(length);
+        let drive = self.frame.step_drive(length);
         let input = StepInput {
             length,
             error: self.tolerances.step_error,
@@ -289,19 +290,12 @@ impl Integration<'_> {
         Ok(())
     }
 
-    /// Takes steps of the grid, to the end of the next that holds an event, within `horizon` s, or to the cut. False
-    /// if none has room.
+    /// Takes steps of the grid, to the end of the next that holds an event, or to the cut.
     pub(super) fn take_grid_steps(
         &mut self,
-        horizon: f64,
         observer: &mut dyn Observer,
-    ) -> Result<bool, SimulationError> {
+    ) -> Result<(), SimulationError> {
         let length = self.grid.step.length;
-        let room = horizon * self.grid.step.inverse_length;
-        if room < 1.0 {
-            self.leave_grid(observer);
-            return Ok(false);
-        }
         if !self.grid.is_on {
             self.enter_grid()?;
         }
@@ -314,7 +308,6 @@ impl Integration<'_> {
         if self.next_leap > self.frame.time {
             steps = steps.min(steps_until(self.next_leap));
         }
-        let steps = steps.min(floored(room));
         self.grid.events.cut = self.cut;
         let done = self
             .kernels
@@ -336,14 +329,13 @@ impl Integration<'_> {
         self.report_changes(start, observer);
         self.enter_dissipation_to(1.0);
         if self.frame.time >= self.cut {
-            self.step_back(observer)?;
-            return Ok(true);
+            return self.step_back(observer);
         }
         self.largest_force = self.largest_force.max(self.grid.force);
         if self.grid.history.count > MAX_HISTORY {
             self.report_force(1.0, observer);
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Enters the damping loss that goes with ∫ X'² ds in m².

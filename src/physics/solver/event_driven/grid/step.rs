@@ -14,7 +14,7 @@
 
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
-use crate::solver::event_driven::moving_frame::GridDrive;
+use crate::solver::event_driven::moving_frame::StepDrive;
 use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, Layout, State};
 
 /// Longest run of steps without a look at the clock.
@@ -79,6 +79,8 @@ pub struct GridStep {
     pub inverse_stiffness: f64,
     /// h²/m, in m/N.
     pub by_mass: f64,
+    /// Sine and cosine of ωh, by which the modulation turns in a step.
+    pub turn: [f64; 2],
     /// e², e g1 and e g2.
     decay: f64,
     first: f64,
@@ -130,6 +132,7 @@ impl GridStep {
             inverse_end: 1.0 / (1.0 + 2.0 / 3.0 * half),
             inverse_stiffness: 1.0 / chain.drive_stiffness,
             by_mass: square / chain.mass,
+            turn: [0.0, 1.0],
             decay: decay * decay,
             first: decay * g1,
             second: decay * g2,
@@ -283,7 +286,7 @@ pub(super) fn march<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     step: &mut GridStep,
-    drive: &mut GridDrive,
+    drive: &mut StepDrive,
     displacement: &mut [Row],
     steps: usize,
 ) -> usize {
@@ -303,7 +306,7 @@ fn march_in_registers<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     step: &mut GridStep,
-    drive: &mut GridDrive,
+    drive: &mut StepDrive,
     displacement: &mut [Row],
     steps: usize,
 ) -> usize {
@@ -371,7 +374,7 @@ fn march_in_registers<S: Simd, const R: usize>(
             reached[r] = x[r].reaches(simd.load(&upper[r])) | simd.load(&lower[r]).reaches(x[r]);
         }
         is_any = reached.iter().fold(0, |any, lanes| any | lanes) != 0;
-        drive.advance();
+        drive.advance(step.turn);
         x[0].store(&mut displacement[0]);
         step.trail[done] = chain.drive_stiffness * (drive.displacement() - displacement[0][0]);
         done += 1;
@@ -401,7 +404,7 @@ fn march_in_memory<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     step: &mut GridStep,
-    drive: &mut GridDrive,
+    drive: &mut StepDrive,
     displacement: &mut [Row],
     steps: usize,
 ) -> usize {
@@ -445,7 +448,7 @@ fn march_in_memory<S: Simd, const R: usize>(
             reached |= moved.reaches(simd.load(&upper[r])) | simd.load(&lower[r]).reaches(moved);
             (before, here) = (here, after);
         }
-        drive.advance();
+        drive.advance(step.turn);
         step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0][0]);
         if let Some(end_force) = &mut step.end_force {
             forces(simd, x, law, step.pulling * drive.displacement(), end_force);
@@ -521,7 +524,7 @@ fn dissipation<S: Simd>(
 
 /// What the drive adds to φ of block 1, and to its increment beside, in m.
 #[inline(always)]
-fn pushes(pulling: f64, second: f64, damping: f64, drive: &GridDrive) -> [f64; 2] {
+fn pushes(pulling: f64, second: f64, damping: f64, drive: &StepDrive) -> [f64; 2] {
     [
         pulling * drive.displacement(),
         second * pulling * (drive.bend() + damping * drive.increment()),
@@ -553,7 +556,7 @@ pub fn velocity<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     step: &mut GridStep,
-    drive: &GridDrive,
+    drive: &StepDrive,
     state: &mut State,
 ) {
     let rows = if R == 0 { chain.layout.rows } else { R };
@@ -628,7 +631,7 @@ mod tests {
         length: f64,
         x: &[f64],
         before: &[f64],
-    ) -> (Slider, GridStep, GridDrive) {
+    ) -> (Slider, GridStep, StepDrive) {
         let mut slider = Slider::new(parameters);
         let layout = slider.chain.layout;
         let mut step = GridStep::new(parameters, &slider.chain, length);
@@ -641,11 +644,11 @@ mod tests {
         (
             slider,
             step,
-            Frame::new(Drive::new(parameters), SPAN).grid_drive(length),
+            Frame::new(Drive::new(parameters), SPAN).step_drive(length),
         )
     }
 
-    fn take(slider: &mut Slider, step: &mut GridStep, drive: &mut GridDrive, mut steps: usize) {
+    fn take(slider: &mut Slider, step: &mut GridStep, drive: &mut StepDrive, mut steps: usize) {
         while steps > 0 {
             steps -= march::<_, 0>(
                 Baseline,

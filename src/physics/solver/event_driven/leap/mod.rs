@@ -58,12 +58,12 @@ pub(super) struct Bounds {
     pub error: f64,
     /// Largest shear force on record since the last break, in N. Every observer has seen it.
     pub largest_force: f64,
-    /// How long a leap from the grid, over reattachments, must be and may be, in s.
-    pub passing: Option<[f64; 2]>,
+    /// How long a leap from the grid, over reattachments, must be, in s.
+    pub passing: Option<f64>,
 }
 
 /// How long a leap over reattachments may be, in s, with free motion of at most `largest` m now; if that is less than
-/// it must be, after how many seconds to look again. A contact that attaches on the way holds its block back by its
+/// the `least` it must be, after how many seconds to look again. A contact that attaches on the way holds its block back by its
 /// stiffness times how far the block has moved since, which the driven solution leaves out; what all displace may be a
 /// part of the error.
 fn passing_horizon(
@@ -71,7 +71,7 @@ fn passing_horizon(
     (chain, interface): (&Chain, &mut Interface),
     drive: &Harmonic,
     Bounds { start, error, .. }: Bounds,
-    [least, most]: [f64; 2],
+    least: f64,
     largest: f64,
 ) -> Result<f64, f64> {
     let loose = libm::log(largest / (LOOSE * error)) / split.decay_rate;
@@ -80,7 +80,7 @@ fn passing_horizon(
     let mut displaced = 0.0;
     let mut rate = 0.0;
     let mut last = 0.0;
-    let mut limit = most;
+    let mut limit = f64::INFINITY;
     interface.look_ahead(|due, block, life| {
         let seconds = due - start;
         let by_then = displaced + rate * (seconds - last);

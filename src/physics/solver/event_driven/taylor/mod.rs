@@ -4,25 +4,17 @@
 //! order at which they converge, as described by À. Jorba and M. Zou, Exp. Math. 14, 99 (2005); a bound on each block's
 //! motion isolates the first crossing of a break position ([`first_exit`](polynomial::first_exit)).
 //!
-//! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of
-//! k_i a_i over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and
-//! g_p = h² (ΔP - ΔK x_j)_p/m, the motion changes by
-//!
-//! ```text
-//! at j:         δ2 ξ² + δ3 ξ³ + δ4 ξ⁴,   δ2 = g_0/2,   δ3 = g_1/6 - γh δ2/3,   δ4 = g_2/12 - γh δ3/4 - h² S_jj/m δ2/12
-//! at j-1, j+1:  h² K_int/m δ2/12 ξ⁴
-//! ```
-//!
-//! and by terms of higher order that spread along the chain. As long as these stay below a small part of the error of a
-//! step, the event is merged into it: the change is added to the series, which stays accurate after the event. The step
-//! ends where the series would no longer be accurate. Contract: events in the right order, also of blocks whose series
-//! has changed.
+//! An event changes the motion from there on ([`event`](super::event)). As long as the terms left out stay below a
+//! small part of the error of a step, it is merged into the step: the change is added to the series, which stays
+//! accurate after the event. The step ends where the series would no longer be accurate. Contract: events in the right
+//! order, also of blocks whose series has changed.
 
 mod series;
 
-pub(super) use self::series::{DriveDerivatives, Series, StepInput, evaluate, expand, reachable};
+pub(super) use self::series::{Series, StepInput, evaluate, expand, reachable};
 
 use super::Integration;
+use super::event::{own_terms, term_beside};
 use super::slider::{Chain, Layout, Slider};
 use crate::model::Change;
 use crate::solver::ledger::Audit;
@@ -159,28 +151,22 @@ impl Step {
 }
 
 impl Integration<'_> {
-    /// Takes one Taylor step of at most `horizon` s, to its end or soon after its first events, or to the cut.
-    pub(super) fn take_step(
-        &mut self,
-        horizon: f64,
-        observer: &mut dyn Observer,
-    ) -> Result<(), SimulationError> {
-        let until_attach = self.slider.interface.next_reattachment() - self.frame.time
-            + self.control.attach_window;
-        self.expand(horizon.min(until_attach))?;
+    /// Takes one Taylor step, to its end or soon after its first events, or to the cut.
+    pub(super) fn take_step(&mut self, observer: &mut dyn Observer) -> Result<(), SimulationError> {
+        let until_attach = self.slider.interface.next_reattachment() - self.frame.time;
+        self.expand(until_attach + self.control.attach_window)?;
         let start = self.step.start;
         let length = self.step.length;
         self.frame.check_resolution(length)?;
         self.summary.steps += 1;
         let mut done = 0.0;
         let cut = (self.cut - start) / length;
-        let mut end = (horizon / length).min(1.0);
         let mut merged = 0;
         let mut force = ForceAt {
             force: self.step.force[0],
             integral: 0.0,
         };
-        end = self.look_for_breaks(end);
+        let mut end = self.look_for_breaks(1.0);
         loop {
             let event = self.next_event(done, end.min(cut));
             let s = event.map_or(end.min(cut), |(_, _, s)| s);
@@ -326,12 +312,14 @@ impl Integration<'_> {
         let square = length * length;
         let stiffened = (interface.block_stiffness[block] - stiffness) * square / chain.mass;
         let pulled = (interface.block_pull[block] - pull) * square / chain.mass;
+        let forces = [
+            pulled - stiffened * x,
+            -stiffened * slope,
+            -stiffened * half_curvature,
+        ];
         let damping = chain.damping_rate * length;
-        let second = 0.5 * (pulled - stiffened * x);
-        let third = -stiffened * slope / 6.0 - damping * second / 3.0;
         let own = square * chain.at(&chain.diagonal, block);
-        let fourth =
-            -stiffened * half_curvature / 12.0 - 0.25 * damping * third - own * second / 12.0;
+        let [second, third, fourth] = own_terms(forces, damping, own);
         let window = self
             .tolerances
             .merged_window([second, third], length, chain.damping_rate);
@@ -341,7 +329,8 @@ impl Integration<'_> {
         self.step
             .amend(chain, block, about_start([second, third, fourth], s));
         if change == Change::Break {
-            let beside = about_start([0.0, 0.0, square * chain.coupling[0][0] * second / 12.0], s);
+            let beside = term_beside(second, square * chain.coupling[0][0]);
+            let beside = about_start([0.0, 0.0, beside], s);
             if block > 0 {
                 self.step.amend(chain, block - 1, beside);
             }
@@ -365,7 +354,7 @@ impl Integration<'_> {
         let Slider { chain, state, .. } = &self.slider;
         loop {
             let min_order = self.control.min_orders.get(halvings).copied().unwrap_or(0);
-            let drive = self.frame.drive_derivatives(length);
+            let drive = self.frame.step_drive(length);
             let input = StepInput {
                 length,
                 error: self.tolerances.step_error,

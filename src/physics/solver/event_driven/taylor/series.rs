@@ -8,6 +8,7 @@
 
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
+use crate::solver::event_driven::moving_frame::StepDrive;
 use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, Layout, State};
 use crate::solver::polynomial::{INVERSE, MAX_COEFFICIENTS};
 use pulp::Scalar512b;
@@ -28,28 +29,6 @@ const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
     }
     inverse
 };
-
-/// The drive's displacement U over a step: h^p U^(p), order after order, in m.
-#[derive(Clone, Copy, Debug)]
-pub struct DriveDerivatives {
-    /// Ramp at the start, and its rise over the step.
-    pub ramp: [f64; 2],
-    /// Δ cos θ and -Δ sin θ at the phase θ of the start.
-    pub swing: [f64; 2],
-    /// ω h, in rad.
-    pub angle: f64,
-}
-
-impl DriveDerivatives {
-    /// The term of one order; each call returns that of the next order.
-    #[inline(always)]
-    pub fn next_order(&mut self) -> f64 {
-        let term = self.ramp[0] + self.swing[0];
-        self.ramp = [self.ramp[1], 0.0];
-        self.swing = [self.angle * self.swing[1], -self.angle * self.swing[0]];
-        term
-    }
-}
 
 /// The series of one step.
 #[derive(Clone, Debug, Default)]
@@ -134,16 +113,12 @@ impl Series {
     }
 
     /// Writes the coefficients of F_S, in N, for a drive of `stiffness` N/m.
-    pub fn shear_force(
-        &self,
-        mut drive: DriveDerivatives,
-        stiffness: f64,
-        coefficients: &mut Vec<f64>,
-    ) {
+    pub fn shear_force(&self, mut drive: StepDrive, stiffness: f64, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
         let mut at = 0;
         for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
-            *coefficient = stiffness * inverse * (drive.next_order() - self.terms[at][0]);
+            *coefficient = stiffness * inverse * (drive.displacement() - self.terms[at][0]);
+            drive = drive.derivative();
             at += self.rows;
         }
     }
@@ -240,7 +215,7 @@ pub struct StepInput {
     pub error: f64,
     /// Order from which on the terms are compared with it.
     pub min_order: usize,
-    pub drive: DriveDerivatives,
+    pub drive: StepDrive,
 }
 
 /// Expands the state into a series; false if it does not converge within [`MAX_ORDER`]. Compiled for `R` rows, or for
@@ -292,7 +267,8 @@ pub fn expand<S: Simd, const R: usize>(
                 pull.mul_add(square, simd.load(row)).store(row);
             }
         }
-        let push = pulling * drive.next_order();
+        let push = pulling * drive.displacement();
+        drive = drive.derivative();
         if push != 0.0 {
             let first = simd.load(&FIRST_BLOCK);
             first
@@ -315,7 +291,7 @@ pub fn expand<S: Simd, const R: usize>(
 /// Least order from which on what a modulated drive adds to the orders left out, times their order, is within `error`
 /// m. Terms may vanish that the drive is still to make: at rest, those of the first four orders do.
 #[inline(always)]
-fn order_of_drive(drive: DriveDerivatives, pulling: f64, error: f64) -> usize {
+fn order_of_drive(drive: StepDrive, pulling: f64, error: f64) -> usize {
     let mut order = MIN_ORDER;
     // Of order + 1, times that; from here on they fall, since a step is at most four radians of the modulation.
     let mut term =
