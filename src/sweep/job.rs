@@ -135,7 +135,7 @@ mod tests {
         let default = of(Solver::default(), &Recording::default());
         assert_eq!(
             default.id(&Parameters::default(), &Symbol::ALL),
-            "8de35ee6538959f1dab461a0e6830f9f"
+            "2c170cc0b36cc42ee95cf55769f6ce90"
         );
         assert_eq!(
             identity().id(&modulated, &Symbol::ALL),
@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(
             (MODEL_VERSION, defaults.join(" ").as_str()),
             (
-                7,
+                8,
                 "N=70 Ns=20 M=11.5 K=1e8 Kd=4e7 ki=5e6 fs=1.37 dfs=0.0069 tau_r=0.005 gamma=6462 \
                 V0=1e-4 Delta=0 T=none T_to=none Delta_to=none ramp_time=0 \
                 pulse_start=none pulse_cycles=none FN=4000 L=0.15 break_on=magnitude seed=0 \

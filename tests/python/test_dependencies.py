@@ -11,7 +11,7 @@ from conftest import ROOT
 
 # Calls that need the crates.
 CARGO = re.compile(r"\bcargo (build|clippy|doc|run|test)\b")
-MANIFESTS = [ROOT / path / "Cargo.toml" for path in ("", "src/physics", "python")]
+MANIFESTS = [ROOT / path / "Cargo.toml" for path in ("", "crates/physics", "python")]
 OWN = ("stickslip", "stickslip-physics")
 DENY = tomllib.loads((ROOT / "deny.toml").read_text())
 

@@ -16,3 +16,7 @@ pub mod model;
 pub mod observe;
 pub mod solver;
 pub mod value;
+
+#[doc = include_str!("../README.md")]
+#[cfg(doctest)]
+struct Readme;

@@ -281,9 +281,10 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
         let end = x[row][lane];
         let rise = step.increment[row][lane];
         let force = step.force_on(&place, end, place.beside(x), drive.displacement());
-        // A parabola is enough, as the force of an unstressed contact only grows.
+        // A cubic from the end is enough, as the force of an unstressed contact only grows.
         let bend = step.damping.mul_add(-rise, force);
-        let x = end - left * (rise + 0.5 * s * bend);
+        let jerk = step.rate_of_force(&place, rise, place.beside(&step.increment), drive);
+        let x = end - left * (rise + s * (0.5 * bend - SIXTH * (1.0 + left) * jerk));
         let change = slider.interface.reattach_running(simd, x);
         if events.wants_attachments {
             events.changes.push(change);
@@ -472,6 +473,28 @@ mod tests {
             let [x, ..] = path.at(s);
             prop_assert!((x - level).abs() < 1e-8, "{} at {}, not {}", x, s, level);
         }
+    }
+
+    #[test]
+    fn a_path_is_at_once_at_the_level_where_it_begins() {
+        let curved = [
+            0.028_374_695_423_159_856,
+            0.045_693_419_018_870_99,
+            0.026_611_963_530_136_448,
+        ];
+        let from = 0.278_173_423_255_389_96;
+        let path = path(
+            [
+                0.3,
+                -0.281_292_960_401_967_8,
+                curved[0],
+                curved[1],
+                curved[2],
+            ],
+            from,
+        );
+        let s = path.crossing(path.at(from)[0]);
+        assert!((s - from).abs() < 1e-8, "{s}");
     }
 
     #[test]

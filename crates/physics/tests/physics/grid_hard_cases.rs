@@ -3,10 +3,12 @@
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use stickslip::model::equation::StiffnessMatrix;
-use stickslip::model::{Change, ContactEvent, Parameters};
-use stickslip::observe::{AttachedMap, ContactLog, Observers, Recording, SlipObserver, Trace};
-use stickslip::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate};
+use stickslip_physics::model::equation::StiffnessMatrix;
+use stickslip_physics::model::{Change, ContactEvent, Parameters};
+use stickslip_physics::observe::{
+    AttachedMap, ContactLog, Observers, Recording, SlipObserver, Trace,
+};
+use stickslip_physics::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate};
 
 const fn solver(tolerance: f64, resolve: Resolve) -> Solver {
     Solver {

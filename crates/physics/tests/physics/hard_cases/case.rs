@@ -8,9 +8,9 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
-use stickslip::model::{ParameterError, Parameters, Symbol, Value};
-use stickslip::observe::{Recording, SlipObserver};
-use stickslip::solver::{
+use stickslip_physics::model::{ParameterError, Parameters, Symbol, Value};
+use stickslip_physics::observe::{Recording, SlipObserver};
+use stickslip_physics::solver::{
     Limits, Method, Resolve, SimulationError, Solver, Summary, simulate_audited,
 };
 

@@ -1,9 +1,9 @@
 //! A ramp of the modulation within a run: the same in both solvers, exact, and balanced, also where it is steep.
 
 use std::collections::HashMap;
-use stickslip::model::{Change, Parameters};
-use stickslip::observe::{ContactLog, Observers, Trace};
-use stickslip::solver::{Limits, Resolve, Solver, simulate, simulate_audited};
+use stickslip_physics::model::{Change, Parameters};
+use stickslip_physics::observe::{ContactLog, Observers, Trace};
+use stickslip_physics::solver::{Limits, Resolve, Solver, simulate, simulate_audited};
 
 /// Period and amplitude change a lot before the first break, near 0.06 s.
 fn ramped() -> Parameters {

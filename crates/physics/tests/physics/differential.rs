@@ -10,10 +10,10 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use stickslip::model::equation::largest_frequency;
-use stickslip::model::{BreakOn, Change, ContactEvent, Parameters};
-use stickslip::observe::{Observers, Recording, Slip, SlipObserver};
-use stickslip::solver::{Limits, Observer, Resolve, Solver, simulate};
+use stickslip_physics::model::equation::largest_frequency;
+use stickslip_physics::model::{BreakOn, Change, ContactEvent, Parameters};
+use stickslip_physics::observe::{Observers, Recording, Slip, SlipObserver};
+use stickslip_physics::solver::{Limits, Observer, Resolve, Solver, simulate};
 
 /// Block, contact and generation.
 type Life = (usize, usize, u32);

@@ -1,11 +1,11 @@
 //! Beyond the paper's parameters: steady sliding ends a job, what counts as a slip, and what is measured of it.
 
 use std::sync::atomic::AtomicBool;
-use stickslip::model::{Change, Parameters};
-use stickslip::observe::{
+use stickslip_physics::model::{Change, Parameters};
+use stickslip_physics::observe::{
     ContactLog, Measurements, Observers, Recording, Regime, Slip, SlipObserver, measure,
 };
-use stickslip::solver::{Limits, Resolve, Solver, simulate};
+use stickslip_physics::solver::{Limits, Resolve, Solver, simulate};
 
 fn measured(parameters: &Parameters, recording: Recording) -> Measurements {
     let parameters = parameters.clone().validated().unwrap();

@@ -247,6 +247,24 @@ impl GridStep {
         self.dissipation = self.dissipation.map(|sum| sum + change);
     }
 
+    /// What φ of a block gains in a step, from the rises of it and of both blocks beside together, in m.
+    #[inline(always)]
+    pub(super) fn rate_of_force(
+        &self,
+        place: &Place,
+        rise: f64,
+        beside: f64,
+        drive: &StepDrive,
+    ) -> f64 {
+        let (row, lane) = place.slot;
+        let pulled = if place.slot == (0, 0) {
+            self.pulling * drive.increment()
+        } else {
+            0.0
+        };
+        self.diagonal[row][lane].mul_add(rise, self.coupling.mul_add(beside, pulled))
+    }
+
     /// φ of a block at the displacements of it, of both blocks beside together, and of the drive, in m.
     #[inline(always)]
     pub(super) fn force_on(&self, place: &Place, here: f64, beside: f64, driven: f64) -> f64 {

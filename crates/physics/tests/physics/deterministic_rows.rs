@@ -2,13 +2,13 @@
 //!
 //! Reference values were computed independently of this program; each test allows the rounding of their last digit.
 
-use stickslip::model::equation::{StiffnessMatrix, largest_frequency};
-use stickslip::model::theory::{
+use stickslip_physics::model::equation::{StiffnessMatrix, largest_frequency};
+use stickslip_physics::model::theory::{
     load_maximum_phase, minimum_phase, minimum_phase_asymptote, total_strength,
 };
-use stickslip::model::{Change, Parameters};
-use stickslip::observe::{ContactLog, Profile};
-use stickslip::solver::{Limits, Solver, simulate};
+use stickslip_physics::model::{Change, Parameters};
+use stickslip_physics::observe::{ContactLog, Profile};
+use stickslip_physics::solver::{Limits, Solver, simulate};
 
 /// Decay rate of the displacement per block in Eq. 1, `sqrt(K_s/K_int)`; infinite for a single block.
 fn decay_per_block(parameters: &Parameters) -> f64 {

@@ -2,9 +2,9 @@
 //! chooses it.
 
 use std::collections::HashMap;
-use stickslip::model::{Change, ContactEvent, Parameters};
-use stickslip::observe::{ContactLog, Recording, SlipObserver};
-use stickslip::solver::{GRID_TOLERANCE, Limits, Resolve, Solver, Summary, simulate};
+use stickslip_physics::model::{Change, ContactEvent, Parameters};
+use stickslip_physics::observe::{ContactLog, Recording, SlipObserver};
+use stickslip_physics::solver::{GRID_TOLERANCE, Limits, Resolve, Solver, Summary, simulate};
 
 fn modulated() -> Parameters {
     Parameters {
@@ -123,8 +123,8 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
     /// Follows attachments, counts what is attached and passes everything on.
     struct Following(SlipObserver, u64);
 
-    impl stickslip::solver::Observer for Following {
-        fn advance(&mut self, segment: &stickslip::solver::Segment<'_>) {
+    impl stickslip_physics::solver::Observer for Following {
+        fn advance(&mut self, segment: &stickslip_physics::solver::Segment<'_>) {
             self.0.advance(segment);
         }
 

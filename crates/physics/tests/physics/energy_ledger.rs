@@ -1,9 +1,9 @@
 //! The energy ledger balances: an error certificate of every solver, on the model of Fig. 1.
 
 use std::sync::atomic::AtomicBool;
-use stickslip::model::Parameters;
-use stickslip::observe::{ContactLog, Observers, Recording, SlipObserver, measure};
-use stickslip::solver::{Limits, Resolve, Solver, simulate, simulate_audited};
+use stickslip_physics::model::Parameters;
+use stickslip_physics::observe::{ContactLog, Observers, Recording, SlipObserver, measure};
+use stickslip_physics::solver::{Limits, Resolve, Solver, simulate, simulate_audited};
 
 const LIMITS: Limits<'static> = Limits {
     end_time: 0.25,
@@ -174,7 +174,7 @@ fn the_work_of_the_drive_over_many_slips_goes_into_damping_and_broken_contacts()
             &AtomicBool::new(false),
         )
         .unwrap();
-        let total = |energy: &dyn Fn(&stickslip::observe::Slip) -> Option<f64>| -> f64 {
+        let total = |energy: &dyn Fn(&stickslip_physics::observe::Slip) -> Option<f64>| -> f64 {
             measured
                 .slips
                 .iter()

@@ -3,9 +3,9 @@
 mod case;
 
 use case::{HardCase, hard_cases};
-use stickslip::model::{Change, Parameters};
-use stickslip::observe::{ContactLog, Observers, Profile, Recording, SlipObserver};
-use stickslip::solver::{Limits, Resolve, SimulationError, Solver, simulate};
+use stickslip_physics::model::{Change, Parameters};
+use stickslip_physics::observe::{ContactLog, Observers, Profile, Recording, SlipObserver};
+use stickslip_physics::solver::{Limits, Resolve, SimulationError, Solver, simulate};
 
 #[track_caller]
 fn all_pass(threat: &str) {

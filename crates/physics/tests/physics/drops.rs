@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-use stickslip::model::Parameters;
-use stickslip::observe::{Drops, Recording, Slip, measure};
-use stickslip::solver::Solver;
+use stickslip_physics::model::Parameters;
+use stickslip_physics::observe::{Drops, Recording, Slip, measure};
+use stickslip_physics::solver::Solver;
 
 /// Slips of four seeds.
 fn slips(parameters: &Parameters, slips: u64, drop_size: Option<f64>) -> Vec<Slip> {

@@ -454,4 +454,13 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_constant_never_crosses() {
+        let constant = [0.391_297_004_391_785, 0.0];
+        for level in [0.001, 0.05] {
+            let levels = [constant[0] - level, constant[0] + level];
+            assert_eq!(first_exit(&mut constant.to_vec(), levels, 0.0, 0.05), None);
+        }
+    }
 }

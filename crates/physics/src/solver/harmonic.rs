@@ -202,28 +202,49 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn assert_first(driven: Harmonic, level: f64, from: f64) {
+        let rise = driven.first_rise_to(level, from);
+        assert!(rise >= from);
+        let fall = driven.first_fall_to(-level, from);
+        for i in 1..2000 {
+            let value_at =
+                |end: f64| driven.value(from + (end - from).min(50.0) * f64::from(i) / 2001.0);
+            assert!(
+                rise == from || value_at(rise) < level + 1e-9,
+                "rise missed: {driven:?}"
+            );
+            assert!(
+                fall == from || value_at(fall) > -level - 1e-9,
+                "fall missed: {driven:?}"
+            );
+        }
+        if rise > from {
+            assert!((driven.value(rise) - level).abs() < 1e-9);
+        }
+        if fall.is_finite() && fall > from {
+            assert!((driven.value(fall) + level).abs() < 1e-9);
+        }
+    }
+
     proptest! {
         #[test]
         fn the_first_rise_and_fall_of_a_driven_block_are_the_first(
             start in -1.0_f64..1.0, rate in 0.001_f64..2.0, amplitude in 0.0_f64..1.5, phase in -7.0_f64..7.0,
             level in 0.0_f64..4.0, from in 0.0_f64..9.0
         ) {
-            let driven = Harmonic { start, rate, amplitude, phase, angular_frequency: 2.5 };
-            let rise = driven.first_rise_to(level, from);
-            prop_assert!(rise >= from);
-            let fall = driven.first_fall_to(-level, from);
-            for i in 1..2000 {
-                let elapsed = from + (rise - from).min(50.0) * f64::from(i) / 2001.0;
-                prop_assert!(rise == from || driven.value(elapsed) < level + 1e-9, "rise missed at {}", elapsed);
-                let elapsed = from + (fall - from).min(50.0) * f64::from(i) / 2001.0;
-                prop_assert!(fall == from || driven.value(elapsed) > -level - 1e-9, "fall missed at {}", elapsed);
-            }
-            if rise > from {
-                prop_assert!((driven.value(rise) - level).abs() < 1e-9);
-            }
-            if fall.is_finite() && fall > from {
-                prop_assert!((driven.value(fall) + level).abs() < 1e-9);
-            }
+            assert_first(Harmonic { start, rate, amplitude, phase, angular_frequency: 2.5 }, level, from);
         }
+    }
+
+    #[test]
+    fn a_level_passed_long_ago_is_reached_at_once() {
+        let ramp = Harmonic {
+            start: 0.0,
+            rate: 1.860_662_955_836_161_1,
+            amplitude: 0.0,
+            phase: 0.0,
+            angular_frequency: 2.5,
+        };
+        assert_first(ramp, 0.0, 5.359_564_334_310_364);
     }
 }

@@ -1,7 +1,7 @@
 //! Both solvers follow the equation of motion, as a plain integration of its plain form shows.
 
-use stickslip::model::{Change, ContactEvent, Drive, Parameters};
-use stickslip::solver::{Limits, Observer, Solver, simulate};
+use stickslip_physics::model::{Change, ContactEvent, Drive, Parameters};
+use stickslip_physics::solver::{Limits, Observer, Solver, simulate};
 
 /// Shear force `F_S = K_d (u(t) - x_1)` at a time in s, for a trailing edge at `trailing_edge` m, in N.
 fn shear_force(drive: &Drive, time: f64, trailing_edge: f64) -> f64 {
