@@ -193,6 +193,7 @@ mod tests {
             timed_slips: 0,
         };
         let method = MethodRow {
+            unbalanced: None,
             parameters: Selected::new(parameters.clone()),
             case: "defaults".to_owned(),
             solver: solver.clone(),
@@ -200,6 +201,7 @@ mod tests {
             break_times,
         };
         let untested = MethodRow {
+            unbalanced: None,
             break_times: BreakErrors::default(),
             ..method.clone()
         };

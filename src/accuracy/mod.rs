@@ -102,6 +102,8 @@ columns! {
         solver: SolverColumns;
         cost: Cost;
         break_times: BreakErrors;
+        unbalanced: Option<f64> = "",
+            "largest share of the work of the drive that does not balance, over a few jobs; of the sweep's solver alone";
     }
 }
 

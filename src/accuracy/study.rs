@@ -9,9 +9,9 @@
 use super::comparison::{Bias, BreakErrors, Comparison, Reference, Sample};
 use super::{BiasRow, Cost, Findings, MethodRow, SolverColumns, set_in_words};
 use crate::model::{Parameters, Selected};
-use crate::observe::{Measurements, Recording, Slip, measure};
+use crate::observe::{Measurements, Recording, Slip, SlipObserver, measure};
 use crate::run::limits;
-use crate::solver::{Observer, Resolve, Solver, Summary};
+use crate::solver::{Limits, Observer, Resolve, Solver, Summary, simulate_audited};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -25,6 +25,8 @@ const TIGHTEST_TOLERANCE: f64 = 1e-12;
 const ENSEMBLE_TOLERANCE: f64 = 1e-10;
 /// Seeds of the reference ensemble are so far from those of the methods: the samples are independent.
 const REFERENCE_SEEDS: u64 = 1_000_000;
+/// Jobs that keep an energy ledger at each set.
+const AUDITED_JOBS: u64 = 3;
 /// Seeds of the reference ensemble for each one of a method: more, so that its own error matters less.
 const REFERENCE_SHARE: u64 = 2;
 
@@ -248,6 +250,9 @@ impl Study {
                     solver: solver.into(),
                     cost: ensemble.cost(mean_interval),
                     break_times,
+                    unbalanced: (solver == self.own)
+                        .then(|| self.unbalanced(parameters, solver))
+                        .transpose()?,
                 });
                 if !self.is_stretch_only(parameters, solver) {
                     let untimed = first + self.seeds..first + seeds;
@@ -297,6 +302,28 @@ impl Study {
         let mut comparison = Comparison::new(reference);
         simulated(parameters, solver, &mut comparison)?;
         Ok(comparison.errors())
+    }
+
+    /// The largest residual of the energy ledger over a few jobs.
+    fn unbalanced(&self, parameters: &Parameters, solver: Solver) -> Result<f64> {
+        let mut largest: f64 = 0.0;
+        for seed in self.first_seed..self.first_seed + AUDITED_JOBS {
+            let parameters = parameters.with_seed(seed);
+            let mut recording = self.recording();
+            if self.is_stretch_only(&parameters, solver) {
+                recording.max_time = solver.time_step.map(|step| step * self.timed_steps as f64);
+            }
+            let limits = Limits {
+                end_time: recording.max_time.unwrap_or(f64::INFINITY),
+                events: recording.max_events,
+                interrupt: None,
+            };
+            let mut observer = SlipObserver::new(&parameters, &recording);
+            let (_, ledger) = simulate_audited(&parameters, solver, limits, &mut observer)
+                .with_context(|| in_words(&parameters, solver))?;
+            largest = largest.max(ledger.residual().abs());
+        }
+        Ok(largest)
     }
 
     /// Whether slips of this solver would take too long.

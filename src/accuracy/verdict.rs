@@ -73,6 +73,7 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
     };
     let mut lines = vec![format!("{subject} ({own}): {finding}.")];
     lines.extend(break_errors(&rows));
+    lines.extend(unbalanced(&rows));
     lines.extend(statistical_error(study, &intervals, most.is_some()));
     lines.extend(tighter(findings, &rows));
     lines
@@ -97,6 +98,15 @@ fn break_errors(rows: &[&MethodRow]) -> Option<String> {
     let most_off = largest(|row| row.break_times.largest)?;
     Some(format!(
         "Before trajectories part, breaks are off by {median:.0e} s in the median, and by {most_off:.0e} s at most."
+    ))
+}
+
+/// How well energy balances in jobs of the sweep.
+fn unbalanced(rows: &[&MethodRow]) -> Option<String> {
+    let residuals = rows.iter().filter_map(|row| row.unbalanced);
+    let largest = residuals.reduce(f64::max)?;
+    Some(format!(
+        "Energy balances to {largest:.0e} of the work of the drive."
     ))
 }
 
@@ -197,6 +207,7 @@ mod tests {
 
     fn method(solver: Solver, error: f64, per_slip: f64) -> MethodRow {
         MethodRow {
+            unbalanced: None,
             parameters: Selected::new(Parameters::default()),
             case: String::new(),
             solver: solver.into(),
