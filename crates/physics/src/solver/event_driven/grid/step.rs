@@ -11,6 +11,8 @@
 //! drive u adds to the second derivative of the force. It is exact for damping, for equilibrium and for uniform motion.
 //! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present
 //! law.
+//!
+//! Steps are written twice: with the motion in registers and in memory. One loop for both costs 3 to 4 % of a run.
 
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
@@ -578,51 +580,34 @@ pub fn velocity<S: Simd, const R: usize>(
     state: &mut State,
 ) {
     let rows = if R == 0 { chain.layout.rows } else { R };
-    let last = rows - 1;
     step.saved_displacement.copy_from_slice(&state.displacement);
     step.saved_increment.copy_from_slice(&step.increment);
     let mut ahead = *drive;
     march_in_memory::<S, R>(simd, chain, step, &mut ahead, &mut state.displacement, 1);
     state.displacement.copy_from_slice(&step.saved_displacement);
-    // Central differences, in the place of the displacements after the step.
+    // Central differences, in the place of the displacements after the step, and what damping adds to the third
+    // derivative, in that of the increments.
     let central = &mut step.saved_displacement[..rows];
-    for ((central, before), after) in central
-        .iter_mut()
-        .zip(&step.saved_increment)
-        .zip(&step.increment)
-    {
-        simd.load(before)
-            .plus(simd.load(after))
-            .times(simd.splat(0.5))
-            .store(central);
+    let damped = &mut step.increment[..rows];
+    let damping = simd.splat(-step.damping);
+    for r in 0..rows {
+        let before = simd.load(&step.saved_increment[r]);
+        let sum = before.plus(simd.load(&damped[r]));
+        let mean = sum.times(simd.splat(0.5));
+        mean.store(&mut central[r]);
+        let bend = mean.mul_add(damping, simd.load(&step.force[r]));
+        bend.times(damping).store(&mut damped[r]);
+    }
+    let law = [&*damped, &step.diagonal[..rows], &step.couplings[..rows]];
+    let third = &mut step.force[..rows];
+    forces(simd, central, law, step.pulling * drive.increment(), third);
+    for r in 0..rows {
+        let third = simd.load(&third[r]);
+        let increment = third.mul_add(simd.splat(-1.0 / 6.0), simd.load(&central[r]));
+        let velocity = increment.times(simd.splat(step.inverse_length));
+        velocity.store(&mut state.velocity[r]);
     }
     step.increment.copy_from_slice(&step.saved_increment);
-    let first_lane = simd.load(&FIRST_BLOCK);
-    let damping = simd.splat(-step.damping);
-    let mut before = simd.load(&central[last]).to_next_lane();
-    let mut here = simd.load(&central[0]);
-    let beyond = here.to_lane_before();
-    for r in 0..rows {
-        let after = if r < last {
-            simd.load(&central[r + 1])
-        } else {
-            beyond
-        };
-        let bend = here.mul_add(damping, simd.load(&step.force[r]));
-        let mut third = bend.times(damping);
-        if r == 0 {
-            third = first_lane.mul_add(simd.splat(step.pulling * drive.increment()), third);
-        }
-        third = here.mul_add(simd.load(&step.diagonal[r]), third);
-        third = before
-            .plus(after)
-            .mul_add(simd.load(&step.couplings[r]), third);
-        let increment = third.mul_add(simd.splat(-1.0 / 6.0), here);
-        increment
-            .times(simd.splat(1.0 / step.length))
-            .store(&mut state.velocity[r]);
-        (before, here) = (here, after);
-    }
 }
 
 #[cfg(test)]
