@@ -12,7 +12,10 @@ import pyarrow.parquet as pq
 import pytest
 from conftest import ROOT
 
-PAGES = [*map(ROOT.joinpath, ("README.md", "CHANGELOG.md", "results/README.md")), *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *map(ROOT.joinpath, ("README.md", "CHANGELOG.md", "results/README.md", "crates/physics/README.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+]
 
 
 def name(page):
@@ -180,7 +183,7 @@ def test_links_lead_somewhere(page):
 
 
 def test_pages_named_in_sources_exist():
-    folders = ("src", "scripts", "sweeps", "python", "tests")
+    folders = ("src", "crates", "scripts", "sweeps", "python", "tests")
     files = [
         file for folder in folders for file in (ROOT / folder).rglob("*") if file.suffix in ("", ".rs", ".py", ".toml")
     ]

@@ -10,6 +10,7 @@ mod differential;
 mod drops;
 mod energy_ledger;
 mod equation_of_motion;
+mod examples;
 mod grid;
 mod grid_hard_cases;
 mod hard_cases;
