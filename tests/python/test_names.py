@@ -9,7 +9,7 @@ from conftest import ROOT
 
 SOURCES = {
     path: path.read_text()
-    for folder in ("src", "python", "tests", "benches", "scripts")
+    for folder in ("src", "crates", "python", "tests", "benches", "scripts")
     for path in sorted((ROOT / folder).rglob("*"))
     if path.is_file() and path.suffix in ("", ".rs", ".py", ".js")
 }
