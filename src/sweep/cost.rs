@@ -214,9 +214,9 @@ fn step_length(parameters: &Parameters) -> f64 {
         .max(of_modulation)
 }
 
-/// Bytes of memory. Measured with all methods on 100 to 100,000 blocks with 2 to 10,000 contacts each: 340 a contact
+/// Bytes of memory. Measured with all methods on 100 to 100,000 blocks with 2 to 10,000 contacts each: 150 a contact
 /// and 1170 a block from the beginning of a job on, and 320 a slip.
-const MEMORY_OF_A_CONTACT: f64 = 350.0;
+const MEMORY_OF_A_CONTACT: f64 = 155.0;
 const MEMORY_OF_A_BLOCK: f64 = 1250.0;
 /// Until its part is committed, which takes the same again.
 pub(super) const MEMORY_OF_A_SLIP: f64 = 600.0;

@@ -139,7 +139,7 @@ mod tests {
         );
         assert_eq!(
             identity().id(&modulated, &Symbol::ALL),
-            "bb31b1d2c30bd4a0fb4143cca6aa8453"
+            "a222cc3c059a14192ba1a6f92a7b4939"
         );
         assert_eq!(
             identity().id(&modulated, AllButSeed::SYMBOLS),

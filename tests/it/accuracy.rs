@@ -98,7 +98,9 @@ fn a_sweep_gets_its_verdict_in_the_first_lines_and_the_result_beside_its_own() {
     );
     assert!(lines[0].contains("too few slips: "), "{}", lines[0]);
     assert!(
-        lines[1].contains("breaks are off by") && lines[2].contains("Statistical error"),
+        lines[1].contains("breaks are off by")
+            && lines[2].starts_with("Energy balances to ")
+            && lines[3].contains("Statistical error"),
         "{}",
         ended.stdout
     );

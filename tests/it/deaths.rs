@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const BIG: &str = "\
 name = \"big\"
 [model]
-Ns = 100
+Ns = 226
 [axes]
 N = [3, 20000, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25]
 seed = { count = 4 }
@@ -92,7 +92,7 @@ fn assert_named(folder: &Folder, directory: &str) {
         );
     }
     assert!(
-        status.contains("stickslip simulate --set N=20000 --set Ns=100"),
+        status.contains("stickslip simulate --set N=20000 --set Ns=226"),
         "{status}"
     );
     folder.ends(0, &format!("run {directory} --no-reduce"));

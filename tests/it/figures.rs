@@ -172,7 +172,7 @@ fn each_option_of_a_figure_changes_what_it_says() {
         ("--panels Delta", ">(b)<"),
         (
             "--xlim 1e-5:1e-4 --size 250mmx90mm",
-            "not shown: 10 of 16 sets",
+            "not shown: 9 of 16 sets",
         ),
         ("--xlabel speed", ">speed<"),
         // XML cannot hold it.
