@@ -1,4 +1,5 @@
 //! The first slip of the paper's slider: when it begins, how large it is, and whether its energy balances.
+#![allow(clippy::print_stdout, reason = "an example")]
 
 use stickslip_physics::model::Parameters;
 use stickslip_physics::observe::{Recording, SlipObserver};

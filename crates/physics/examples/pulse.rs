@@ -1,4 +1,5 @@
 //! One period of modulation before the slider would slip: how much earlier its next slip comes.
+#![allow(clippy::print_stdout, reason = "an example")]
 
 use std::error::Error;
 use std::sync::atomic::AtomicBool;

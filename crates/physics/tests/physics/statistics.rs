@@ -17,6 +17,7 @@ use stickslip_physics::model::equation::StiffnessMatrix;
 use stickslip_physics::model::{Change, ContactEvent, Parameters};
 use stickslip_physics::observe::{Measurements, Recording, measure};
 use stickslip_physics::solver::{Limits, Observer, Resolve, Segment, Solver, simulate};
+use stickslip_physics::value::floored;
 
 /// Intervals between slips past start-up, in s, sorted.
 struct Intervals(Vec<f64>);
@@ -25,9 +26,8 @@ impl Intervals {
     /// Interpolated linearly.
     fn quantile(&self, share: f64) -> f64 {
         let rank = share * (self.0.len() - 1) as f64;
-        let below = rank.floor();
-        let pair = [below, rank.ceil()].map(|place| self.0[place as usize]);
-        pair[0] + (rank - below) * (pair[1] - pair[0])
+        let pair = [rank.floor(), rank.ceil()].map(|place| self.0[floored(place)]);
+        pair[0] + rank.fract() * (pair[1] - pair[0])
     }
 
     /// Of this many slips for each seed, with the default solver.
