@@ -143,7 +143,7 @@ mod tests {
         );
         assert_eq!(
             identity().id(&modulated, AllButSeed::SYMBOLS),
-            "025166b744a818ccc1e32c2fbb0fe56e"
+            "3732eed4518ef4d6b2f14de8a7a287d1"
         );
     }
 

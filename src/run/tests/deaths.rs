@@ -178,7 +178,7 @@ fn run_kernel_within(
     retry_failed: bool,
     kernel: &Kernel<'_>,
 ) -> RunReport {
-    let text = "name = \"big\"\n[model]\nNs = 100\n[axes]\nN = [3, 100000, 4]\nseed = { count = 2 }\n[record]\nslips = 2\n";
+    let text = "name = \"big\"\n[model]\nNs = 226\n[axes]\nN = [3, 100000, 4]\nseed = { count = 2 }\n[record]\nslips = 2\n";
     let sweep = Sweep::parse(text, Path::new("big.toml")).unwrap();
     let stop = AtomicBool::new(false);
     let options = Options {
@@ -284,7 +284,7 @@ fn other_failures_do_not_run_again_by_themselves_however_much_memory_there_is() 
 #[test]
 fn jobs_that_do_not_fit_beside_each_other_run_one_after_the_other_and_the_log_says_so() {
     let root = tempfile::tempdir().unwrap();
-    let text = "name = \"big\"\n[model]\nN = 10000\nNs = 100\n[axes]\nseed = { count = 6 }\n[record]\nslips = 2\n";
+    let text = "name = \"big\"\n[model]\nN = 10000\nNs = 226\n[axes]\nseed = { count = 6 }\n[record]\nslips = 2\n";
     let sweep = Sweep::parse(text, Path::new("big.toml")).unwrap();
     let running = AtomicU64::new(0);
     let most = AtomicU64::new(0);
