@@ -178,7 +178,7 @@ fn run_kernel_within(
     retry_failed: bool,
     kernel: &Kernel<'_>,
 ) -> RunReport {
-    let text = "name = \"big\"\n[model]\nNs = 226\n[axes]\nN = [3, 100000, 4]\nseed = { count = 2 }\n[record]\nslips = 2\n";
+    let text = "name = \"big\"\n[model]\nNs = 100\n[axes]\nN = [3, 100000, 4]\nseed = { count = 2 }\n[record]\nslips = 2\n";
     let sweep = Sweep::parse(text, Path::new("big.toml")).unwrap();
     let stop = AtomicBool::new(false);
     let options = Options {
@@ -201,7 +201,7 @@ fn a_job_that_may_take_too_much_memory_begins_when_all_that_is_finished_is_commi
     for _ in 0..20 {
         let root = tempfile::tempdir().unwrap();
         let committed = Mutex::new(Vec::new());
-        run_kernel_within(root.path(), 3e9, false, &|job, interrupt| {
+        run_kernel_within(root.path(), 1.4e9, false, &|job, interrupt| {
             if job.parameters.blocks == 100_000 {
                 let results = Results::read(&Layout::new(&Disk, root.path())).unwrap();
                 let jobs = status(&results, MAX_FAILURES).unwrap().overview.jobs_done;
@@ -218,7 +218,7 @@ fn what_memory_forbids_fails_with_its_reason_and_runs_again_by_itself_where_it_f
     let whole = tempfile::tempdir().unwrap();
     assert_eq!(run_within(whole.path(), f64::INFINITY, false).0.jobs_run, 6);
     let root = tempfile::tempdir().unwrap();
-    let (report, blocks) = run_within(root.path(), 1.5e9, false);
+    let (report, blocks) = run_within(root.path(), 0.7e9, false);
     assert_eq!(
         (report.jobs_run, report.jobs_failed, report.jobs_left),
         (6, 2, 0)
@@ -226,7 +226,7 @@ fn what_memory_forbids_fails_with_its_reason_and_runs_again_by_itself_where_it_f
     assert_eq!(blocks, [3, 3, 4, 4]);
     let reasons = texts(root.path(), "jobs", "reason");
     let reason =
-        "memory: needs at least 2.5 GB, 1.5 GB allowed here; run it again where more is allowed";
+        "memory: needs at least 1.2 GB, 700 MB allowed here; run it again where more is allowed";
     assert_eq!(
         reasons.iter().filter(|found| *found == reason).count(),
         2,
@@ -235,20 +235,20 @@ fn what_memory_forbids_fails_with_its_reason_and_runs_again_by_itself_where_it_f
 
     // It still does not fit, even if failed jobs are to run again.
     for retry_failed in [false, true] {
-        let (report, blocks) = run_within(root.path(), 2e9, retry_failed);
+        let (report, blocks) = run_within(root.path(), 0.9e9, retry_failed);
         assert_eq!(
             (report.jobs_failed, report.jobs_left, blocks),
             (2, 0, vec![])
         );
     }
-    let (report, blocks) = run_within(root.path(), 3e9, false);
+    let (report, blocks) = run_within(root.path(), 1.4e9, false);
     assert_eq!(
         (report.jobs_run, report.jobs_failed, report.jobs_left),
         (2, 0, 0)
     );
     assert_eq!(blocks, [100_000; 2]);
     assert!(files_of(root.path(), "tables") == files_of(whole.path(), "tables"));
-    let (report, blocks) = run_within(root.path(), 1e9, true);
+    let (report, blocks) = run_within(root.path(), 0.5e9, true);
     assert_eq!(
         (report.jobs_run, report.jobs_failed, blocks),
         (0, 0, vec![])
