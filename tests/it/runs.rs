@@ -56,7 +56,7 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     // Of a job's contacts, blocks and slips, and of the slips of a part, which here is a job.
     assert_eq!(
         plan["thread_memory_bytes"].as_f64(),
-        Some(350.0 * (9.0 * 20.0) + 1250.0 * 9.0 + 600.0 * (4.0 + 4.0))
+        Some(155.0 * (9.0 * 20.0) + 1250.0 * 9.0 + 600.0 * (4.0 + 4.0))
     );
     assert_eq!(folder.contents("").len(), 1, "a plan writes nothing");
 

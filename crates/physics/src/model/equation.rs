@@ -8,8 +8,8 @@
 //! At the ends the missing neighbour drops out. The sum runs over the attached contacts of block j; `a_i` is where
 //! contact i attached. S is tridiagonal: the springs `K_int` between neighbours, the attached contacts of each block,
 //! and the driving spring at block 1. All blocks have the same mass m, so the squared angular frequencies are the
-//! eigenvalues of S/m; `tests/it/deterministic_rows.rs` compares them with known ones. The solvers have their own fast
-//! forms of the equation; `tests/it/equation_of_motion.rs` compares them with the plain one.
+//! eigenvalues of S/m; `deterministic_rows.rs` among the tests compares them with known ones. The solvers have their
+//! own fast forms of the equation; `equation_of_motion.rs` compares them with the plain one.
 
 use super::Parameters;
 use super::theory::bisected;
