@@ -41,6 +41,8 @@ class Section:
 
     def check(self, claim: str, criterion: str, measured: str, *agrees: bool | None) -> None:
         """`claim` is empty where the criterion says it; `agrees` are whether each number meets it, None if undecided."""
+        # Nothing to compare decides nothing.
+        agrees = agrees or (None,)
         self.agrees += agrees
         claim = self.number() + ": ".join(filter(None, (claim, criterion)))
         words = {True: "yes", False: "**no**", None: "undecided"}
