@@ -266,10 +266,14 @@ impl Study {
         Ok(findings)
     }
 
-    fn recording(&self) -> Recording {
+    /// What a job records; of a solver whose slips would take too long, over a stretch of time.
+    fn recording(&self, parameters: &Parameters, solver: Solver) -> Recording {
+        let is_stretch = self.is_stretch_only(parameters, solver);
+        let stretch = solver.time_step.filter(|_| is_stretch);
         Recording {
             slips: Some(self.slips),
             discard: DISCARD,
+            max_time: stretch.map(|time_step| time_step * self.timed_steps as f64),
             ..Recording::default()
         }
     }
@@ -282,7 +286,8 @@ impl Study {
         seeds: Range<u64>,
     ) -> Result<Vec<Slip>> {
         let slips = |seed: u64| {
-            let (_, measured) = measured(&parameters.with_seed(seed), solver, &self.recording())?;
+            let recording = self.recording(parameters, solver);
+            let (_, measured) = measured(&parameters.with_seed(seed), solver, &recording)?;
             Ok(measured.slips)
         };
         let slips: Result<Vec<_>> = seeds.into_par_iter().map(slips).collect();
@@ -309,10 +314,7 @@ impl Study {
         let mut largest: f64 = 0.0;
         for seed in self.first_seed..self.first_seed + AUDITED_JOBS {
             let parameters = parameters.with_seed(seed);
-            let mut recording = self.recording();
-            if self.is_stretch_only(&parameters, solver) {
-                recording.max_time = solver.time_step.map(|step| step * self.timed_steps as f64);
-            }
+            let recording = self.recording(&parameters, solver);
             let limits = Limits {
                 end_time: recording.max_time.unwrap_or(f64::INFINITY),
                 events: recording.max_events,
@@ -338,10 +340,7 @@ impl Study {
             let parameters = parameters.with_seed(seed);
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
                 let is_stretch = self.is_stretch_only(&parameters, solver);
-                let mut recording = self.recording();
-                if is_stretch && let Some(time_step) = solver.time_step {
-                    recording.max_time = Some(time_step * self.timed_steps as f64);
-                }
+                let recording = self.recording(&parameters, solver);
                 let (cpu_seconds, measured) = measured(&parameters, solver, &recording)?;
                 // The few slips of a stretch are no sample.
                 let slips = if is_stretch {

@@ -43,22 +43,21 @@ fn ratio(runs: [&dyn Fn(); 2]) -> f64 {
 }
 
 #[test]
-#[cfg(target_arch = "x86_64")]
 #[cfg_attr(debug_assertions, ignore = "speed of optimized code")]
 fn loops_for_this_processor_are_faster_than_those_for_any() {
-    if pulp::x86::V3::try_new().is_none() {
+    let parameters = Parameters::default();
+    let rows = Layout::new(parameters.blocks).rows;
+    if available(rows).len() == 1 {
         return;
     }
-    let parameters = Parameters::default();
     let run = |kernels: Box<dyn Kernels>| {
         Integration::new(&parameters, 1e-3, true, LIMITS, kernels, None)
             .integrate(&mut Nobody)
             .unwrap();
     };
-    let rows = Layout::new(parameters.blocks).rows;
     let best = || run(kernels::fastest(rows));
     let baseline = || run(available(rows).swap_remove(0).1);
-    // Seen: 8.
+    // Seen: 3.6 to 6.6.
     let ratio = ratio([&best, &baseline]);
     assert!(ratio > 2.0, "{ratio}");
 }
@@ -71,7 +70,7 @@ fn the_grid_is_faster_than_fixed_steps() {
     };
     let grid = || run(Solver::default());
     let fixed_steps = || run(Solver::fixed_step(1e-6));
-    // Seen: 12 over a slip and the quiet time before it.
+    // Seen: 7.8 to 8.6.
     let ratio = ratio([&grid, &fixed_steps]);
     assert!(ratio > 5.0, "{ratio}");
 }
