@@ -29,5 +29,5 @@ fn a_pulse_advances_the_slip_after_it_and_not_the_one_before() {
         slips[0].ends_with(", 0.00 ms earlier than in the control"),
         "{shown}"
     );
-    assert!(slips[1].contains(" 37.76 ms earlier"), "{shown}");
+    assert!(slips[1].contains(" 37.96 ms earlier"), "{shown}");
 }

@@ -262,13 +262,15 @@ impl<'a> Integration<'a> {
         let start = self.frame.now();
         let began = self.frame.time;
         let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
+        // The drive beyond the cycle of a ramp is another, and force may peak there; a run knows no pulse.
+        let until_cycle_end = match self.frame.drive.pulse() {
+            Some(_) => f64::INFINITY,
+            None => self.frame.until(self.frame.drive.cycle_end),
+        };
         let bounds = Bounds {
             start: began,
-            horizon,
-            until_cycle_end: match self.frame.drive.pulse() {
-                Some(_) => f64::INFINITY,
-                None => self.frame.until(self.frame.drive.cycle_end),
-            },
+            horizon: horizon.min(until_cycle_end),
+            until_cycle_end,
             until_cut: self.cut - began,
             error: self.tolerances.leap_error,
             largest_force: self.largest_force,

@@ -70,7 +70,12 @@ fn passing_horizon(
     split: &Split,
     (chain, interface): (&Chain, &mut Interface),
     drive: &Harmonic,
-    Bounds { start, error, .. }: Bounds,
+    Bounds {
+        start,
+        until_cycle_end,
+        error,
+        ..
+    }: Bounds,
     least: f64,
     largest: f64,
 ) -> Result<f64, f64> {
@@ -80,7 +85,7 @@ fn passing_horizon(
     let mut displaced = 0.0;
     let mut rate = 0.0;
     let mut last = 0.0;
-    let mut limit = f64::INFINITY;
+    let mut limit = until_cycle_end;
     interface.look_ahead(|due, block, life| {
         let seconds = due - start;
         let by_then = displaced + rate * (seconds - last);
