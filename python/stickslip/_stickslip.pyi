@@ -24,6 +24,7 @@ __all__ = [
     "read",
     "reduce",
     "run",
+    "side_by_side",
     "simulate",
     "sweep_of",
     "sweep_text",
