@@ -5,8 +5,8 @@ use super::{Exit, UsageError, layout};
 use crate::model::{Parameters, Selected, Selection, Symbol, Value as Parameter};
 use crate::reduce::{
     Comparison, Condition, Difference, EdgeRow, FREQUENCY, Interval, Pulses, SetInRounds, SetRow,
-    TriggerRow, Values, ascending, compare, differing, means_of_slips, read_optional, read_sets,
-    read_sets_in_rounds, renew,
+    TriggerRow, Values, add_intervals, ascending, compare, differing, means_of_slips,
+    read_optional, read_sets, read_sets_in_rounds, renew,
 };
 use crate::results::Results;
 use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, symbol_of, with_decimals};
@@ -261,7 +261,12 @@ fn chosen_columns(
     let mut columns = Vec::new();
     for name in chosen {
         columns.push(match Values::of(all, name) {
-            Ok(values) => values,
+            Ok(mut values) => {
+                if values.sources.iter().all(|source| source != values.name()) {
+                    add_intervals(results, rows, &mut values)?;
+                }
+                values
+            }
             Err(problem) => means_of_slips(results, rows, name)?
                 .ok_or_else(|| UsageError(format!("--columns {name}: {problem}")))?,
         });

@@ -2,23 +2,21 @@
 //! their difference, and smaller effects show than in two separate intervals. Measured slips have no such pair: all
 //! their series count, and the errors of both sides are independent.
 //!
-//! Values are those of the table of sets, of the jobs with seeds that both have. The error of a difference is that of a
-//! mean over these seeds, of what each adds to it: the jackknife to first order, in a time proportional to the number
-//! of slips.
+//! Values are those of the table of sets, of the jobs with seeds that both have.
 
 use super::differences::Difference;
-use super::gather::{Gathered, Gathering, MAX_SLIPS, sets_of};
-use super::sequence::{Sum, unit};
-use super::set::{SetJobs, non_nan};
+use super::estimate::Estimate;
+use super::gather::{Gathering, MAX_SLIPS, sets_of};
+use super::set::{FinishedSet, SetJobs};
 use super::values::Values;
 use crate::model::{Parameters, Symbol};
 use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
 use crate::sets::{SetRow, column_of};
-use crate::table::columns::{Interval, Kind};
+use crate::table::columns::Kind;
 use std::collections::{BTreeMap, HashMap};
 
-/// What is compared: columns of the sets, each the mean of a sum.
+/// What is compared: columns of the sets.
 const STATISTICS: [&str; 3] = ["tau_mean", "mean_friction", "resultant_length"];
 
 /// The sets of a directory with a job that did not fail, controls left out.
@@ -42,48 +40,18 @@ struct Pair<'a> {
     seeds_of_b: Vec<u64>,
 }
 
-/// A set of some seeds: its row, and for each statistic the sums of its jobs in the order of these.
-struct Found {
-    row: SetRow,
-    sums: [Vec<Sum>; STATISTICS.len()],
-}
-
-impl Found {
-    fn of(set: Gathered, seeds: &[u64]) -> Self {
-        let mut sums = [const { Vec::new() }; STATISTICS.len()];
-        for seed in seeds {
-            let slips = set.slips.of_job(*seed).iter();
-            let intervals = slips.clone().filter_map(|slip| non_nan(slip.interval));
-            let intervals = Sum::of(intervals.map(|interval| [interval, 0.0]));
-            let mut friction = Sum::default();
-            if let Some(job) = set.jobs.averages.get(seed) {
-                friction.push([job.time * job.friction, 0.0], job.time);
-            }
-            let phases = slips.filter_map(|slip| non_nan(slip.phase));
-            let of_job = [intervals, friction, Sum::of(phases.map(unit))];
-            for (sums, sum) in sums.iter_mut().zip(of_job) {
-                sums.push(sum);
-            }
-        }
-        let row = set.slips.finish(&set.jobs).row;
-        Self { row, sums }
-    }
-}
-
 /// The sets with these seeds, by their ids.
 fn found_in(
     results: &Results<'_>,
     wanted: &HashMap<&str, &[u64]>,
-) -> Result<HashMap<String, Found>, ResultsError> {
+) -> Result<HashMap<String, FinishedSet>, ResultsError> {
     let is_wanted = |parameters: &Parameters| {
         let seeds = wanted.get(&*results.sweep().set_id(parameters));
         seeds.is_some_and(|seeds| seeds.binary_search(&parameters.seed).is_ok())
     };
     let mut found = HashMap::new();
     Gathering::of_jobs(results, &is_wanted)?.each_set(MAX_SLIPS, u64::MAX, |set, _| {
-        let id = set.jobs.set_id.clone();
-        let seeds = wanted[&*id];
-        found.insert(id, Found::of(set, seeds));
+        found.insert(set.jobs.set_id.clone(), set.slips.finish(&set.jobs));
         Ok(())
     })?;
     Ok(found)
@@ -126,21 +94,6 @@ fn pairs<'a>(
     all.filter_map(|(set, other)| pair(set, other)).collect()
 }
 
-/// The interval of the error of a difference B - A, if those of both sides are independent.
-fn independent(b: &Found, a: &Found, name: &str) -> Option<Interval> {
-    let errors = |found: &Found| {
-        let value = found.row.number(name)?;
-        let end = |end| Some(found.row.number(&format!("{name}_{end}"))? - value);
-        Some((end("low")?, end("high")?))
-    };
-    let (b_low, b_high) = errors(b)?;
-    let (a_low, a_high) = errors(a)?;
-    Some(Interval {
-        low: -libm::hypot(b_low, a_high),
-        high: libm::hypot(b_high, a_low),
-    })
-}
-
 /// Two directories A and B side by side.
 pub struct Comparison {
     /// Of their sets that agree in all parameters that either varies and both know: the parameters that either varies,
@@ -178,7 +131,7 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsEr
         .map(|pair| (&*pair.b.set_id, &*pair.seeds_of_b));
     let found_in_b = found_in(b, &of_b.collect())?;
     let of_pair = |pair: &Pair<'_>| (&found_in_a[&pair.a.set_id], &found_in_b[&pair.b.set_id]);
-    let sets: Vec<(&Found, &Found)> = pairs.iter().map(of_pair).collect();
+    let sets: Vec<(&FinishedSet, &FinishedSet)> = pairs.iter().map(of_pair).collect();
 
     let seeds = |name: &str, count: fn(&Pair<'_>) -> usize| {
         let counts = pairs.iter().map(|pair| (Some(count(pair) as f64), None));
@@ -188,21 +141,17 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsEr
         seeds("seeds_a", |pair| pair.seeds_of_a.len()),
         seeds("seeds_b", |pair| pair.seeds_of_b.len()),
     ];
-    for (statistic, name) in STATISTICS.into_iter().enumerate() {
-        let number = |found: &Found| found.row.number(name);
-        let difference = |(a, b): &(&Found, &Found)| {
-            let whole = number(b).zip(number(a)).map(|(b, a)| b - a);
-            let errors = if have_common_seeds {
-                Sum::difference(&b.sums[statistic], &a.sums[statistic]).interval()
-            } else {
-                independent(b, a, name)
-            };
-            let interval = whole.zip(errors);
-            let interval = interval.map(|(whole, error)| (whole + error.low, whole + error.high));
-            (whole, interval)
+    for name in STATISTICS {
+        let of = |set: &FinishedSet| set.estimates.get(name).cloned();
+        let difference = |(a, b): &(&FinishedSet, &FinishedSet)| {
+            let in_a = of(a).map(|a| if have_common_seeds { a } else { a.apart() });
+            let difference = of(b).zip(in_a);
+            let difference = difference.map(|(b, a)| Estimate::function([&b, &a], |[b, a]| b - a));
+            Estimate::both(difference.as_ref())
         };
-        let in_a = sets.iter().map(|(a, _)| (number(a), None));
-        let in_b = sets.iter().map(|(_, b)| (number(b), None));
+        let number = |set: &FinishedSet| (of(set).map(|found| found.value), None);
+        let in_a = sets.iter().map(|(a, _)| number(a));
+        let in_b = sets.iter().map(|(_, b)| number(b));
         let differences = sets.iter().map(difference);
         let name = |which| format!("{name}_{which}");
         let mut of_statistic = [

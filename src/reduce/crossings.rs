@@ -10,12 +10,11 @@
 //! Beyond the last clear set, and between two on the same side, an unclear set may hide edges, so a row says that
 //! nothing crosses only if all its sets are clear.
 //!
-//! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is one
-//! realisation of the disorder in all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal
-//! size). Places on the axis are rows of the grid and fractions of them.
+//! A seed is left out of all sets together, since it is one realisation of the disorder in all of them. Places on the
+//! axis are rows of the grid and fractions of them.
 
-use super::confidence::student;
 use super::drive_alone::Explained;
+use super::estimate::{CONFIDENCE, Estimate};
 use super::gather::{Gathered, of_chosen};
 use crate::model::{Parameters, Selected};
 use crate::results::{Results, ResultsError};
@@ -27,8 +26,6 @@ use crate::table::value::{floored, words};
 use std::collections::BTreeMap;
 use std::iter::once;
 
-/// Groups of seeds, so that the cost of leaving them out is bounded.
-pub const GROUPS: usize = 30;
 /// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width. Fewer
 /// where they are a larger share of the value at the edge, over which responses bend.
 const WINDOW: f64 = 3.0;
@@ -93,95 +90,45 @@ impl EdgeRow {
     }
 }
 
-/// A statistic less its threshold, and what each group of seeds adds to it.
-#[derive(Clone, Debug, Default)]
-pub struct Sample {
-    pub(crate) excess: f64,
-    /// Of the mean of independent values: the sums of their deviations from it, over their number.
-    influences: [f64; GROUPS],
-    /// Sum of the squared shares of the groups in all jobs.
-    concentration: f64,
-}
-
-impl Sample {
-    /// From the jobs of each group, and the value of all jobs except those of a group; `None` if one of these values is
-    /// missing.
-    pub fn new(
-        counts: &[u64; GROUPS],
-        threshold: f64,
-        less: impl Fn(Option<usize>) -> Option<f64>,
-    ) -> Option<Self> {
-        let jobs = counts.iter().sum::<u64>() as f64;
-        let value = less(None)?;
-        let mut sample = Self {
-            excess: value - threshold,
-            influences: [0.0; GROUPS],
-            concentration: 0.0,
-        };
-        for (group, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
-            let share = count as f64 / jobs;
-            sample.influences[group] = (1.0 - share) * (value - less(Some(group))?);
-            sample.concentration += share * share;
-        }
-        Some(sample)
-    }
-
-    fn add(&mut self, factor: f64, other: &Self) {
-        self.excess += factor * other.excess;
-        for (sum, influence) in self.influences.iter_mut().zip(other.influences) {
-            *sum += factor * influence;
-        }
-        self.concentration = self.concentration.max(other.concentration);
-    }
-
-    fn half_width(&self) -> f64 {
-        let variance = product(&self.influences, &self.influences);
-        (quantile(self.concentration) * variance).sqrt()
-    }
-
-    /// Below the threshold, above it, or equal if that is not clear.
-    pub(crate) fn side(&self) -> f64 {
-        if self.excess.abs() > self.half_width() {
-            self.excess.signum()
-        } else {
-            0.0
-        }
-    }
-
-    /// The half-width of its interval over its distance from the threshold: at least 1 if it is not clear.
-    pub fn error(&self) -> f64 {
-        self.half_width() / self.excess.abs()
-    }
-}
-
-/// The square of Student's t with the degrees of freedom of these groups, over what makes a variance a sum of squares.
-fn quantile(concentration: f64) -> f64 {
-    let t = student(1.0 / concentration - 1.0);
-    t * t / (1.0 - concentration)
-}
-
-fn product(left: &[f64; GROUPS], right: &[f64; GROUPS]) -> f64 {
-    let pairs = left.iter().zip(right);
-    pairs.map(|(left, right)| left * right).sum()
-}
-
 /// What the rounds know of a set.
 #[derive(Clone, Debug, Default)]
 pub struct SetOfEdges {
     pub set_id: String,
     pub parameters: Parameters,
     pub seeds: u64,
-    /// For each statistic; `None` if it has no value.
-    pub samples: Vec<Option<Sample>>,
+    /// Each statistic less its threshold; `None` if it has no value.
+    pub(crate) excesses: Vec<Option<Estimate>>,
 }
 
-/// A set on the refined axis, and on which side of the threshold it lies.
+/// A set on the refined axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
     pub row: u64,
+    /// Below the threshold, above it, or 0 if that is not clear.
     side: f64,
-    pub sample: &'a Sample,
+    excess: &'a Estimate,
     pub set: &'a SetOfEdges,
+}
+
+impl<'a> Placed<'a> {
+    fn new(row: u64, excess: &'a Estimate, set: &'a SetOfEdges) -> Self {
+        let mut placed = Self {
+            row,
+            side: 0.0,
+            excess,
+            set,
+        };
+        if placed.error() < 1.0 {
+            placed.side = excess.value.signum();
+        }
+        placed
+    }
+
+    /// The half-width of its interval over its distance from the threshold: at least 1 if it is not clear.
+    pub fn error(&self) -> f64 {
+        let half = self.excess.half_width().unwrap_or(f64::INFINITY);
+        half / self.excess.value.abs()
+    }
 }
 
 /// Sets next to each other that are not clear, and lie between no two that are on opposite sides.
@@ -254,7 +201,7 @@ impl<'a> Edge<'a> {
         window: impl Fn(f64) -> u64,
     ) -> Option<Self> {
         let bracket = [all[first], all[last]];
-        let excess = |set: &Placed<'_>| bracket[1].side * set.sample.excess;
+        let excess = |set: &Placed<'_>| bracket[1].side * set.excess.value;
         let rise = |pair: &&[Placed<'_>]| excess(&pair[1]) - excess(&pair[0]);
         let crosses = |pair: &&[Placed<'_>]| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0;
         let crossings = all[first..=last].windows(2).filter(crosses);
@@ -357,26 +304,30 @@ fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
     let mean = points().map(|(x, weight)| weight * x).sum::<f64>() / total;
     let moments = points().map(|(x, weight)| weight * (x - mean) * (x - mean));
     let moment: f64 = moments.sum();
-    let mut begin = Sample::default();
-    let mut slope = Sample::default();
-    for (set, (x, weight)) in sets.iter().zip(points()) {
-        let of_slope = weight * (x - mean) / moment;
-        begin.add(weight / total - mean * of_slope, set.sample);
-        slope.add(of_slope, set.sample);
-    }
-    let factor = LOOKS * LOOKS * quantile(slope.concentration);
-    let beyond_error = |left: &Sample, right: &Sample| {
-        left.excess * right.excess - factor * product(&left.influences, &right.influences)
+    // Of the line at the origin, and of its slope.
+    let sum = |weight: &dyn Fn(f64, f64) -> f64| {
+        let terms = sets.iter().zip(points());
+        let terms = terms.map(|(set, (x, of_set))| set.excess.times(weight(x, of_set)));
+        terms.reduce(|sum, term| Estimate::function([&sum, &term], |[sum, term]| sum + term))
+    };
+    let of_slope = |x: f64, weight: f64| weight * (x - mean) / moment;
+    let begin = sum(&|x, weight| weight / total - mean * of_slope(x, weight))?;
+    let slope = sum(&of_slope)?;
+    let t = LOOKS * slope.student(CONFIDENCE);
+    let [not_seen, ends] = begin.allowances();
+    let beyond_error = |left: &Estimate, right: &Estimate| {
+        let covariance = left.covariance(right).unwrap_or(f64::INFINITY);
+        left.value * right.value - t * t * covariance
     };
     // All x at which the line is no more than so many standard deviations away: a + 2 b x + c x² <= 0.
-    let a = beyond_error(&begin, &begin);
+    let a = beyond_error(&begin, &begin) - (not_seen + ends) * (not_seen + ends);
     let b = beyond_error(&begin, &slope);
     let c = beyond_error(&slope, &slope);
     let root = (b * b - a * c).max(0.0).sqrt();
     let interval = (c > 0.0).then(|| [origin - (b + root) / c, origin + (root - b) / c]);
     (moment > 0.0).then(|| Fit {
-        slope: slope.excess,
-        crossing: origin - begin.excess / slope.excess,
+        slope: slope.value,
+        crossing: origin - begin.value / slope.value,
         interval,
     })
 }
@@ -413,13 +364,8 @@ pub fn lines<'a>(
         for (number, &statistic) in refinement.by.iter().enumerate() {
             // Without a value, a set says nothing.
             let placed = |&(row, set): &(u64, &'a SetOfEdges)| {
-                let sample = set.samples.get(number)?.as_ref()?;
-                Some(Placed {
-                    row,
-                    side: sample.side(),
-                    sample,
-                    set,
-                })
+                let excess = set.excesses.get(number)?.as_ref()?;
+                Some(Placed::new(row, excess, set))
             };
             let known: Vec<Placed<'_>> = sets.iter().filter_map(placed).collect();
             let is_clear = |index: &usize| known[*index].side != 0.0;
@@ -554,41 +500,27 @@ pub fn sets_of_edges(
     results: &Results<'_>,
     refinement: &Refinement,
 ) -> Result<BTreeMap<u64, SetOfEdges>, ResultsError> {
-    of_chosen(results, |set, explained| {
-        of_set(&set, explained, refinement)
-    })
+    of_chosen(results, |set, explained| of_set(set, explained, refinement))
 }
 
-fn of_set(set: &Gathered, explained: &Explained, refinement: &Refinement) -> SetOfEdges {
-    let group = |seed: u64| usize::try_from(seed % GROUPS as u64).unwrap_or_default();
-    let mut counts = [0; GROUPS];
-    for &seed in set.jobs.averages.keys() {
-        counts[group(seed)] += 1;
-    }
-    let without = |left_out: Option<usize>| {
-        let part = set.only(|seed| Some(group(seed)) != left_out);
-        if let Some(periods) = refinement.periods {
-            return vec![part.slips.share_of_periods(periods as f64)];
-        }
-        let row = part.finish_with(explained).0.row;
-        refinement.by.iter().map(|by| row.number(by.key)).collect()
+fn of_set(set: Gathered, explained: &Explained, refinement: &Refinement) -> SetOfEdges {
+    let share = refinement
+        .periods
+        .map(|periods| set.slips.share_of_periods(periods as f64));
+    let seeds = set.jobs.finished.len() as u64 + set.jobs.failed;
+    let set_id = set.jobs.set_id.clone();
+    let parameters = set.jobs.parameters.clone();
+    let mut estimates = set.finish_with(explained).0.estimates;
+    let mut of = |statistic: &Statistic| {
+        share
+            .clone()
+            .unwrap_or_else(|| estimates.remove(statistic.key))
     };
-    let all = without(None);
-    let of_others = |group: usize| match counts[group] {
-        0 => Vec::new(),
-        _ => without(Some(group)),
-    };
-    let each: Vec<Vec<Option<f64>>> = (0..GROUPS).map(of_others).collect();
-    let sample = |statistic: usize| {
-        Sample::new(&counts, refinement.threshold, |left_out| {
-            let values = left_out.map_or(&all, |group| &each[group]);
-            values.get(statistic).copied()?
-        })
-    };
+    let excess = |estimate: Estimate| estimate.plus(-refinement.threshold);
     SetOfEdges {
-        set_id: set.jobs.set_id.clone(),
-        parameters: set.jobs.parameters.clone(),
-        seeds: set.jobs.finished.len() as u64 + set.jobs.failed,
-        samples: (0..refinement.by.len()).map(sample).collect(),
+        set_id,
+        parameters,
+        seeds,
+        excesses: refinement.by.iter().map(|by| of(by).map(excess)).collect(),
     }
 }

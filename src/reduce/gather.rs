@@ -192,7 +192,6 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
 }
 
 /// A set and its slips so far.
-#[derive(Clone)]
 pub(super) struct Gathered {
     pub(super) jobs: SetJobs,
     pub(super) slips: SetSlips,
@@ -207,14 +206,6 @@ impl Gathered {
             slips: SetSlips::default(),
             points: Vec::new(),
         }
-    }
-
-    pub(super) fn only(&self, keeps: impl Fn(u64) -> bool) -> Self {
-        let mut part = self.clone();
-        part.jobs.averages.retain(|&seed, _| keeps(seed));
-        part.jobs.running.retain(|&(seed, _)| keeps(seed));
-        part.slips.retain(keeps);
-        part
     }
 
     pub(super) fn finish_with(self, explained: &Explained) -> (FinishedSet, Vec<(u64, Point)>) {

@@ -3,16 +3,15 @@
 
 mod backbone;
 mod compare;
-mod confidence;
 mod crossings;
 mod differences;
 mod dimension;
 mod drive_alone;
+mod estimate;
 mod gather;
 #[cfg(test)]
 mod pool;
 mod reduction;
-mod sequence;
 mod set;
 mod slips;
 mod triggers;
@@ -22,14 +21,14 @@ pub use crate::sets::{FREQUENCY, SetRow, is_same};
 pub use crate::table::columns::Interval;
 pub use backbone::BackboneBin;
 pub use compare::{Comparison, compare};
-pub use confidence::Mean;
 #[cfg(test)]
-pub(crate) use confidence::mean_of;
-pub(crate) use confidence::student_at;
-#[cfg(test)]
-pub(crate) use crossings::{Edge, GROUPS, Sample};
+pub(crate) use crossings::Edge;
 pub use crossings::{EdgeRow, Ended, Line, SetOfEdges, lines, sets_of_edges};
 pub use differences::Difference;
+pub use estimate::quantile;
+pub(crate) use estimate::student_at;
+#[cfg(test)]
+pub(crate) use estimate::{Units, mean};
 pub use gather::{Point, RampStage, reduce_chosen};
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
@@ -40,13 +39,28 @@ pub use reduction::{
     HistogramBin, NoJobs, ReductionSummary, SetInRounds, advise, error_over_target, read_optional,
     read_reduced, read_sets, read_sets_in_rounds, reduce, renew,
 };
-pub use sequence::quantile;
-pub use slips::{SlipOfSet, means_of_slips, sample_of_slips};
-pub use triggers::{Pulses, TriggerRow};
+pub use slips::{SlipOfSet, add_intervals, means_of_slips, sample_of_slips};
+pub use triggers::{Mean, Pulses, TriggerRow};
 pub use values::{Condition, Values, ascending, differing, has_even_steps, is_spread, swept};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
+
+/// Resultant of slips at random loads: of the density 1 - η sin φ, for η >= 1 from φ_min to Φ_max.
+fn resultant_at_random(eta: f64) -> f64 {
+    let Some((low, high)) = minimum_phase(eta).zip(load_maximum_phase(eta)) else {
+        return 0.5 * eta;
+    };
+    let integral = |phase: f64| {
+        let (sine, cosine) = libm::sincos(phase);
+        [
+            sine - 0.5 * eta * sine * sine,
+            -cosine - 0.5 * eta * (phase - sine * cosine),
+        ]
+    };
+    let [x, y] = [0, 1].map(|part| integral(high)[part] - integral(low)[part]);
+    libm::hypot(x, y) / TAU
+}
 
 /// Upper end of the turn in which mean phases at some η are given, in rad. For η >= 1 the seam is in the middle of the
 /// gap between Φ_max - 2π and φ_min, where no slip begins.

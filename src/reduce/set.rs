@@ -1,13 +1,12 @@
 //! The table of sets, a row for each with all seeds together: what the jobs table says (outcomes, averages over the
 //! time of each job), and from the slips, statistics of intervals, locking and phases.
 
-use super::confidence::{OF_INTERVALS, OF_PHASES, Tongue, Unseen};
-use super::sequence::{Centred, Estimate, Sequences, at_rank, unit};
-use super::top_of_phases;
-use crate::model::{Parameters, Selected};
+use super::estimate::{Estimate, MAX_UNSEEN, Numbers, Units, at_rank, length, mean, unit};
+use super::{resultant_at_random, top_of_phases};
+use crate::model::{Parameters, Selected, Symbol};
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
-use crate::sets::SetRow;
+use crate::sets::{FREQUENCY, SetRow};
 use crate::table::columns::{Interval, columns};
 use crate::table::value::floored;
 use std::collections::{BTreeMap, BTreeSet};
@@ -68,90 +67,55 @@ impl SetSlips {
         self.jobs.get(&seed).map_or(&[], Vec::as_slice)
     }
 
-    /// Leaves the slips of other seeds out.
-    pub(super) fn retain(&mut self, keeps: impl Fn(u64) -> bool) {
-        self.jobs.retain(|&seed, _| keeps(seed));
+    fn largest(&self, quantity: impl Fn(&SlipStats) -> f64) -> f64 {
+        let slips = self.jobs.values().flatten();
+        slips.map(quantity).fold(0.0, f64::max)
     }
 
     /// The share of the intervals that are nearest to this number of periods.
-    pub(super) fn share_of_periods(&self, periods: f64) -> Option<f64> {
-        let slips = self.jobs.values().flatten();
-        let all: Vec<f64> = slips.filter_map(|slip| non_nan(slip.periods)).collect();
-        let nearest = all.iter().filter(|found| found.round() == periods).count();
-        (!all.is_empty()).then(|| nearest as f64 / all.len() as f64)
+    pub(super) fn share_of_periods(&self, periods: f64) -> Option<Estimate> {
+        let is_nearest = |slip: &SlipStats| {
+            Some(f64::from(u8::from(
+                non_nan(slip.periods)?.round() == periods,
+            )))
+        };
+        let [share, _] = Numbers::of(&self.each(is_nearest), 0.0).estimates(0.0);
+        share
+    }
+
+    /// A quantity that some of the slips have, by seeds.
+    fn each<T>(&self, quantity: impl Fn(&SlipStats) -> Option<T>) -> Vec<(u64, Vec<T>)> {
+        each(&self.by_job(), quantity)
+    }
+
+    fn by_job(&self) -> Vec<(u64, &[SlipStats])> {
+        let jobs = self.jobs.iter();
+        jobs.map(|(&seed, slips)| (seed, slips.as_slice()))
+            .collect()
     }
 
     pub(super) fn finish(self, jobs: &SetJobs) -> FinishedSet {
-        let by_job: Vec<&[SlipStats]> = self.jobs.values().map(Vec::as_slice).collect();
-        let tau = Intervals::new(&by_job, |slip| slip.interval, &jobs.running);
-        let in_periods = Intervals::new(&by_job, |slip| slip.periods, &jobs.running);
-        let n = in_periods.quantile(0.5).map(|n| floored(n.round()) as u64);
-        let mean_periods = in_periods.estimate(|periods| [periods]).value();
-        let tongue = Tongue::of(&in_periods.sorted, n, mean_periods);
-        let mut row = jobs.row();
-        row.slips = by_job.iter().map(|job| job.len() as u64).sum();
-        row.periods = n;
-        tau.describe(&mut row, jobs.cut, tongue);
-        describe_forces(&mut row, &by_job, tongue);
-        let locking = describe_locking(&mut row, &by_job, tongue);
-        let cycles = Cycles::of(&jobs.parameters, row.tau_mean);
-        let in_cycles = match cycles {
-            None => by_job.clone(),
-            Some(cycles) => cycles.within(&by_job, |slip| slip.onset),
+        let mut set = FinishedSet {
+            row: jobs.row(),
+            ..FinishedSet::default()
         };
-        let phases = describe_phases(&mut row, &in_cycles, tongue);
-        FinishedSet {
-            row,
-            intervals: tau.sorted,
-            seeds: self.jobs.keys().copied().collect(),
-            phases,
-            locking,
-            tongue,
-            cycles,
-        }
+        set.row.slips = self.jobs.values().map(|job| job.len() as u64).sum();
+        set.describe_time(jobs);
+        let off = set.describe_intervals(&self, jobs);
+        set.describe_forces(&self, off);
+        set.describe_locking(&self, jobs.running.len());
+        set.describe_phases(&self, &jobs.parameters);
+        set
     }
 }
 
-fn describe_forces(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) {
-    let drops = sequences(jobs, |slip| Some([non_nan(slip.drop)?])).estimate();
-    // A longer interval ends at a force that is higher by the additional drop.
-    let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_mean(&drops));
-    row.drop_mean = drops.value();
-    row.drop_interval = drops.interval_with(unseen);
-    let peak_forces = sequences(jobs, |slip| Some([non_nan(slip.peak_force)?])).estimate();
-    row.peak_force_mean = peak_forces.value();
-    row.peak_force_interval = peak_forces.interval_with(unseen);
-    let square = drops.square_of_deviation(largest(jobs, |slip| slip.peak_force.max(slip.drop)));
-    let squares = sequences(jobs, |slip| Some([square(non_nan(slip.drop)?)])).estimate();
-    let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&drops));
-    (row.drop_deviation, row.drop_deviation_interval) = squares.deviation(unseen);
-    let ratio = row.drop_deviation.zip(row.drop_mean);
-    row.drop_variation = ratio.map(|(deviation, mean)| deviation / mean);
-}
-
-/// Intervals in periods, as angles.
-fn describe_locking(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) -> Centred<2> {
-    // Whole turns are removed first: they would cost the sine its digits.
-    let angle = |slip: &SlipStats| Some(unit(TAU * non_nan(slip.periods)?.fract()));
-    let locking = sequences(jobs, angle).centred();
-    if row.periods != Some(0) {
-        row.locking_index = locking.mean.resultant_length();
-        row.locking_interval = locking.length_interval(tongue.map_or(0.0, |_| OF_INTERVALS));
-    }
-    locking
-}
-
-fn describe_phases(row: &mut SetRow, jobs: &[&[SlipStats]], tongue: Option<Tongue>) -> Centred<2> {
-    let phases = sequences(jobs, |slip| non_nan(slip.phase).map(unit)).centred();
-    let top = top_of_phases(row.eta);
-    row.phase_mean = phases.mean.direction(top);
-    row.phase_interval = phases.mean.direction_interval(top);
-    row.has_phase = row
-        .phase_interval
-        .is_some_and(|ends| ends.high - ends.low < WHOLE_TURN);
-    row.resultant_length = phases.mean.resultant_length();
-    row.length_interval = phases.length_interval(tongue.map_or(0.0, |_| OF_PHASES));
-    phases
+fn each<T>(
+    jobs: &[(u64, &[SlipStats])],
+    quantity: impl Fn(&SlipStats) -> Option<T>,
+) -> Vec<(u64, Vec<T>)> {
+    let of_job =
+        |(seed, slips): &(u64, &[SlipStats])| (*seed, slips.iter().filter_map(&quantity).collect());
+    jobs.iter().map(of_job).collect()
 }
 
 /// Whole cycles of a modulation whose period is at least the mean interval: a run holds few of them, and its beginning
@@ -173,137 +137,285 @@ impl Cycles {
     }
 
     /// The slips of each job within whole cycles from its first one on; empty if these are too few.
-    pub(super) fn within<'a, T>(self, jobs: &[&'a [T]], onset: impl Fn(&T) -> f64) -> Vec<&'a [T]> {
+    pub(super) fn within<'a, T>(
+        self,
+        mut jobs: Vec<(u64, &'a [T])>,
+        onset: impl Fn(&T) -> f64,
+    ) -> Vec<(u64, &'a [T])> {
         let mut total = 0.0;
-        let mut of_job = |slips: &&'a [T]| -> &'a [T] {
+        for (_, slips) in &mut jobs {
             let onsets = || slips.iter().map(&onset).filter(|onset| !onset.is_nan());
             let Some((first, last)) = onsets().next().zip(onsets().last()) else {
-                return &[];
+                *slips = &[];
+                continue;
             };
             let cycles = ((last - first) / self.period).floor();
             total += cycles;
             let end = first + cycles * self.period;
-            &slips[..onsets().take_while(|onset| *onset < end).count()]
-        };
-        let within = jobs.iter().map(&mut of_job).collect();
-        if total >= Self::MIN * jobs.len() as f64 {
-            within
-        } else {
-            Vec::new()
+            *slips = &slips[..onsets().take_while(|onset| *onset < end).count()];
         }
+        if total < Self::MIN * jobs.len() as f64 {
+            jobs.clear();
+        }
+        jobs
     }
 }
 
-fn largest(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats) -> f64) -> f64 {
-    jobs.iter()
-        .copied()
-        .flatten()
-        .map(quantity)
-        .fold(0.0, f64::max)
-}
-
-/// A quantity that some of the slips have.
-fn sequences<const D: usize>(
-    jobs: &[&[SlipStats]],
-    quantity: impl Fn(&SlipStats) -> Option<[f64; D]>,
-) -> Sequences<D> {
-    Sequences::of(jobs.iter().map(|job| job.iter().filter_map(&quantity)))
-}
-
-/// Intervals between slips, in some unit.
-struct Intervals<'a> {
-    jobs: &'a [&'a [SlipStats]],
-    length: fn(&SlipStats) -> f64,
+/// Lengths of intervals, of which some still ran when their jobs gave up: these are longer than all others.
+struct Ranked {
     sorted: Vec<f64>,
-    /// Seeds of jobs that gave up after a slip, and the time since it in s: these intervals are longer than all others.
-    running: &'a [(u64, f64)],
+    running: usize,
 }
 
-impl<'a> Intervals<'a> {
-    fn new(
-        jobs: &'a [&'a [SlipStats]],
-        length: fn(&SlipStats) -> f64,
-        running: &'a [(u64, f64)],
-    ) -> Self {
-        let all = jobs.iter().copied().flatten().map(length);
-        let mut sorted: Vec<f64> = all.filter_map(non_nan).collect();
+impl Ranked {
+    fn of(jobs: &[(u64, Vec<f64>)], running: usize) -> Self {
+        let mut sorted: Vec<f64> = jobs.iter().flat_map(|(_, all)| all).copied().collect();
         sorted.sort_by(f64::total_cmp);
-        Self {
-            jobs,
-            length,
-            sorted,
-            running,
-        }
+        Self { sorted, running }
     }
 
-    /// The mean of a value over them; unknown if a job gave up.
-    fn estimate(&self, value: impl Fn(f64) -> [f64; 1]) -> Estimate<1> {
-        if !self.running.is_empty() {
-            return Sequences::default().estimate();
-        }
-        sequences(self.jobs, |slip| non_nan((self.length)(slip)).map(&value)).estimate()
-    }
-
-    /// A quantile of all intervals; `None` if that interval still ran.
+    /// A quantile of all; `None` if that interval still ran.
     fn quantile(&self, share: f64) -> Option<f64> {
-        let last = (self.sorted.len() + self.running.len()).checked_sub(1)?;
+        let last = (self.sorted.len() + self.running).checked_sub(1)?;
         at_rank(&self.sorted, share.clamp(0.0, 1.0) * last as f64)
     }
+}
 
-    fn median_interval(&self) -> Option<Interval> {
-        let median = self.quantile(0.5)?;
-        let is_below = self.estimate(|length| [f64::from(u8::from(length <= median))]);
-        let [low, high] = is_below.shares_about_median()?;
-        Some(Interval {
-            low: self.quantile(low)?,
-            high: self.quantile(high)?,
-        })
-    }
+/// Ranges of statistics.
+pub(super) const SHARE: [f64; 2] = [0.0, 1.0];
+const POSITIVE: [f64; 2] = [0.0, f64::INFINITY];
+pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-    /// Writes their statistics into a row, if `max_time` cut those of some jobs.
-    fn describe(&self, row: &mut SetRow, cut: u64, tongue: Option<Tongue>) {
-        row.intervals = self.sorted.len() as u64;
-        let mean = self.estimate(|interval| [interval]);
-        let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_mean(&mean));
-        row.tau_mean = mean.value();
-        row.tau_interval = mean.interval_with(unseen);
-        let square = mean.square_of_deviation(largest(self.jobs, |slip| slip.onset));
-        let squares = self.estimate(|interval| [square(interval)]);
-        let unseen = tongue.map_or_else(Unseen::default, |tongue| tongue.of_squares(&mean));
-        (row.tau_deviation, row.tau_deviation_interval) = squares.deviation(unseen);
-        if !self.running.is_empty() {
-            let waited = self.running.iter().map(|(_, interval)| interval);
-            let total = self.sorted.iter().chain(waited).sum::<f64>();
-            row.tau_bound = Some(total / (self.sorted.len() + self.running.len()) as f64);
-        }
-        if cut > 0 {
-            let relative = row.tau_deviation.zip(row.tau_mean);
-            let relative = relative.map(|(deviation, mean)| deviation / mean);
-            let cut_share = cut as f64 / self.sorted.len() as f64;
-            row.tau_off = relative.map(|relative| -relative * relative * cut_share);
-        }
-        row.tau_05 = self.quantile(0.05);
-        row.tau_25 = self.quantile(0.25);
-        row.tau_50 = self.quantile(0.5);
-        row.median_interval = self.median_interval();
-        row.tau_75 = self.quantile(0.75);
-        row.tau_95 = self.quantile(0.95);
+/// Mean intervals up to which a period is the least by which a slip comes early or late: less than all that lies
+/// between two slips, with room for their spread.
+const NEXT_PERIOD: f64 = 1.2;
+/// The same where intervals alternate, such as two slips a period: these are two to a period.
+const ALTERNATING: f64 = 2.5;
+/// Error of a mean, over that of independent intervals, below which intervals alternate.
+const REGULAR: f64 = 0.5;
+
+/// The time by which a slip of a kind that was not seen may come early or late: to another period of the modulation, or
+/// at another of its slips; 0 where no period says so.
+fn off(period: Option<f64>, mean: f64, numbers: &Numbers) -> f64 {
+    let is_regular = || {
+        numbers
+            .regularity()
+            .is_some_and(|regularity| regularity < REGULAR)
+    };
+    match period {
+        Some(period) if period <= ALTERNATING * mean && is_regular() => period,
+        Some(period) if period <= NEXT_PERIOD * mean => period.min(mean),
+        _ => 0.0,
     }
 }
 
-#[derive(Clone, Debug)]
+/// What a slip that was not seen may take from a sum of vectors if the others have the length of slips at random loads:
+/// so many times what that lacks of 1, and at most what one across the others takes.
+fn lost(length_at_random: f64, [times, most]: [f64; 2], count: f64) -> f64 {
+    MAX_UNSEEN * (times * (1.0 - length_at_random)).min(most) / count
+}
+/// Of a slip.
+const OF_PHASES: [f64; 2] = [3.0, 0.75];
+/// Of the two intervals beside it, whose vectors have the square of that length.
+const OF_INTERVALS: [f64; 2] = [6.0, 1.5];
+
+/// Between quantiles at the ends of the interval of the share that does not exceed the median (R. S. Woodruff, J. Am.
+/// Stat. Assoc. 47, 635 (1952)).
+fn median_interval(jobs: &[(u64, Vec<f64>)], ranked: &Ranked) -> Option<Interval> {
+    let median = ranked.quantile(0.5)?;
+    let is_below = |length: &f64| [1.0, f64::from(u8::from(*length <= median)), 0.0];
+    let flags = jobs
+        .iter()
+        .map(|(seed, lengths)| (*seed, lengths.iter().map(is_below).collect()));
+    let share = Units::of(flags).estimate(mean)?;
+    // A value more or less is the least that a share can be off.
+    let half = share.half_width()?.max(1.0 / ranked.sorted.len() as f64);
+    Some(Interval {
+        low: ranked.quantile(0.5 - half)?,
+        high: ranked.quantile(0.5 + half)?,
+    })
+}
+
+/// A set whose sums are complete.
+#[derive(Clone, Debug, Default)]
 pub(super) struct FinishedSet {
     pub(super) row: SetRow,
     /// Its intervals in s, sorted.
     pub(super) intervals: Vec<f64>,
-    /// Seeds of the jobs of these phases and intervals.
-    pub(super) seeds: Vec<u64>,
-    pub(super) phases: Centred<2>,
+    pub(super) phases: Units,
     /// Intervals in periods, as angles.
-    pub(super) locking: Centred<2>,
-    pub(super) tongue: Option<Tongue>,
+    pub(super) locking: Units,
     /// The cycles within which phases count, if not all do.
     pub(super) cycles: Option<Cycles>,
+    /// Its statistics that are functions of sums, by their columns.
+    pub(super) estimates: BTreeMap<&'static str, Estimate>,
+}
+
+impl FinishedSet {
+    /// A statistic, or a parameter; `None` of what has no error that is known.
+    pub(super) fn estimate(&self, column: &str) -> Option<Estimate> {
+        let is_exact = matches!(column, FREQUENCY | "eta") || Symbol::from_key(column).is_some();
+        let exact = || {
+            Some(Estimate::exact(
+                self.row.number(column).filter(|_| is_exact)?,
+            ))
+        };
+        self.estimates.get(column).cloned().or_else(exact)
+    }
+
+    /// Notes the estimate of a column: its value, and its interval within a range.
+    pub(super) fn note(
+        &mut self,
+        column: &'static str,
+        estimate: Option<Estimate>,
+        [least, most]: [f64; 2],
+    ) -> (Option<f64>, Option<Interval>) {
+        let value = estimate.as_ref().map(|estimate| estimate.value);
+        let interval = estimate.as_ref().and_then(Estimate::interval);
+        self.estimates
+            .extend(estimate.map(|estimate| (column, estimate)));
+        let within = |Interval { low, high }| Interval {
+            low: low.max(least),
+            high: high.min(most),
+        };
+        (value, interval.map(within))
+    }
+
+    fn describe_time(&mut self, jobs: &SetJobs) {
+        let over_time = |of: fn(&JobAverages) -> f64| {
+            let sums = |(seed, job): (&u64, &JobAverages)| {
+                (*seed, vec![[job.time, job.time * of(job), 0.0]])
+            };
+            Units::of(jobs.averages.iter().map(sums)).estimate(mean)
+        };
+        let share = over_time(|job| job.slip_share);
+        let friction = over_time(|job| job.friction);
+        let force = jobs.parameters.normal_force;
+        let coefficient = friction
+            .as_ref()
+            .map(|friction| friction.times(1.0 / force));
+        (self.row.slip_share, self.row.slip_share_interval) = self.note("slip_share", share, SHARE);
+        (self.row.mean_friction, self.row.mean_friction_interval) =
+            self.note("mean_friction", friction, ANY);
+        (
+            self.row.friction_coefficient,
+            self.row.friction_coefficient_interval,
+        ) = self.note("friction_coefficient", coefficient, ANY);
+    }
+
+    /// Returns the part of the mean interval by which a slip that was not seen may come early or late.
+    fn describe_intervals(&mut self, slips: &SetSlips, jobs: &SetJobs) -> f64 {
+        let intervals = slips.each(|slip| non_nan(slip.interval));
+        let ranked = Ranked::of(&intervals, jobs.running.len());
+        let numbers = Numbers::of(&intervals, slips.largest(|slip| slip.onset));
+        let off = off(jobs.parameters.modulation_period, numbers.mean, &numbers);
+        self.row.intervals = ranked.sorted.len() as u64;
+        self.row.tau_05 = ranked.quantile(0.05);
+        self.row.tau_25 = ranked.quantile(0.25);
+        self.row.tau_50 = ranked.quantile(0.5);
+        self.row.tau_75 = ranked.quantile(0.75);
+        self.row.tau_95 = ranked.quantile(0.95);
+        if jobs.running.is_empty() {
+            let [mean, deviation] = numbers.estimates(off);
+            (self.row.tau_mean, self.row.tau_interval) = self.note("tau_mean", mean, POSITIVE);
+            (self.row.tau_deviation, self.row.tau_deviation_interval) =
+                self.note("tau_sd", deviation, POSITIVE);
+            self.row.median_interval = median_interval(&intervals, &ranked);
+        } else {
+            let waited = jobs.running.iter().map(|(_, interval)| interval);
+            let total = ranked.sorted.iter().chain(waited).sum::<f64>();
+            self.row.tau_bound = Some(total / (ranked.sorted.len() + jobs.running.len()) as f64);
+        }
+        if jobs.cut > 0 {
+            let relative = self.row.tau_deviation.zip(self.row.tau_mean);
+            let relative = relative.map(|(deviation, mean)| deviation / mean);
+            let cut_share = jobs.cut as f64 / ranked.sorted.len() as f64;
+            self.row.tau_off = relative.map(|relative| -relative * relative * cut_share);
+        }
+        self.intervals = ranked.sorted;
+        off / numbers.mean
+    }
+
+    fn describe_forces(&mut self, slips: &SetSlips, off: f64) {
+        let drops = slips.each(|slip| non_nan(slip.drop));
+        let drops = Numbers::of(&drops, slips.largest(|slip| slip.peak_force.max(slip.drop)));
+        // A longer interval ends at a force that is higher by the additional drop.
+        let off = off * drops.mean;
+        let [mean, deviation] = drops.estimates(off);
+        let both = deviation.as_ref().zip(mean.as_ref());
+        let variation = both.map(|(deviation, mean)| {
+            Estimate::function([deviation, mean], |[deviation, mean]| deviation / mean)
+        });
+        (self.row.drop_mean, self.row.drop_interval) = self.note("drop_mean", mean, ANY);
+        (self.row.drop_deviation, self.row.drop_deviation_interval) =
+            self.note("drop_sd", deviation, POSITIVE);
+        (self.row.drop_variation, _) = self.note("drop_cv", variation, POSITIVE);
+        let forces = slips.each(|slip| non_nan(slip.peak_force));
+        let [force, _] = Numbers::of(&forces, 0.0).estimates(off);
+        (self.row.peak_force_mean, self.row.peak_force_interval) =
+            self.note("peak_force_mean", force, ANY);
+    }
+
+    /// Intervals in periods, as angles.
+    fn describe_locking(&mut self, slips: &SetSlips, running: usize) {
+        let periods = slips.each(|slip| non_nan(slip.periods));
+        let median = Ranked::of(&periods, running).quantile(0.5);
+        self.row.periods = median.map(|n| floored(n.round()) as u64);
+        // Whole turns are removed first: they would cost the sine its digits.
+        let vectors = |periods: &Vec<f64>| {
+            periods
+                .iter()
+                .map(|periods| unit(TAU * periods.fract()))
+                .collect()
+        };
+        self.locking = Units::of(
+            periods
+                .iter()
+                .map(|(seed, periods)| (*seed, vectors(periods))),
+        );
+        if self.row.periods != Some(0) {
+            let locking = self
+                .locking
+                .estimate(length)
+                .map(|locking| self.allow_for_intervals(locking));
+            (self.row.locking_index, self.row.locking_interval) =
+                self.note("locking_index", locking, SHARE);
+        }
+    }
+
+    fn describe_phases(&mut self, slips: &SetSlips, parameters: &Parameters) {
+        self.cycles = Cycles::of(parameters, self.row.tau_mean);
+        let jobs = match self.cycles {
+            None => slips.by_job(),
+            Some(cycles) => cycles.within(slips.by_job(), |slip| slip.onset),
+        };
+        self.phases = Units::of(each(&jobs, |slip| non_nan(slip.phase).map(unit)));
+        if let Some((direction, interval)) = self.phases.direction(top_of_phases(self.row.eta)) {
+            self.row.phase_mean = Some(direction.value);
+            self.row.phase_interval = interval;
+            let is_narrow = |ends: Interval| ends.high - ends.low < WHOLE_TURN;
+            self.row.has_phase = interval.is_some_and(is_narrow);
+        }
+        let length = self
+            .phases
+            .estimate(length)
+            .map(|length| self.allow_for_phases(length));
+        (self.row.resultant_length, self.row.length_interval) =
+            self.note("resultant_length", length, SHARE);
+    }
+
+    /// The same of a length of vectors of phases.
+    pub(super) fn allow_for_phases(&self, length: Estimate) -> Estimate {
+        let [count, ..] = self.phases.total();
+        length.allowing_for(lost(resultant_at_random(self.row.eta), OF_PHASES, count))
+    }
+
+    /// The same of a length of vectors of intervals.
+    pub(super) fn allow_for_intervals(&self, length: Estimate) -> Estimate {
+        let [count, ..] = self.locking.total();
+        let at_random = resultant_at_random(self.row.eta);
+        length.allowing_for(lost(at_random * at_random, OF_INTERVALS, count))
+    }
 }
 
 columns! {
@@ -384,9 +496,6 @@ impl SetJobs {
 
     /// The row of the set with all that does not need its slips.
     pub(super) fn row(&self) -> SetRow {
-        let slip_share = self.over_time(|job| job.slip_share);
-        let friction = self.over_time(|job| job.friction);
-        let coefficient = self.over_time(|job| job.friction / self.parameters.normal_force);
         SetRow {
             set_id: self.set_id.clone(),
             parameters: Selected::new(self.parameters.clone()),
@@ -397,34 +506,14 @@ impl SetJobs {
             jobs_without_slips: self.without_slips,
             jobs_cut: self.cut,
             regime: self.regime,
-            slip_share: slip_share.value(),
-            slip_share_interval: slip_share.interval().map(|ends| Interval {
-                low: ends.low.max(0.0),
-                high: ends.high.min(1.0),
-            }),
-            mean_friction: friction.value(),
-            mean_friction_interval: friction.interval(),
-            friction_coefficient: coefficient.value(),
-            friction_coefficient_interval: coefficient.interval(),
             ..SetRow::default()
         }
-    }
-
-    /// An average over the time of all jobs: by pseudo-values, one for each job, which weigh it by its time.
-    pub(super) fn over_time(&self, of: impl Fn(&JobAverages) -> f64) -> Estimate<1> {
-        let sum = |of: &dyn Fn(&JobAverages) -> f64| self.averages.values().map(of).sum::<f64>();
-        let time = sum(&|job| job.time);
-        let average = sum(&|job| job.time * of(job)) / time;
-        let weight = self.averages.len() as f64 / time;
-        let jobs = self.averages.values();
-        let pseudo = jobs.map(|job| [[average + (of(job) - average) * job.time * weight]]);
-        Sequences::of(pseudo).estimate()
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::confidence::tests::Draws;
+    use super::super::estimate::tests::Draws;
     use super::*;
     use crate::observe::Modulation;
     use crate::results::tables::JobOutcome;

@@ -1,13 +1,14 @@
 //! Slips one by one, with all parameters of their sets: for figures, and for means that the table of sets lacks.
 
 use super::Condition;
-use super::sequence::Sequences;
+use super::estimate::{Estimate, Numbers};
+use super::gather::{Gathering, MAX_SLIPS as MAX_SLIPS_AT_ONCE};
 use super::values::{Values, formula};
 use crate::model::Selected;
 use crate::observe::Slip;
 use crate::results::tables::{JOBS, JobOfSlip, Loading, SLIPS, gaps};
 use crate::results::{Results, ResultsError};
-use crate::sets::{AllButSeed, SetRow};
+use crate::sets::{AllButSeed, SetRow, Statistic};
 use crate::sweep::Expression;
 use crate::table::columns::{Row, columns};
 use std::collections::{BTreeMap, HashMap};
@@ -86,6 +87,51 @@ pub fn sample_of_slips(
     Ok((slips, every, matching))
 }
 
+/// Gives the values of a formula of columns of sets their intervals, if these are statistics and parameters.
+pub fn add_intervals(
+    results: &Results<'_>,
+    sets: &[SetRow],
+    values: &mut Values,
+) -> Result<(), ResultsError> {
+    let columns = SetRow::columns();
+    let is_measured = values
+        .sources
+        .iter()
+        .any(|name| Statistic::from_key(name).is_some());
+    let Some(formula) = formula(values.name(), &columns)
+        .ok()
+        .filter(|_| is_measured)
+    else {
+        return Ok(());
+    };
+    let names: Vec<usize> = formula.names().into_iter().copied().collect();
+    let ids = sets.iter().map(|set| set.set_id.clone());
+    let places: HashMap<String, usize> = ids.zip(0..).collect();
+    Gathering::of_jobs(results, &|_| true)?.each_set(
+        MAX_SLIPS_AT_ONCE,
+        u64::MAX,
+        |set, explained| {
+            let Some(&place) = places.get(&set.jobs.set_id) else {
+                return Ok(());
+            };
+            let set = set.finish_with(explained).0;
+            let of = names
+                .iter()
+                .map(|column| set.estimate(&columns[*column].name));
+            let found = of.collect::<Option<Vec<_>>>().map(|of| {
+                let value = |values: &[f64]| {
+                    let known: HashMap<usize, f64> =
+                        names.iter().copied().zip(values.iter().copied()).collect();
+                    formula.evaluate(&|column| known[column])
+                };
+                Estimate::of_all(&of.iter().collect::<Vec<_>>(), value)
+            });
+            values.intervals[place] = Estimate::both(found.as_ref()).1;
+            Ok(())
+        },
+    )
+}
+
 /// The means over the slips of each set of a column of slips, or a formula of such; `None` if it is neither.
 pub fn means_of_slips(
     results: &Results<'_>,
@@ -108,11 +154,10 @@ pub fn means_of_slips(
             jobs[place].entry(slip.0.0.seed).or_default().push(value);
         }
     })?;
-    let found = jobs.iter().map(|jobs| {
-        let values = jobs.values().map(|job| job.iter().map(|value| [*value]));
-        let mean = Sequences::of(values).estimate();
-        let interval = mean.interval().map(|ends| (ends.low, ends.high));
-        (mean.value(), interval)
+    let found = jobs.into_iter().map(|jobs| {
+        let jobs: Vec<(u64, Vec<f64>)> = jobs.into_iter().collect();
+        let [mean, _] = Numbers::of(&jobs, 0.0).estimates(0.0);
+        Estimate::both(mean.as_ref())
     });
     Ok(Some(Values::of_numbers(name, &formula, &columns, found)))
 }

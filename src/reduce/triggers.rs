@@ -5,19 +5,21 @@
 //! far as the control's had at its onset. Without an exact counterfactual, experiments compare catalogues before and after waves (van der Elst
 //! and Savage, J. Geophys. Res. 120 (2015), 10.1002/2014JB011611).
 
-use super::confidence::{Mean, Unseen};
 use super::drive_alone::{Explained, Times};
+use super::estimate::{Estimate, MAX_UNSEEN, Sums, Units, mean, plus};
 use super::gather::Gathered;
-use super::sequence::{Estimate, Sequences};
 use crate::model::{Drive, Parameters, Selected};
 use crate::results::tables::All;
 use crate::table::columns::{Interval, columns};
 use crate::table::tables;
 use crate::table::value::words;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Amplitude in m up to which a pulse moves nothing: what advances by it shows the error of the solver.
 const NO_PULSE: f64 = 1e-12;
+
+/// A mean and its interval.
+pub type Mean = (f64, Option<Interval>);
 
 /// Seeds that a mean needs for an interval.
 const MIN_SEEDS: usize = 8;
@@ -216,40 +218,48 @@ impl<'a> Pulses<'a> {
 
     /// The mean advance over the mean interval: as seen, by the drive alone, and of the difference.
     pub fn advances(&self) -> Option<[Mean; 3]> {
-        self.means(TriggerRow::advances, Estimate::interval)
+        let means = self.means(TriggerRow::advances)?;
+        Some(means.map(|mean| self.with(&mean, Estimate::interval)))
     }
 
     /// The share of slips that are triggered, likewise.
     pub fn triggered(&self) -> Option<[Mean; 3]> {
-        let [seen, by_drive, _] = self.means(TriggerRow::triggers, Estimate::share_interval)?;
-        let unseen = Unseen {
-            below: 1.0,
-            above: 1.0,
-        };
-        let of_excess = |mean: &Estimate<1>| mean.interval_with(unseen);
-        let [.., excess] = self.means(TriggerRow::triggers, of_excess)?;
-        Some([seen, by_drive, excess])
+        let [seen, by_drive, excess] = self.means(TriggerRow::triggers)?;
+        let count = self.rows.len() as f64;
+        let share = |share: &Estimate| share.share_interval(count);
+        // A slip that was not seen may be triggered, or not.
+        let excess = excess.allowing_for(MAX_UNSEEN / count);
+        Some([
+            self.with(&seen, share),
+            self.with(&by_drive, share),
+            self.with(&excess, Estimate::interval),
+        ])
     }
 
-    /// `None` without values. Pulses of a seed meet the same slip, so intervals need `MIN_SEEDS` of them.
-    fn means(
-        &self,
-        quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>,
-        interval: impl Fn(&Estimate<1>) -> Option<Interval>,
-    ) -> Option<[Mean; 3]> {
-        let mut seeds: BTreeMap<u64, Vec<[f64; 2]>> = BTreeMap::new();
-        for row in &self.rows {
-            if let Some(values) = quantity(row) {
-                seeds.entry(row.parameters.seed).or_default().push(values);
+    /// Pulses of a seed meet the same slip, so intervals need `MIN_SEEDS` of them.
+    fn with(&self, of: &Estimate, interval: impl Fn(&Estimate) -> Option<Interval>) -> Mean {
+        let seeds: BTreeSet<u64> = self.rows.iter().map(|row| row.parameters.seed).collect();
+        (of.value, interval(of).filter(|_| seeds.len() >= MIN_SEEDS))
+    }
+
+    /// `None` without values.
+    fn means(&self, quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>) -> Option<[Estimate; 3]> {
+        let mean_of = |of: fn([f64; 2]) -> f64| {
+            let mut seeds: BTreeMap<u64, Vec<Sums>> = BTreeMap::new();
+            for row in &self.rows {
+                let sums = quantity(row).map(|values| [1.0, of(values), 0.0]);
+                let of_seed = seeds
+                    .entry(row.parameters.seed)
+                    .or_insert_with(|| vec![[0.0; 3]]);
+                // As one value: pulses have no order.
+                of_seed[0] = plus(of_seed[0], 1.0, sums.unwrap_or_default());
             }
-        }
-        let has_interval = seeds.len() >= MIN_SEEDS;
-        let all = Sequences::of(seeds.into_values());
-        let mean = |direction: [f64; 2]| {
-            let mean = all.along(&direction).estimate();
-            Some((mean.value()?, interval(&mean).filter(|_| has_interval)))
+            Units::of(seeds).estimate(mean)
         };
-        Some([mean([1.0, 0.0])?, mean([0.0, 1.0])?, mean([1.0, -1.0])?])
+        let seen = mean_of(|[seen, _]| seen)?;
+        let by_drive = mean_of(|[_, drive]| drive)?;
+        let excess = mean_of(|[seen, drive]| seen - drive)?;
+        Some([seen, by_drive, excess])
     }
 
     /// Those that begin between two shares of the interval of the control.

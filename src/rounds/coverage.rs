@@ -3,7 +3,7 @@
 
 use super::{need, seeds_for};
 use crate::model::Parameters;
-use crate::reduce::{Pool, PooledJob, SetRow, error_over_target, mean_of, quantile};
+use crate::reduce::{Pool, PooledJob, SetRow, Units, error_over_target, mean, quantile};
 use crate::results::layout::Layout;
 use crate::sets::{STATISTICS, Statistic};
 use crate::sweep::{MIN_SEEDS, Precision, Target};
@@ -90,10 +90,12 @@ fn of_draws(repetitions: u64, least: u64, target: f64, is_skewed: bool) -> Found
     let row = |repetition: u64, seeds: u64| {
         let of_seeds =
             &all[usize::try_from(repetition).unwrap()][..usize::try_from(seeds).unwrap()];
-        let (mean, interval) = mean_of(of_seeds);
+        let jobs = (0..).zip(of_seeds);
+        let found = Units::of(jobs.map(|(seed, value)| (seed, vec![[1.0, *value, 0.0]])));
+        let found = found.estimate(mean).unwrap();
         SetRow {
-            mean_friction: mean,
-            mean_friction_interval: interval,
+            mean_friction: Some(found.value),
+            mean_friction_interval: found.interval(),
             ..SetRow::default()
         }
     };

@@ -134,7 +134,7 @@ fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEd
     for line in &lines {
         for unclear in line.unclear.iter().flat_map(|stretch| &stretch.sets) {
             let most = sweep.seed_count();
-            let seeds = seeds_for(unclear.set.seeds, unclear.sample.error(), MIN_SEEDS, most);
+            let seeds = seeds_for(unclear.set.seeds, unclear.error(), MIN_SEEDS, most);
             let set = set_of(line, unclear.row);
             if !ask(set.into_iter().collect(), seeds.unwrap_or(most)) {
                 capped.extend(set);

@@ -1,7 +1,7 @@
 //! Rounds of sweeps that look for edges, from the first to the end, with responses whose edges are known.
 
 use super::*;
-use crate::reduce::{Edge, GROUPS, Interval, Sample};
+use crate::reduce::{Edge, Interval, Units, mean};
 use crate::sets::Statistic;
 use crate::sweep::Target;
 use proptest::prelude::*;
@@ -35,25 +35,16 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
             let mut uniform = || ((generator.next_u64() >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
             (-2.0 * libm::log(uniform())).sqrt() * libm::cos(TAU * uniform())
         };
-        let mut counts = [0; GROUPS];
-        let mut sums = [0.0; GROUPS];
-        let mean = (self.mean)(amplitude, velocity);
-        for seed in 0..seeds {
-            let group = usize::try_from(seed).unwrap() % GROUPS;
+        let of_set = (self.mean)(amplitude, velocity);
+        let value = |seed: u64| {
             let noise = self.common.sqrt() * normal(0, seed)
                 + (1.0 - self.common).sqrt() * normal(1 + number, seed);
-            counts[group] += 1;
-            sums[group] += mean.unwrap_or(0.0) + self.deviation * noise;
-        }
-        let (count, total): (u64, f64) = (counts.iter().sum(), sums.iter().sum());
-        let less = |group: Option<usize>| {
-            let (of_group, sum) = group.map_or((0, 0.0), |group| (counts[group], sums[group]));
-            mean.filter(|_| count > of_group)
-                .map(|_| (total - sum) / (count - of_group) as f64)
+            of_set.unwrap_or(0.0) + self.deviation * noise
         };
+        let values = Units::of((0..seeds).map(|seed| (seed, vec![[1.0, value(seed), 0.0]])));
         SetOfEdges {
             seeds,
-            samples: vec![Sample::new(&counts, 0.0, less)],
+            excesses: vec![of_set.and_then(|_| values.estimate(mean))],
             ..SetOfEdges::default()
         }
     }
@@ -203,9 +194,9 @@ fn plain_bisection(
             let mut seeds = 24;
             let side = loop {
                 let set = noisy.set(middle.to_bits(), seeds, middle, 0.0);
-                let sample = set.samples[0].as_ref().unwrap();
-                if sample.side() != 0.0 || seeds >= 2000 {
-                    break sample.excess;
+                let excess = set.excesses[0].as_ref().unwrap();
+                if excess.half_width().unwrap() < excess.value.abs() || seeds >= 2000 {
+                    break excess.value;
                 }
                 seeds = (2 * seeds).min(2000);
             };
