@@ -6,7 +6,7 @@
 //! and Savage, J. Geophys. Res. 120 (2015), 10.1002/2014JB011611).
 
 use super::drive_alone::{Explained, Times};
-use super::estimate::{Estimate, MAX_UNSEEN, Sums, Units, mean, plus};
+use super::estimate::{Estimate, MAX_UNSEEN, Sums, Units, plus};
 use super::gather::Gathered;
 use crate::model::{Drive, Parameters, Selected};
 use crate::results::tables::All;
@@ -242,23 +242,26 @@ impl<'a> Pulses<'a> {
         (of.value, interval(of).filter(|_| seeds.len() >= MIN_SEEDS))
     }
 
-    /// `None` without values.
+    /// Of what is seen, by the drive alone, and of the difference; `None` without values.
     fn means(&self, quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>) -> Option<[Estimate; 3]> {
-        let mean_of = |of: fn([f64; 2]) -> f64| {
-            let mut seeds: BTreeMap<u64, Vec<Sums>> = BTreeMap::new();
-            for row in &self.rows {
-                let sums = quantity(row).map(|values| [1.0, of(values), 0.0]);
-                let of_seed = seeds
-                    .entry(row.parameters.seed)
-                    .or_insert_with(|| vec![[0.0; 3]]);
+        let mut seeds: BTreeMap<u64, Vec<Sums>> = BTreeMap::new();
+        for row in &self.rows {
+            if let Some([seen, drive]) = quantity(row) {
+                let of_seed = seeds.entry(row.parameters.seed).or_default();
                 // As one value: pulses have no order.
-                of_seed[0] = plus(of_seed[0], 1.0, sums.unwrap_or_default());
+                let sums = of_seed.pop().unwrap_or_default();
+                of_seed.push(plus(sums, 1.0, [1.0, seen, drive]));
             }
-            Units::of(seeds).estimate(mean)
+        }
+        let units = Units::of(seeds);
+        let mean = |of: fn([f64; 2]) -> f64| {
+            units.estimate(|[weight, seen, drive]| {
+                (weight > 0.0).then(|| of([seen, drive]) / weight)
+            })
         };
-        let seen = mean_of(|[seen, _]| seen)?;
-        let by_drive = mean_of(|[_, drive]| drive)?;
-        let excess = mean_of(|[seen, drive]| seen - drive)?;
+        let seen = mean(|[seen, _]| seen)?;
+        let by_drive = mean(|[_, drive]| drive)?;
+        let excess = mean(|[seen, drive]| seen - drive)?;
         Some([seen, by_drive, excess])
     }
 

@@ -160,27 +160,50 @@ fn coverage_by_the_least_number_of_seeds_is_measured() {
 const REPETITIONS: u64 = 2000;
 const REPETITIONS_BY_RULE: u64 = 400;
 /// Jobs and slips of a job of the cells with a fixed number of jobs.
-const SIZES: [(usize, usize); 9] = [
+const SIZES: [(usize, usize); 12] = [
     (1, 30),
     (2, 15),
+    (3, 5),
     (3, 15),
+    (5, 5),
     (7, 15),
+    (8, 8),
     (8, 15),
     (8, 30),
     (16, 15),
-    (64, 15),
-    (256, 15),
+    (64, 14),
+    (200, 15),
 ];
+/// Jobs of a pool for each that a repetition takes, so that repetitions have few in common.
+const SHARED: usize = 20;
 /// Jobs of 15 slips that would do, of the cells that end by the rule of `[precision]`; and jobs at most.
 const BY_RULE: [f64; 2] = [32.0, 96.0];
 const SLIPS_BY_RULE: usize = 15;
-const MAX_JOBS: u64 = 256;
+const MAX_JOBS: u64 = 200;
 /// Jobs from which coverage and width are promised.
 const MANY: usize = 8;
 /// Coverage that 2,000 repetitions find of a true one of 91 %, at least, in %.
 const MIN_COVERAGE: f64 = 89.5;
-/// The pools that `scripts/coverage` makes.
-const POOLS: [&str; 5] = ["locking", "deep", "short", "slow", "loose"];
+/// The same from [`FEW`] jobs on.
+const MIN_COVERAGE_OF_FEW: f64 = 85.0;
+/// Half-width over the ideal one of the cells that are listed.
+const MAX_WIDTH: f64 = 6.0;
+/// Jobs from which fewer are promised to do, in the same.
+const FEW: usize = 3;
+/// The pools that `scripts/coverage` makes, each with one of long jobs.
+const POOLS: [&str; 11] = [
+    "locking",
+    "deep",
+    "short",
+    "slow",
+    "loose",
+    "two",
+    "two-large",
+    "strong",
+    "long-periods",
+    "fast",
+    "rare",
+];
 
 fn read_pool(folder: &Path, name: &str) -> Pool {
     let folder = folder.join(format!("coverage-{name}"));
@@ -240,7 +263,7 @@ impl Repetition {
 struct Cell {
     /// Share of intervals that hold the true value, in %.
     coverage: f64,
-    /// Mean half-width over 1.96 standard deviations of the estimate.
+    /// Mean half-width over 1.96 times the root of the mean square error.
     width: f64,
 }
 
@@ -254,27 +277,34 @@ impl Cell {
         let mean = |of: &dyn Fn(&Repetition) -> f64| {
             found.iter().map(of).sum::<f64>() / found.len() as f64
         };
-        let off = mean(&|one| one.off);
-        let deviation = mean(&|one| (one.off - off) * (one.off - off)).sqrt();
+        let error = mean(&|one| one.off * one.off).sqrt();
         Some(Self {
             coverage: 100.0 * mean(&|one| f64::from(u8::from(one.holds()))),
-            width: mean(&|one| 0.5 * (one.high - one.low)) / (1.96 * deviation),
+            width: mean(&|one| 0.5 * (one.high - one.low)) / (1.96 * error),
         })
     }
 }
 
-/// The cells of a set, by statistics and then sizes: fixed numbers of jobs, then those that end by the rule.
-fn cells(pool: &Pool, set: usize, statistics: &[Statistic]) -> Vec<Vec<Option<Cell>>> {
+/// The cells of a set, by statistics and then sizes: fixed numbers of jobs, then those that end by the rule. None of
+/// those for which the pool is too small.
+fn cells(
+    pool: &Pool,
+    set: usize,
+    truth: &SetRow,
+    statistics: &[Statistic],
+) -> Vec<Vec<Option<Cell>>> {
     let jobs = &pool.sets[set].1;
-    let truth = |slips: usize| pool.row(set, jobs, slips);
     let mut found = vec![Vec::new(); statistics.len()];
     for (count, slips) in SIZES {
-        let truth = truth(slips);
+        if SHARED * count > jobs.len() {
+            found.iter_mut().for_each(|cells| cells.push(None));
+            continue;
+        }
         let repetitions: Vec<Vec<Option<Repetition>>> = (0..REPETITIONS)
             .into_par_iter()
             .map(|repetition| {
                 let row = pool.row(set, of_repetition(jobs, repetition, count), slips);
-                let of = |statistic: &Statistic| Repetition::of(&row, &truth, *statistic);
+                let of = |statistic: &Statistic| Repetition::of(&row, truth, *statistic);
                 statistics.iter().map(of).collect()
             })
             .collect();
@@ -283,10 +313,11 @@ fn cells(pool: &Pool, set: usize, statistics: &[Statistic]) -> Vec<Vec<Option<Ce
             of_statistic.push(Cell::of(&all));
         }
     }
-    let truth = truth(SLIPS_BY_RULE);
-    for (statistic, of_statistic) in statistics.iter().zip(&mut found) {
-        for enough in BY_RULE {
-            of_statistic.push(by_rule(pool, set, &truth, *statistic, enough));
+    if SHARED as u64 * MAX_JOBS <= jobs.len() as u64 {
+        for (statistic, of_statistic) in statistics.iter().zip(&mut found) {
+            for enough in BY_RULE {
+                of_statistic.push(by_rule(pool, set, truth, *statistic, enough));
+            }
         }
     }
     found
@@ -301,7 +332,7 @@ fn by_rule(
     enough: f64,
 ) -> Option<Cell> {
     let jobs = &pool.sets[set].1;
-    let of_all = Repetition::of(truth, truth, statistic)?;
+    let of_all = Repetition::of(&pool.row(set, jobs, SLIPS_BY_RULE), truth, statistic)?;
     let half = 0.5 * (of_all.high - of_all.low) * (jobs.len() as f64 / enough).sqrt();
     let precision = Precision {
         statistics: vec![statistic],
@@ -363,6 +394,19 @@ impl Measured {
     /// Whether it has as many jobs as are promised to do.
     fn is_of_many(&self) -> bool {
         SIZES.get(self.column).is_none_or(|&(jobs, _)| jobs >= MANY)
+    }
+
+    /// Its jobs and slips of a job.
+    fn size(&self) -> (String, usize) {
+        let by_rule = || {
+            (
+                format!("rule {}", BY_RULE[self.column - SIZES.len()]),
+                SLIPS_BY_RULE,
+            )
+        };
+        SIZES
+            .get(self.column)
+            .map_or_else(by_rule, |&(jobs, slips)| (jobs.to_string(), slips))
     }
 }
 
@@ -444,6 +488,43 @@ fn by_set(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
     lines.join("\n")
 }
 
+/// The cells that are not as promised, those with the least coverage first, then those with the widest intervals.
+fn worst(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
+    let jobs = |cell: &&Measured| SIZES.get(cell.column).map_or(MANY, |&(jobs, _)| jobs);
+    let least = |cell: &&Measured| match jobs(cell) {
+        ..FEW => 0.0,
+        FEW..MANY => MIN_COVERAGE_OF_FEW,
+        MANY.. => MIN_COVERAGE,
+    };
+    let is_wide = |cell: &&Measured| cell.is_of_many() && cell.cell.width > MAX_WIDTH;
+    let low = cells.iter().filter(|cell| cell.cell.coverage < least(cell));
+    let mut low: Vec<&Measured> = low.collect();
+    low.sort_by(|a, b| a.cell.coverage.total_cmp(&b.cell.coverage));
+    let mut wide: Vec<&Measured> = cells.iter().filter(is_wide).collect();
+    wide.sort_by(|a, b| b.cell.width.total_cmp(&a.cell.width));
+    let mut lines = vec![
+        "| N | V0 (m/s) | Δ (µm) | f (Hz) | τ_r (ms) | statistic | jobs × slips | coverage | half-width |"
+            .to_owned(),
+        "|---|---|---|---|---|---|---|---|---|".to_owned(),
+    ];
+    for cell in low.into_iter().chain(wide) {
+        let parameters = &sets[cell.set].0;
+        let (jobs, slips) = cell.size();
+        lines.push(format!(
+            "| {} | {:e} | {:.2} | {:.1} | {:.1} | `{}` | {jobs} × {slips} | {:.1} | {:.2} |",
+            parameters.blocks,
+            parameters.drive_velocity,
+            1e6 * parameters.modulation_amplitude,
+            parameters.frequency().unwrap_or_default(),
+            1e3 * parameters.reattachment_time,
+            cell.statistic,
+            cell.cell.coverage,
+            cell.cell.width,
+        ));
+    }
+    lines.join("\n")
+}
+
 /// Every cell, for `docs/coverage.csv`.
 fn csv(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
     let mut lines = vec![
@@ -451,13 +532,7 @@ fn csv(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
     ];
     for measured in cells {
         let parameters = &sets[measured.set].0;
-        let (jobs, slips) = SIZES.get(measured.column).map_or_else(
-            || {
-                let enough = BY_RULE[measured.column - SIZES.len()];
-                (format!("rule {enough}"), SLIPS_BY_RULE)
-            },
-            |&(jobs, slips)| (jobs.to_string(), slips),
-        );
+        let (jobs, slips) = measured.size();
         lines.push(format!(
             "{},{},{:e},{:e},{:.4},{},{:.6e},{jobs},{slips},{:.2},{:.3}",
             parameters.blocks,
@@ -489,9 +564,10 @@ fn coverage_is_measured() {
     let mut all = Vec::new();
     for name in POOLS {
         let pool = read_pool(folder, name);
-        for (set, (parameters, jobs)) in pool.sets.iter().enumerate() {
-            let row = pool.row(set, jobs, SLIPS_BY_RULE);
-            for (statistic, cells) in statistics.iter().zip(cells(&pool, set, &statistics)) {
+        let long = read_pool(folder, &format!("{name}-long"));
+        for (set, (parameters, _)) in pool.sets.iter().enumerate() {
+            let row = long.row(set, &long.sets[set].1, usize::MAX);
+            for (statistic, cells) in statistics.iter().zip(cells(&pool, set, &row, &statistics)) {
                 let Some(truth) = row.number(statistic.key) else {
                     continue;
                 };
@@ -513,12 +589,17 @@ fn coverage_is_measured() {
     let few = Summary::of(all.iter().filter(|cell| !cell.is_of_many()));
     let is_low = |cell: &&Measured| cell.is_of_many() && cell.cell.coverage < MIN_COVERAGE;
     let low = all.iter().filter(is_low).count();
+    let is_narrow = |cell: &&Measured| cell.is_of_many() && cell.cell.width <= 3.0;
+    let narrow = 100.0 * all.iter().filter(is_narrow).count() as f64 / many.count as f64;
     let [slips, means] = of_backbone(&read_pool(folder, "dense"));
     let text = format!(
         "{}\n\n\
          From {MANY} jobs on there are {} cells: {low} lie below {MIN_COVERAGE} %, the least at {:.1} %, the median at\n\
-         {:.1} %; the half-width is {:.2} in the median, {:.2} at most.\n\
+         {:.1} %; the half-width is {:.2} in the median, {:.2} at most, and at most 3 in {narrow:.1} %.\n\
          With fewer jobs the median is {:.1} %, and the half-width {:.2} in the median, {:.2} at most.\n\n\
+         ## Worst cells\n\n\
+         Below {MIN_COVERAGE} % from {MANY} jobs on, below {MIN_COVERAGE_OF_FEW} % from {FEW} on, then those wider than\n\
+         {MAX_WIDTH} from {MANY} on:\n\n{}\n\n\
          ## By statistic\n\n{}\n\n\
          ## By set, from {MANY} jobs on\n\n{}\n\n\
          ## The back-bone\n\n\
@@ -534,6 +615,7 @@ fn coverage_is_measured() {
         few.coverage[1],
         few.width[1],
         few.width[2],
+        worst(&all, &sets),
         by_statistic(&all, &statistics),
         by_set(&all, &sets),
     );
