@@ -4,9 +4,9 @@ use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
 use crate::model::{Parameters, Selected, Selection, Symbol, Value as Parameter};
 use crate::reduce::{
-    Comparison, Condition, Difference, EdgeRow, FREQUENCY, Interval, Pulses, SetInRounds, SetRow,
-    TriggerRow, Values, add_intervals, ascending, compare, differing, means_of_slips,
-    read_optional, read_sets, read_sets_in_rounds, renew,
+    Comparison, Condition, Difference, EdgePair, EdgeRow, FREQUENCY, Interval, Pulses, SetInRounds,
+    SetRow, TriggerRow, Values, add_intervals, ascending, compare, differing, means_of_slips,
+    pairs_of_edges, read_optional, read_sets, read_sets_in_rounds, renew,
 };
 use crate::results::Results;
 use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, symbol_of, with_decimals};
@@ -193,6 +193,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
             output::print(&format!("so far: {unfinished}\n\n"))?;
         }
         output::print(&table_of_edges(&edges, &rows))?;
+        output::print(&table_of_pairs(&pairs_of_edges(results)?))?;
         output::print(&table_of_pulses(&read_optional(results.layout())?))?;
     }
     let edges: Vec<Json> = edges.iter().map(json).collect();
@@ -480,6 +481,33 @@ fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
     });
     columns.words("jobs", edges, |edge| edge.jobs.to_string());
     columns.words("ended by", edges, |edge| edge.ended.word().to_owned());
+    format!("{columns}\n")
+}
+
+/// By how much edges of other statistics lie further than those of the first, and a blank line; empty if there are none.
+fn table_of_pairs(pairs: &[EdgePair]) -> String {
+    let Some(first) = pairs.first() else {
+        return String::new();
+    };
+    let axis = Symbol::from_key(&first.edges[0].axis).unwrap_or(Symbol::T);
+    let parameters = pairs
+        .iter()
+        .map(|pair| pair.edges[0].parameters.parameters.clone());
+    let mut columns = parameters_but(axis, parameters);
+    let label = label(axis.key());
+    let largest = pairs
+        .iter()
+        .filter_map(|pair| pair.edges[1].edge)
+        .fold(0.0, f64::max);
+    let (factor, unit) = label.scale(largest);
+    columns.words("edge of", pairs, |pair| pair.edges[1].crossed());
+    columns.words("less that of", pairs, |pair| pair.edges[0].crossed());
+    columns.words(label.short(unit), pairs, |pair| {
+        let [low, high] = pair.interval.map_or([f64::NAN; 2], |(low, high)| {
+            [low, high].map(|end| factor * end)
+        });
+        with_interval(factor * pair.difference, low, high)
+    });
     format!("{columns}\n")
 }
 

@@ -15,7 +15,7 @@
 
 use super::drive_alone::Explained;
 use super::estimate::{CONFIDENCE, Estimate};
-use super::gather::{Gathered, of_chosen};
+use super::gather::{Gathered, has_jobs, of_chosen};
 use crate::model::{Parameters, Selected};
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, Digits, Statistic, label};
@@ -184,6 +184,8 @@ pub struct Edge<'a> {
     /// Where it is, and the ends of its interval.
     pub(crate) place: f64,
     pub(crate) interval: [f64; 2],
+    /// The row of the axis at which a line through these sets crosses.
+    crossing: Option<Estimate>,
     /// Width of the interval over that wanted; infinite if no line gives one.
     pub error: f64,
     /// The row between two neighbours that is wanted next, if these are too far from each other.
@@ -213,6 +215,7 @@ impl<'a> Edge<'a> {
             let place = ends[0] - gap as f64 * excess(&pair[0]) / rise(&pair);
             let error = gap as f64 / width;
             return Some(Self {
+                crossing: fit(pair, ends[0]).map(|line| line.estimate),
                 sets: pair.to_vec(),
                 bracket,
                 place,
@@ -254,6 +257,7 @@ impl<'a> Edge<'a> {
             bracket,
             place,
             interval,
+            crossing: Some(line.estimate),
             error,
             wanted_row,
             is_bracketed: false,
@@ -294,6 +298,7 @@ struct Fit {
     /// Where it crosses zero, and the ends of its interval; `None` if the slope may be zero.
     crossing: f64,
     interval: Option<[f64; 2]>,
+    estimate: Estimate,
 }
 
 /// By least squares, sets weighted by their seeds; `None` for less than two rows.
@@ -325,7 +330,9 @@ fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
     let c = beyond_error(&slope, &slope);
     let root = (b * b - a * c).max(0.0).sqrt();
     let interval = (c > 0.0).then(|| [origin - (b + root) / c, origin + (root - b) / c]);
+    let estimate = Estimate::function([&begin, &slope], |[begin, slope]| origin - begin / slope);
     (moment > 0.0).then(|| Fit {
+        estimate,
         slope: slope.value,
         crossing: origin - begin.value / slope.value,
         interval,
@@ -468,6 +475,73 @@ pub(super) fn edge_rows(
         }
     }
     Ok(rows)
+}
+
+/// The edges of two statistics on one row, by how much the second lies further, and the ends of its interval.
+pub struct EdgePair {
+    pub edges: [EdgeRow; 2],
+    pub difference: f64,
+    pub interval: Option<(f64, f64)>,
+}
+
+/// Of the first statistic and each other, by the seeds of both.
+pub fn pairs_of_edges(results: &Results<'_>) -> Result<Vec<EdgePair>, ResultsError> {
+    let sweep = results.sweep();
+    let has_jobs = has_jobs(results)?;
+    let refinement = sweep.refinement();
+    let Some(refinement) = refinement.filter(|refinement| refinement.by.len() > 1 && has_jobs)
+    else {
+        return Ok(Vec::new());
+    };
+    let sets = sets_of_edges(results, refinement)?;
+    let scale = Scale::of(sweep, refinement);
+    let mut found = Vec::new();
+    for of_row in lines(sweep, refinement, &sets).chunk_by(|line, next| line.rows == next.rows) {
+        let others = of_row.iter().skip(1);
+        let edges = others.flat_map(|other| {
+            of_row[0]
+                .edges
+                .iter()
+                .zip(&other.edges)
+                .map(move |pair| (pair, other))
+        });
+        for ((edge, other), line) in edges {
+            let Some([crossing, of_other]) = edge
+                .crossing
+                .as_ref()
+                .zip(other.crossing.as_ref())
+                .map(<[_; 2]>::from)
+            else {
+                continue;
+            };
+            let value = |row| scale.value(row);
+            let difference = Estimate::function([crossing, of_other], |[row, other]| {
+                value(other) - value(row)
+            });
+            // As wide as that of an edge, for the same reason.
+            let half = difference.half_width().map(|half| LOOKS * half);
+            let difference = difference.value;
+            let row = |key, edge: &Edge<'_>| EdgeRow {
+                edge: Some(scale.value(edge.place)),
+                ..row_between(
+                    sweep,
+                    refinement,
+                    key,
+                    (edge.bracket[0].row, edge.bracket[0].set),
+                    edge.bracket[1].row,
+                )
+            };
+            found.push(EdgePair {
+                edges: [
+                    row(of_row[0].statistic.key, edge),
+                    row(line.statistic.key, other),
+                ],
+                difference,
+                interval: half.map(|half| (difference - half, difference + half)),
+            });
+        }
+    }
+    Ok(found)
 }
 
 /// A row without an edge between the first of these rows of the axis, with its set, and the last.

@@ -29,6 +29,12 @@ pub(super) const MAX_SLIPS: u64 = 1 << 22;
 /// Which jobs are wanted, by their parameters.
 type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 
+/// Whether a directory has its tables, and not reduced data alone.
+pub(super) fn has_jobs(results: &Results<'_>) -> Result<bool, ResultsError> {
+    let layout = results.layout();
+    Ok(layout.storage.exists(&layout.table(JOBS))?)
+}
+
 /// The sets that the rounds of a directory have chosen, by their numbers, controls left out: of the chosen jobs alone.
 pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, ResultsError> {
     of_chosen(results, |set, explained| set.finish_with(explained).0.row)

@@ -23,7 +23,9 @@ pub use backbone::BackboneBin;
 pub use compare::{Comparison, compare};
 #[cfg(test)]
 pub(crate) use crossings::Edge;
-pub use crossings::{EdgeRow, Ended, Line, SetOfEdges, lines, sets_of_edges};
+pub use crossings::{
+    EdgePair, EdgeRow, Ended, Line, SetOfEdges, lines, pairs_of_edges, sets_of_edges,
+};
 pub use differences::Difference;
 pub use estimate::quantile;
 pub(crate) use estimate::student_at;

@@ -2,7 +2,7 @@
 
 use super::Condition;
 use super::estimate::{Estimate, Numbers};
-use super::gather::{Gathering, MAX_SLIPS as MAX_SLIPS_AT_ONCE};
+use super::gather::{Gathering, MAX_SLIPS as MAX_SLIPS_AT_ONCE, has_jobs};
 use super::values::{Values, formula};
 use crate::model::Selected;
 use crate::observe::Slip;
@@ -94,13 +94,14 @@ pub fn add_intervals(
     values: &mut Values,
 ) -> Result<(), ResultsError> {
     let columns = SetRow::columns();
+    let has_jobs = has_jobs(results)?;
     let is_measured = values
         .sources
         .iter()
         .any(|name| Statistic::from_key(name).is_some());
     let Some(formula) = formula(values.name(), &columns)
         .ok()
-        .filter(|_| is_measured)
+        .filter(|_| is_measured && has_jobs)
     else {
         return Ok(());
     };
