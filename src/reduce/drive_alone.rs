@@ -105,8 +105,8 @@ impl Explained {
         };
         let vectors = |job: &[(f64, Sums)]| job.iter().map(|(_, vector)| *vector).collect();
         let phases = Units::of(jobs.into_iter().map(|(seed, job)| (seed, vectors(job))));
-        let [seen, alone] = beside(&set.phases, &phases);
-        let seen = seen.map(|seen| set.allow_for_phases(seen));
+        let seen = set.length_of_phases(&set.phases.common(&phases));
+        let alone = phases.common(&set.phases).estimate(length);
         let excess = less(seen.as_ref(), alone.as_ref());
         (set.row.resultant_drive, _) = set.note("resultant_drive", alone, SHARE);
         (set.row.resultant_excess, set.row.resultant_excess_interval) =
@@ -116,8 +116,8 @@ impl Explained {
         }
         let jobs = passages.iter();
         let periods = Units::of(jobs.map(|(&seed, job)| (seed, job.periods.clone())));
-        let [seen, alone] = beside(&set.locking, &periods);
-        let seen = seen.map(|seen| set.allow_for_intervals(seen));
+        let seen = set.length_of_intervals(&set.locking.common(&periods));
+        let alone = periods.common(&set.locking).estimate(length);
         let excess = less(seen.as_ref(), alone.as_ref());
         (set.row.locking_index_drive, _) = set.note("locking_index_drive", alone, SHARE);
         (
@@ -125,12 +125,6 @@ impl Explained {
             set.row.locking_excess_interval,
         ) = set.note("locking_index_excess", excess, ANY);
     }
-}
-
-/// Lengths of what is seen and of passages, of the seeds that both have, or of all if there are none.
-fn beside(seen: &Units, passages: &Units) -> [Option<Estimate>; 2] {
-    let common = [seen.common(passages), passages.common(seen)];
-    common.map(|units| units.estimate(length))
 }
 
 fn less(seen: Option<&Estimate>, alone: Option<&Estimate>) -> Option<Estimate> {
@@ -339,10 +333,10 @@ mod tests {
                 alone.push(job(0.6));
             }
             let [seen, alone] = [seen, alone].map(|jobs| Units::of((0..).zip(jobs)));
-            let [seen, alone] = beside(&seen, &alone);
+            let [seen, alone] = [seen, alone].map(|units| units.estimate(length));
             let found = less(seen.as_ref(), alone.as_ref()).unwrap();
-            let length = |spread: f64| libm::exp(-0.5 * (0.09 + spread * spread));
-            let excess = length(0.3) - length(0.6);
+            let length_of = |spread: f64| libm::exp(-0.5 * (0.09 + spread * spread));
+            let excess = length_of(0.3) - length_of(0.6);
             (found.value - excess).abs() <= found.half_width().unwrap()
         };
         for pairs in [2, 8, 30] {

@@ -211,7 +211,8 @@ fn off(period: Option<f64>, mean: f64, numbers: &Numbers) -> f64 {
 
 /// What a slip that was not seen may take from a sum of vectors if the others have the length of slips at random loads:
 /// so many times what that lacks of 1, and at most what one across the others takes.
-fn lost(length_at_random: f64, [times, most]: [f64; 2], count: f64) -> f64 {
+fn lost(length_at_random: f64, [times, most]: [f64; 2], vectors: &Units) -> f64 {
+    let [count, ..] = vectors.total();
     MAX_UNSEEN * (times * (1.0 - length_at_random)).min(most) / count
 }
 /// Of a slip.
@@ -374,10 +375,7 @@ impl FinishedSet {
                 .map(|(seed, periods)| (*seed, vectors(periods))),
         );
         if self.row.periods != Some(0) {
-            let locking = self
-                .locking
-                .estimate(length)
-                .map(|locking| self.allow_for_intervals(locking));
+            let locking = self.length_of_intervals(&self.locking);
             (self.row.locking_index, self.row.locking_interval) =
                 self.note("locking_index", locking, SHARE);
         }
@@ -396,25 +394,22 @@ impl FinishedSet {
             let is_narrow = |ends: Interval| ends.high - ends.low < WHOLE_TURN;
             self.row.has_phase = interval.is_some_and(is_narrow);
         }
-        let length = self
-            .phases
-            .estimate(length)
-            .map(|length| self.allow_for_phases(length));
+        let length = self.length_of_phases(&self.phases);
         (self.row.resultant_length, self.row.length_interval) =
             self.note("resultant_length", length, SHARE);
     }
 
-    /// The same of a length of vectors of phases.
-    pub(super) fn allow_for_phases(&self, length: Estimate) -> Estimate {
-        let [count, ..] = self.phases.total();
-        length.allowing_for(lost(resultant_at_random(self.row.eta), OF_PHASES, count))
+    /// Length of vectors of phases.
+    pub(super) fn length_of_phases(&self, phases: &Units) -> Option<Estimate> {
+        let lost = lost(resultant_at_random(self.row.eta), OF_PHASES, phases);
+        Some(phases.estimate(length)?.allowing_for(lost))
     }
 
-    /// The same of a length of vectors of intervals.
-    pub(super) fn allow_for_intervals(&self, length: Estimate) -> Estimate {
-        let [count, ..] = self.locking.total();
+    /// Of intervals in periods, as angles.
+    pub(super) fn length_of_intervals(&self, intervals: &Units) -> Option<Estimate> {
         let at_random = resultant_at_random(self.row.eta);
-        length.allowing_for(lost(at_random * at_random, OF_INTERVALS, count))
+        let lost = lost(at_random * at_random, OF_INTERVALS, intervals);
+        Some(intervals.estimate(length)?.allowing_for(lost))
     }
 }
 
