@@ -821,9 +821,8 @@ pub(super) mod tests {
     fn where_jobs_begin_and_end_with_the_same_kind_of_interval_the_ends_say_how_far_the_mean_is_off()
      {
         let alternating = |count: u32| {
-            (0..count)
-                .map(|place| 1.0 + 0.1 * f64::from(1 - 2 * (place % 2) as i32))
-                .collect()
+            let interval = |place: u32| if place.is_multiple_of(2) { 1.1 } else { 0.9 };
+            (0..count).map(interval).collect()
         };
         let of = |count| {
             let jobs: Vec<(u64, Vec<f64>)> =
