@@ -137,11 +137,11 @@ impl Cycles {
     }
 
     /// The slips of each job within whole cycles from its first one on; empty if these are too few.
-    pub(super) fn within<'a, T>(
+    pub(super) fn within<T>(
         self,
-        mut jobs: Vec<(u64, &'a [T])>,
+        mut jobs: Vec<(u64, &[T])>,
         onset: impl Fn(&T) -> f64,
-    ) -> Vec<(u64, &'a [T])> {
+    ) -> Vec<(u64, &[T])> {
         let mut total = 0.0;
         for (_, slips) in &mut jobs {
             let onsets = || slips.iter().map(&onset).filter(|onset| !onset.is_nan());

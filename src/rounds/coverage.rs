@@ -297,7 +297,9 @@ fn cells(
     let mut found = vec![Vec::new(); statistics.len()];
     for (count, slips) in SIZES {
         if SHARED * count > jobs.len() {
-            found.iter_mut().for_each(|cells| cells.push(None));
+            for cells in &mut found {
+                cells.push(None);
+            }
             continue;
         }
         let repetitions: Vec<Vec<Option<Repetition>>> = (0..REPETITIONS)
