@@ -1,7 +1,8 @@
 """Circular statistics, and estimates with 95 % confidence intervals.
 
 Jobs of different seeds are independent, slips of one job are not. So the units that are left out (jackknife) or drawn
-again (bootstrap) are seeds or parameter sets, never slips.
+again (bootstrap) are seeds or parameter sets, never slips. The jackknife is that of the reduced tables, without their
+allowances for slips that were not seen and for the ends of jobs (docs/model.md).
 """
 
 from collections.abc import Callable
@@ -53,6 +54,12 @@ class Estimate:
         if self.high < above or self.low > below:
             return False
         return True if above < self.low and self.high < below else None
+
+    def among(self, comparisons: int) -> "Estimate":
+        """The same with Bonferroni's correction for this number of comparisons."""
+        one, all_of_them = (stats.t.ppf(1 - (1 - LEVEL) / 2 / number, self.units - 1) for number in (1, comparisons))
+        ends = (self.value + all_of_them / one * (end - self.value) for end in (self.low, self.high))
+        return Estimate(self.value, *map(float, ends), self.units)
 
     def scaled(self, factor: float) -> "Estimate":
         return Estimate(factor * self.value, factor * self.low, factor * self.high, self.units)

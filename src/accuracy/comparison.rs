@@ -4,12 +4,11 @@
 //! A break is identified by block, contact and generation, which mean the same contact in every solver. It is missing
 //! if it has not come a tenth of the wave crossing time after the last of the reference.
 //!
-//! Realisations are independent, slips of one are not. So errors are those of the sums of realisations, and a
-//! difference has the degrees of freedom of the smaller ensemble: those of Welch are too many far out, where many
-//! comparisons look.
+//! Errors are those of the estimator of a sweep's statistics, with realisations as its units. A difference has the degrees
+//! of freedom of the smaller ensemble: those of Welch are too many far out, where many comparisons look.
 
 use crate::model::{Change, ContactEvent, Parameters};
-use crate::reduce::student_at;
+use crate::reduce::{Estimate, Numbers, student_at};
 use crate::solver::{Observer, Segment};
 use crate::table::columns::{Interval, columns};
 use std::collections::HashMap;
@@ -129,7 +128,7 @@ columns! {
     pub struct Bias {
         of_mean as "mean_bias": f64 = "", "mean less that of the reference";
         interval_of_mean as "mean_bias": Option<Interval> = "",
-            "lower end of its 95 % interval; null for fewer than two realisations";
+            "lower end of its 95 % interval; null if the slips of a solver are too few";
         freedom: Option<f64> = "", "its degrees of freedom";
         of_deviation as "deviation_bias": f64 = "", "standard deviation less that of the reference";
         interval_of_deviation as "deviation_bias": Option<Interval> = "", "lower end of its 95 % interval";
@@ -138,25 +137,26 @@ columns! {
 
 impl Bias {
     pub fn of(sample: &Sample, reference: &Sample) -> Self {
-        let of_mean = sample.mean - reference.mean;
-        let of_deviation = sample.deviation - reference.deviation;
-        let others = sample.others.min(reference.others);
-        // Without two realisations of each there is no error.
-        let freedom = (others >= 1.0).then_some(others);
-        let about = |bias: f64, error: fn(&Sample) -> f64| {
-            let error = libm::hypot(error(sample), error(reference));
-            let half = student_at(CONFIDENCE, freedom?) * error;
-            Some(Interval {
+        let of = |which: fn(&Sample) -> &Estimate| {
+            let [own, other] = [which(sample), which(reference)];
+            let bias = own.value - other.value;
+            let half = own.half_width().zip(other.half_width());
+            let half = half.map(|(own, other)| libm::hypot(own, other));
+            let interval = half.map(|half| Interval {
                 low: bias - half,
                 high: bias + half,
-            })
+            });
+            (bias, interval)
         };
+        let (of_mean, interval_of_mean) = of(|sample| &sample.mean);
+        let (of_deviation, interval_of_deviation) = of(|sample| &sample.deviation);
+        let fewer = sample.mean.freedom().min(reference.mean.freedom());
         Self {
             of_mean,
-            interval_of_mean: about(of_mean, |sample| sample.error_of_mean),
-            freedom,
+            interval_of_mean,
+            freedom: interval_of_mean.map(|_| fewer),
             of_deviation,
-            interval_of_deviation: about(of_deviation, |sample| sample.error_of_deviation),
+            interval_of_deviation,
         }
     }
 
@@ -175,48 +175,24 @@ impl Bias {
     }
 }
 
-/// Mean and standard deviation of the values of realisations, with their standard errors.
-#[derive(Clone, Copy, Debug)]
+/// Mean and standard deviation of the values of realisations.
+#[derive(Clone, Debug)]
 pub struct Sample {
     pub count: usize,
-    pub mean: f64,
-    pub deviation: f64,
-    error_of_mean: f64,
-    error_of_deviation: f64,
-    /// Realisations with values, less one.
-    others: f64,
+    pub(crate) mean: Estimate,
+    pub(crate) deviation: Estimate,
 }
 
 impl Sample {
-    /// `None` without a value.
-    pub fn of(realisations: &[Vec<f64>]) -> Option<Self> {
-        let count: usize = realisations.iter().map(Vec::len).sum();
-        if count == 0 {
-            return None;
-        }
-        let n = count as f64;
-        let with_values = realisations.iter().filter(|values| !values.is_empty());
-        let others = with_values.count() as f64 - 1.0;
-        // The mean of a function of the values, and the standard error by its sums over realisations.
-        let mean_of = |of: &dyn Fn(f64) -> f64| {
-            let sum = |values: &Vec<f64>| values.iter().map(|&value| of(value)).sum::<f64>();
-            let mean = realisations.iter().map(sum).sum::<f64>() / n;
-            let deviations = realisations
-                .iter()
-                .map(|values| sum(values) - mean * values.len() as f64);
-            let squares: f64 = deviations.map(|deviation| deviation * deviation).sum();
-            (mean, (squares * (others + 1.0) / others).sqrt() / n)
-        };
-        let (mean, error_of_mean) = mean_of(&|value| value);
-        let (square, error_of_square) = mean_of(&|value| (value - mean) * (value - mean));
-        let deviation = (square * n / (n - 1.0).max(1.0)).sqrt();
+    /// `None` for fewer than two values.
+    pub fn of(realisations: Vec<Vec<f64>>) -> Option<Self> {
+        let count = realisations.iter().map(Vec::len).sum();
+        let jobs: Vec<(u64, Vec<f64>)> = (0..).zip(realisations).collect();
+        let [mean, deviation] = Numbers::of(&jobs, 0.0).estimates(0.0);
         Some(Self {
             count,
-            mean,
-            deviation,
-            error_of_mean,
-            error_of_deviation: error_of_square / (2.0 * deviation),
-            others,
+            mean: mean?,
+            deviation: deviation?,
         })
     }
 }
@@ -305,36 +281,26 @@ mod tests {
                 (0..20).map(|_| own + width * uniform()).collect()
             })
             .collect();
-        Sample::of(&all).unwrap()
+        Sample::of(all).unwrap()
     }
 
     #[test]
-    fn the_error_of_means_of_equal_realisations_is_that_of_the_textbook() {
-        let sample = Sample::of(&[vec![1.0, 3.0], vec![2.0, 2.0], vec![4.0, 6.0]]).unwrap();
-        // Means 2, 2 and 5.
-        assert!((sample.mean - 3.0).abs() < 1e-15);
-        assert!((sample.error_of_mean - 1.0).abs() < 1e-15);
-        assert!((sample.deviation - (16.0_f64 / 5.0).sqrt()).abs() < 1e-15);
-        let bias = Bias::of(&sample, &sample);
-        assert_eq!(bias.freedom, Some(2.0));
-        let half = student_at(0.95, 2.0) * 2.0_f64.sqrt();
-        assert!((bias.half_width().unwrap() - half).abs() < 1e-12);
+    fn a_bias_has_the_errors_of_both_and_more_comparisons_ask_for_more() {
+        let [sample, reference] = [1, 2].map(|seed| realisations(9, 1.0, 0.0, seed));
+        let bias = Bias::of(&sample, &reference);
+        let halves = [&sample, &reference].map(|sample| sample.mean.half_width().unwrap());
+        let both = libm::hypot(halves[0], halves[1]);
+        assert!((bias.half_width().unwrap() / both - 1.0).abs() < 1e-12);
+        assert_eq!(bias.freedom, Some(8.0));
         assert!(bias.half_width_among(5) > bias.half_width());
     }
 
     #[test]
-    fn one_realisation_has_no_error() {
-        let one = Sample::of(&[vec![1.0, 2.0, 3.0]]).unwrap();
-        let bias = Bias::of(&one, &realisations(5, 1.0, 0.0, 1));
-        assert_eq!(
-            (
-                bias.interval_of_mean,
-                bias.freedom,
-                bias.half_width_among(3)
-            ),
-            (None, None, None)
-        );
-        assert!(Sample::of(&[Vec::new()]).is_none());
+    fn few_values_have_no_error_and_none_no_sample() {
+        let two = Sample::of(vec![vec![1.0, 2.0]]).unwrap();
+        let bias = Bias::of(&two, &realisations(5, 1.0, 0.0, 1));
+        assert!(bias.half_width_among(3).is_some());
+        assert!(Sample::of(vec![vec![1.0]]).is_none() && Sample::of(vec![Vec::new()]).is_none());
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! The files of a study: everything as JSON, and figures.
 
+use super::comparison::Bias;
 use super::{Findings, MethodRow, Study, other_settings, others_in_words, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::destination::{Destination, refuse_reserved};
 use crate::table::arrow;
+use crate::table::columns::Interval;
 use crate::table::file::PROGRAM;
 use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
@@ -87,12 +89,13 @@ pub fn write(
     Ok(files)
 }
 
-/// The figure of the sets that are this one without modulation: cost against the error of break times, and against
-/// biases of means, in units of the bias that chance alone stays under.
+/// The figure of the sets that are this one without modulation: cost against the error of break times, and against the
+/// biases of mean and standard deviation of τ, in units of the bias that chance alone stays under.
 fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Picture> {
     const WORK: &str = "CPU time per slip (s)";
-    const NOTE: &str = "Biases: mean of a method's slips less that of the reference, over what equal means stay under in 95 of 100 \
-                        samples; bars: 95 %. Errors of break times: median, bars up to the largest.";
+    const NOTE: &str = "Biases: a method's slips less those of the reference, over what 95 of 100 samples without a bias stay under, \
+                        so that chance alone puts 1 dot of 20 above 1; bars: 95 %. Errors of break times: median, bars up to the \
+                        largest.";
     const EXTRAPOLATED: &str = " * Cost extrapolated from that of a step.";
     let rows = findings.methods.iter();
     let rows = rows.filter(|row| row.parameters.without_modulation() == *set);
@@ -106,11 +109,14 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
         by_chance: None,
         points: breaks,
     }];
-    for (quantity, name) in [("interval", "τ"), ("front_speed", "front speed")] {
+    let of_mean = |bias: &Bias| (bias.of_mean, bias.interval_of_mean);
+    let of_deviation = |bias: &Bias| (bias.of_deviation, bias.interval_of_deviation);
+    let biases: [(&str, &dyn Fn(&Bias) -> (f64, Option<Interval>)); 2] =
+        [("mean τ", &of_mean), ("s.d. of τ", &of_deviation)];
+    for (name, of) in biases {
         let points = points(&rows, |row| {
-            let bias = findings.bias_of(row, quantity)?.bias;
-            let by_chance = bias.half_width()?;
-            let of_chance = bias.of_mean.abs() / by_chance;
+            let (bias, interval) = of(&findings.bias_of(row, "interval")?.bias);
+            let of_chance = bias.abs() / (interval?.high - bias);
             Some((of_chance, ((of_chance - 1.0).max(0.0), of_chance + 1.0)))
         });
         panels.push(ErrorPanel {
@@ -168,7 +174,7 @@ fn points(
 mod tests {
     use super::super::BiasRow;
     use super::super::SolverColumns;
-    use super::super::comparison::{Bias, BreakErrors, Sample};
+    use super::super::comparison::{BreakErrors, Sample};
     use super::*;
     use crate::model::Selected;
     use crate::solver::Solver;
@@ -217,8 +223,8 @@ mod tests {
             deviation: 0.01,
             reference_deviation: 0.01,
             bias: Bias::of(
-                &Sample::of(&[vec![0.1], vec![0.11, 0.12]]).unwrap(),
-                &Sample::of(&[vec![0.1, 0.11], vec![0.13]]).unwrap(),
+                &Sample::of(vec![vec![0.1], vec![0.11, 0.12]]).unwrap(),
+                &Sample::of(vec![vec![0.1, 0.11], vec![0.13]]).unwrap(),
             ),
         };
         Findings {

@@ -14,7 +14,7 @@ mod verdict;
 
 pub use files::{check, processor, to_json, write};
 pub use study::Study;
-pub use verdict::{shows_bias, verdict};
+pub use verdict::{shows_bias, too_few_slips, verdict};
 
 use self::comparison::{Bias, BreakErrors};
 use crate::model::{Parameters, Selected, Selection, Symbol, Value};

@@ -398,7 +398,7 @@ fn bias_rows(
         // A realisation begins with its slip 0.
         let realisations = slips.chunk_by(|_, next| next.number > 0);
         let values = realisations.map(|slips| slips.iter().filter_map(value).collect());
-        Sample::of(&values.collect::<Vec<_>>())
+        Sample::of(values.collect())
     };
     let row = |(quantity, value): Quantity| {
         let found = sample(slips, value)?;
@@ -410,10 +410,10 @@ fn bias_rows(
             quantity: quantity.to_owned(),
             slips: found.count as u64,
             reference_slips: reference.count as u64,
-            mean: found.mean,
-            reference_mean: reference.mean,
-            deviation: found.deviation,
-            reference_deviation: reference.deviation,
+            mean: found.mean.value,
+            reference_mean: reference.mean.value,
+            deviation: found.deviation.value,
+            reference_deviation: reference.deviation.value,
             bias: Bias::of(&found, &reference),
         })
     };

@@ -26,6 +26,17 @@ fn fewest_slips(row: &BiasRow) -> u64 {
     row.slips.min(row.reference_slips)
 }
 
+/// What a study with few slips will not show.
+pub fn too_few_slips(study: &Study) -> Option<String> {
+    let slips = study.seeds * study.slips;
+    (slips < MIN_SLIPS).then(|| {
+        format!(
+            "{slips} slips per solver show costs and errors of break times, and no bias: that takes {MIN_SLIPS}, by \
+             --seeds and --slips"
+        )
+    })
+}
+
 /// The lines, the answer first.
 pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
     let own = SolverColumns::from(study.own);
@@ -145,7 +156,7 @@ fn statistical_error(study: &Study, intervals: &[&BiasRow], is_biased: bool) -> 
         ""
     } else if intervals
         .iter()
-        .all(|row| excluded_from(row) <= MINOR * largest)
+        .all(|row| excluded_from(row) <= MINOR * least)
     {
         ", so the solver is not what limits you"
     } else {

@@ -3,7 +3,9 @@
 use super::output::{self, TextTable};
 use super::sweep::{self, PresetFlag, Variation, changes};
 use super::{Exit, UsageError, catch_signals};
-use crate::accuracy::{self, Findings, MethodRow, Study, set_in_words, shows_bias, verdict};
+use crate::accuracy::{
+    self, Findings, MethodRow, Study, set_in_words, shows_bias, too_few_slips, verdict,
+};
 use crate::model::Parameters;
 use crate::model::theory::typical_interval;
 use crate::results::layout::Layout;
@@ -54,11 +56,11 @@ pub struct Arguments {
     /// Folder for tables, JSON and figures [default: results/<name of the sweep>-accuracy, or results/accuracy]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Take fewer slips
+    /// Take fewer slips: enough for costs and break times, too few for biases
     #[arg(long)]
     quick: bool,
-    /// Realisations of each ensemble; 8 times as many, not all timed, at Delta = 0 and 1e-4 m/s unless --quick
-    /// [default: 8, with --quick 4]
+    /// Realisations of each ensemble; without a sweep file, --set and --quick, 8 times as many, not all timed, at
+    /// Delta = 0 and 1e-4 m/s [default: 8, with --quick 4]
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=MAX_COUNT))]
     seeds: Option<u64>,
     /// Slips of each realisation [default: 100, with --quick 6]
@@ -109,6 +111,9 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let pool =
         pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     accuracy::check(&out)?;
+    if let Some(few) = too_few_slips(&study) {
+        output::report(&few);
+    }
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
     let files = accuracy::write(&study, &findings, &out, catch_signals()?)?;
     if arguments.json {

@@ -573,6 +573,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         note_on_sliding(sweep, rows),
         note_on_cut_jobs(rows),
         note_on_few_cycles(rows),
+        note_on_start(rows),
         note_on_control(sweep, rows),
         note_on_drive(rows),
         note_on_sets(measured, |row| row.finished_jobs == 1, SINGLE_SERIES),
@@ -631,6 +632,12 @@ fn note_on_few_cycles(rows: &[SetRow]) -> Option<String> {
     };
     let note = "without a phase: the jobs hold less than two cycles of the modulation; more slips give one";
     note_on_sets(rows, has_few_cycles, note)
+}
+
+fn note_on_start(rows: &[SetRow]) -> Option<String> {
+    let note = "in which seeds still share their start, so that intervals of R and φ are too narrow: raise discard, \
+                or take longer jobs";
+    note_on_sets(rows, |row| row.shares_start, note)
 }
 
 /// Where R needs a control to be judged.

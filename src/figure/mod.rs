@@ -56,6 +56,7 @@ use crate::sets::setting;
 use crate::table::Table;
 use anyhow::Result;
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::path::PathBuf;
 
 /// What was asked of a figure that cannot be drawn so: the flag, and what to do.
@@ -188,10 +189,17 @@ pub fn draw_all(
             "no figure shows other directories: there is none of {figures}"
         ));
     }
-    Ok(Drawn {
-        files: write(layout, &pictures, look, formats)?,
-        remarks,
-    })
+    let files = write(layout, &pictures, look, formats)?;
+    // What earlier data gave, and these do not.
+    for name in layout.storage.list(&layout.figures())? {
+        let path = layout.figures().join(name);
+        let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
+        let is_drawn = pictures.iter().any(|picture| picture.name() == stem);
+        if STANDING.contains(&stem) && !is_drawn {
+            layout.remove(&path)?;
+        }
+    }
+    Ok(Drawn { files, remarks })
 }
 
 /// Draws a custom figure of the sets or slips of a results directory; writes nothing.
@@ -513,7 +521,7 @@ mod tests {
     }
 
     #[test]
-    fn without_modulation_no_phase_is_drawn() {
+    fn without_modulation_no_phase_is_drawn_and_that_of_earlier_data_goes() {
         let still = Point {
             period: None,
             periods: None,
@@ -521,11 +529,16 @@ mod tests {
             ..modulated(1)
         };
         let (_root, layout) = reduced(&[still]);
+        fs::create_dir_all(layout.figures()).unwrap();
+        for name in ["phi-eta.pdf", "tau_mean-V0.svg"] {
+            fs::write(layout.figures().join(name), "earlier").unwrap();
+        }
         assert!(
             files_of(&layout, &Look::default(), &Format::DEFAULT)
                 .unwrap()
                 .is_empty()
         );
+        assert_eq!(Disk.list(&layout.figures()).unwrap(), ["tau_mean-V0.svg"]);
     }
 
     #[test]

@@ -81,7 +81,7 @@ impl Backbone {
         bin.slips += floored(slips) as u64;
         bin.phases.merge(&set.phases);
         if set.row.has_phase
-            && let Some((phase, _)) = set.phases.direction(top_of_phases(set.row.eta))
+            && let Some((phase, _)) = set.phases.direction(top_of_phases(set.row.eta), 0.0)
         {
             bin.phased_sets += 1;
             bin.means.push_angle(&phase);
@@ -94,7 +94,7 @@ impl Backbone {
             let eta_high = edge(index + 1);
             let eta_centre = (eta_low * eta_high).sqrt();
             let top = top_of_phases(eta_centre);
-            let [phases, means] = [&bin.phases, &bin.means].map(|units| units.direction(top));
+            let [phases, means] = [&bin.phases, &bin.means].map(|units| units.direction(top, 0.0));
             let value = |found: &Option<(Estimate, _)>| {
                 found.as_ref().map(|(direction, _)| direction.value)
             };

@@ -28,7 +28,7 @@ pub use crossings::{
 };
 pub use differences::Difference;
 pub use estimate::quantile;
-pub(crate) use estimate::student_at;
+pub(crate) use estimate::{Estimate, Numbers, student_at};
 #[cfg(test)]
 pub(crate) use estimate::{Units, mean};
 pub use gather::{Point, RampStage, reduce_chosen};

@@ -1,7 +1,9 @@
 //! The table of sets, a row for each with all seeds together: what the jobs table says (outcomes, averages over the
 //! time of each job), and from the slips, statistics of intervals, locking and phases.
 
-use super::estimate::{Estimate, MAX_UNSEEN, Numbers, Units, at_rank, length, mean, unit};
+use super::estimate::{
+    Estimate, MAX_UNSEEN, Numbers, Sums, Units, at_rank, length, mean, plus, unit,
+};
 use super::{resultant_at_random, top_of_phases};
 use crate::model::{Parameters, Selected, Symbol};
 use crate::observe::{Regime, Slip};
@@ -189,8 +191,8 @@ pub(super) const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 /// Mean intervals up to which a period is the least by which a slip comes early or late: less than all that lies
 /// between two slips, with room for their spread.
 const NEXT_PERIOD: f64 = 1.2;
-/// The same where intervals alternate, such as two slips a period: these are two to a period.
-const ALTERNATING: f64 = 2.5;
+/// Periods of two slips have two mean intervals, to this part of one.
+const TWO_SLIPS: f64 = 0.1;
 /// Error of a mean, over that of independent intervals, below which intervals alternate.
 const REGULAR: f64 = 0.5;
 
@@ -203,8 +205,8 @@ fn off(period: Option<f64>, mean: f64, numbers: &Numbers) -> f64 {
             .is_some_and(|regularity| regularity < REGULAR)
     };
     match period {
-        Some(period) if period <= ALTERNATING * mean && is_regular() => period,
         Some(period) if period <= NEXT_PERIOD * mean => period.min(mean),
+        Some(period) if (period / mean - 2.0).abs() < TWO_SLIPS && is_regular() => period,
         _ => 0.0,
     }
 }
@@ -219,6 +221,29 @@ fn lost(length_at_random: f64, [times, most]: [f64; 2], vectors: &Units) -> f64 
 const OF_PHASES: [f64; 2] = [3.0, 0.75];
 /// Of the two intervals beside it, whose vectors have the square of that length.
 const OF_INTERVALS: [f64; 2] = [6.0, 1.5];
+
+/// Ratio of variances above which jobs still share their start: errors are then more than twice what seeds show.
+const MAX_RATIO: f64 = 4.0;
+
+/// Variance of vectors between slips of different number over what seeds alone make of it (F ratio; 1 if jobs have
+/// forgotten their start). NaN for fewer than two jobs of two slips.
+fn ratio_of_numbers(jobs: &[(u64, Vec<Sums>)]) -> f64 {
+    let numbers = jobs.iter().map(|(_, job)| job.len()).min().unwrap_or(0);
+    let of_number = |number: usize| {
+        let vectors = jobs.iter().map(|(_, job)| job[number]);
+        vectors.fold([0.0; 3], |sum, vector| plus(sum, 1.0, vector))
+    };
+    let sums: Vec<Sums> = (0..numbers).map(of_number).collect();
+    let square = |[weight, x, y]: Sums| (x * x + y * y) / weight;
+    let seeds = jobs.len() as f64;
+    let total = sums
+        .iter()
+        .fold([0.0; 3], |sum, of_one| plus(sum, 1.0, *of_one));
+    let within_numbers: f64 = sums.iter().copied().map(square).sum();
+    let between = (within_numbers - square(total)) / (numbers as f64 - 1.0);
+    let by_seeds = (total[0] - within_numbers) / (numbers as f64 * (seeds - 1.0));
+    between / by_seeds
+}
 
 /// Between quantiles at the ends of the interval of the share that does not exceed the median (R. S. Woodruff, J. Am.
 /// Stat. Assoc. 47, 635 (1952)).
@@ -376,8 +401,9 @@ impl FinishedSet {
         );
         if self.row.periods != Some(0) {
             let locking = self.length_of_intervals(&self.locking);
-            (self.row.locking_index, self.row.locking_interval) =
-                self.note("locking_index", locking, SHARE);
+            let (length, interval) = self.note("locking_index", locking, SHARE);
+            self.row.locking_index = length;
+            self.row.locking_interval = interval.map(|ends| self.locking.with_zero(ends));
         }
     }
 
@@ -387,16 +413,22 @@ impl FinishedSet {
             None => slips.by_job(),
             Some(cycles) => cycles.within(slips.by_job(), |slip| slip.onset),
         };
-        self.phases = Units::of(each(&jobs, |slip| non_nan(slip.phase).map(unit)));
-        if let Some((direction, interval)) = self.phases.direction(top_of_phases(self.row.eta)) {
+        let vectors = each(&jobs, |slip| non_nan(slip.phase).map(unit));
+        self.row.shares_start = ratio_of_numbers(&vectors) > MAX_RATIO;
+        self.phases = Units::of(vectors);
+        let lost = lost(resultant_at_random(self.row.eta), OF_PHASES, &self.phases);
+        if let Some((direction, interval)) =
+            self.phases.direction(top_of_phases(self.row.eta), lost)
+        {
             self.row.phase_mean = Some(direction.value);
             self.row.phase_interval = interval;
             let is_narrow = |ends: Interval| ends.high - ends.low < WHOLE_TURN;
             self.row.has_phase = interval.is_some_and(is_narrow);
         }
         let length = self.length_of_phases(&self.phases);
-        (self.row.resultant_length, self.row.length_interval) =
-            self.note("resultant_length", length, SHARE);
+        let (length, interval) = self.note("resultant_length", length, SHARE);
+        self.row.resultant_length = length;
+        self.row.length_interval = interval.map(|ends| self.phases.with_zero(ends));
     }
 
     /// Length of vectors of phases.

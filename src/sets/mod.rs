@@ -86,8 +86,9 @@ columns! {
         locking_excess_interval as "locking_index_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         phase_mean: Option<f64> = "rad", "circular mean of the phase; if T is tau_mean or more, over whole cycles from the first onset of each job, and null below two of them a job", "⟨φ⟩" "Mean phase";
         phase_interval as "phase_mean": Option<Interval> = "rad",
-            "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
+            "lower end of its 95 % confidence interval; the whole turn if the phases may have no direction";
         has_phase: bool = "", "whether the interval of phase_mean is narrower than 3/2 pi", "has phase";
+        shares_start: bool = "", "whether phases differ between slips of different number more than four times as much as between seeds: the jobs still share their start, and intervals of R and phase are too narrow", "shares start";
         resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase", "R" "Resultant length of the phase";
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
         resultant_drive: Option<f64> = "",

@@ -1,5 +1,7 @@
 """Statistics on data whose answer is known, and paired comparisons of two sets."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -115,3 +117,25 @@ def test_the_locking_index_of_a_set_is_that_of_its_slips(results):
     assert len(reduced) == 1
     # The same sums in another order.
     pd.testing.assert_series_equal(found, reduced, rtol=1e-12, check_names=False)
+
+
+def test_the_jackknife_is_that_of_the_reduction(stickslip, tmp_path):
+    """Friction has a value a job: nothing of it is unseen, and it has no ends."""
+    directories = []
+    for name, stiffness in (("a", 4e7), ("b", 3e7)):
+        sweep, directory = tmp_path / f"{name}.toml", tmp_path / name
+        sweep.write_text(
+            f'name = "{name}"\n[model]\nN = 5\nKd = {stiffness}\n[axes]\nseed = {{ count = 9 }}\n[record]\nslips = 6\n'
+        )
+        stickslip("run", sweep, "--out", directory)
+        directories.append(directory)
+    jobs = [Sweep(directory).table("jobs") for directory in directories]
+    reduced = Sweep(directories[0]).sets().iloc[0]
+    found = statistics.jackknife(statistics.over_time, jobs[0])
+    assert [found.value, found.low, found.high] == pytest.approx(
+        [reduced["mean_friction"], reduced["mean_friction_low"], reduced["mean_friction_high"]], rel=1e-9
+    )
+    (row,) = json.loads(stickslip("show", *directories, "--json").stdout)["sets"]
+    found = statistics.friction_difference(jobs[1], jobs[0])
+    ends = [row[f"mean_friction_difference{end}"] for end in ("", "_low", "_high")]
+    assert [found.value, found.low, found.high] == pytest.approx(ends, rel=1e-6)
