@@ -6,7 +6,6 @@ use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::destination::{Destination, refuse_reserved};
 use crate::table::arrow;
-use crate::table::columns::Interval;
 use crate::table::file::PROGRAM;
 use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
@@ -109,14 +108,13 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
         by_chance: None,
         points: breaks,
     }];
-    let of_mean = |bias: &Bias| (bias.of_mean, bias.interval_of_mean);
-    let of_deviation = |bias: &Bias| (bias.of_deviation, bias.interval_of_deviation);
-    let biases: [(&str, &dyn Fn(&Bias) -> (f64, Option<Interval>)); 2] =
-        [("mean τ", &of_mean), ("s.d. of τ", &of_deviation)];
-    for (name, of) in biases {
+    let of_mean: fn(&Bias) -> Option<f64> =
+        |bias| Some(bias.of_mean / (bias.interval_of_mean?.high - bias.of_mean));
+    let of_deviation: fn(&Bias) -> Option<f64> =
+        |bias| Some(bias.of_deviation / (bias.interval_of_deviation?.high - bias.of_deviation));
+    for (name, over_chance) in [("mean τ", of_mean), ("s.d. of τ", of_deviation)] {
         let points = points(&rows, |row| {
-            let (bias, interval) = of(&findings.bias_of(row, "interval")?.bias);
-            let of_chance = bias.abs() / (interval?.high - bias);
+            let of_chance = over_chance(&findings.bias_of(row, "interval")?.bias)?.abs();
             Some((of_chance, ((of_chance - 1.0).max(0.0), of_chance + 1.0)))
         });
         panels.push(ErrorPanel {
