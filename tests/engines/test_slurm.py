@@ -24,8 +24,8 @@ from slurm import Slurm
 ELEMENTS = range(1, 9)
 COMPLETED = {element: ["COMPLETED"] for element in ELEMENTS}
 
-# Some 12 s of CPU time, so that all elements start before the end: of 2 s, one element of 16 threads may take all.
-SLIPS = 150
+# Some 24 s of CPU time, so that all elements start before the end, also on a busy machine.
+SLIPS = 300
 
 # Before the worker in a script: stops its process but for 2 % of the time, so that some work is left on any machine.
 SLOWLY = "(trap '' TERM USR1; while kill -STOP $$; do sleep 0.98; kill -CONT $$; sleep 0.02; done) 2>/dev/null &\n"
