@@ -434,8 +434,9 @@ impl Estimate {
         Some(libm::hypot(error, not_seen) + ends)
     }
 
-    /// Of a share of so many flags (Wilson, J. Am. Stat. Assoc. 22, 209 (1927)), with the number of independent flags
-    /// that had its variance; where nothing varies, of units. `None` for fewer than two units.
+    /// Interval of a share, of `count` flags (Wilson, J. Am. Stat. Assoc. 22, 209 (1927)). The effective number of flags is
+    /// that of independent ones with the same variance; where nothing varies, the number of units. `None` for fewer than
+    /// two units.
     pub(super) fn share_interval(&self, count: f64) -> Option<Interval> {
         let share = self.value;
         let error = self.error()?;
@@ -892,7 +893,11 @@ pub(super) mod tests {
         // Of other seeds, errors add by their squares.
         let apart = Estimate::function([&mean, &mean.clone().apart()], |[one, two]| two - one);
         let ratio = apart.error().unwrap() / mean.error().unwrap();
-        assert!((ratio / 2.0_f64.sqrt() - 1.0).abs() < 0.05, "{ratio}");
+        // Of twice as many units.
+        assert!(
+            (ratio / (17.0_f64 / 8.0).sqrt() - 1.0).abs() < 1e-9,
+            "{ratio}"
+        );
         // Three jobs are cut, nine are not: units are the jobs that both have.
         let [few, _] = Numbers::of(&jobs[..3], 0.0).estimates(0.0);
         let both = Estimate::function([&mean, &few.unwrap()], |[all, few]| all - few);

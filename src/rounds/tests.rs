@@ -332,12 +332,15 @@ fn sets_that_are_not_clear_get_seeds_before_a_row_is_said_to_have_no_edge() {
         let most = sets.values().map(|set| set.seeds).max().unwrap();
         (rounds.last().unwrap().standing, edges, seeds, most)
     };
-    // A set at the threshold is taken for clear once in twenty times, so that many are unclear in some repetition.
+    // A set at the threshold is taken for clear once in twenty times: most repetitions have as many unclear ones as are
+    // expected.
     let ended = |mean: fn(f64) -> f64, expected: usize| {
-        let mut found = (1..6).map(|repetition| of_repetition(mean, repetition));
-        found
-            .find(|(_, _, unclear, _)| unclear.len() == expected)
-            .unwrap()
+        let mut found: Vec<_> = (1..6)
+            .map(|repetition| of_repetition(mean, repetition))
+            .collect();
+        found.retain(|(_, _, unclear, _)| unclear.len() == expected);
+        assert!(found.len() >= 3, "{expected}: {}", found.len());
+        found.swap_remove(0)
     };
     // Below the threshold by a fifth of the noise, at one end or at the other: too little for 24 seeds.
     for mean in [|x: f64| x - 0.52, |x: f64| 4.48 - x] {
