@@ -211,8 +211,8 @@ fn off(period: Option<f64>, mean: f64, numbers: &Numbers) -> f64 {
     }
 }
 
-/// What a slip that was not seen may take from a sum of vectors if the others have the length of slips at random loads:
-/// so many times what that lacks of 1, and at most what one across the others takes.
+/// By how much slips that were not seen may shorten the mean of vectors, if slips at random loads have this length: each
+/// by `times` the difference of that length from 1, and by `most` at most.
 fn lost(length_at_random: f64, [times, most]: [f64; 2], vectors: &Units) -> f64 {
     let [count, ..] = vectors.total();
     MAX_UNSEEN * (times * (1.0 - length_at_random)).min(most) / count
@@ -240,7 +240,12 @@ fn ratio_of_numbers(jobs: &[(u64, Vec<Sums>)]) -> f64 {
         .iter()
         .fold([0.0; 3], |sum, of_one| plus(sum, 1.0, *of_one));
     let within_numbers: f64 = sums.iter().copied().map(square).sum();
-    let between = (within_numbers - square(total)) / (numbers as f64 - 1.0);
+    let differing = within_numbers - square(total);
+    // Rounding leaves this where all vectors are one.
+    if differing < 1e-12 * total[0] {
+        return 0.0;
+    }
+    let between = differing / (numbers as f64 - 1.0);
     let by_seeds = (total[0] - within_numbers) / (numbers as f64 * (seeds - 1.0));
     between / by_seeds
 }
@@ -416,7 +421,7 @@ impl FinishedSet {
         let vectors = each(&jobs, |slip| non_nan(slip.phase).map(unit));
         self.row.shares_start = ratio_of_numbers(&vectors) > MAX_RATIO;
         self.phases = Units::of(vectors);
-        let lost = lost(resultant_at_random(self.row.eta), OF_PHASES, &self.phases);
+        let lost = self.lost_of_phases(&self.phases);
         if let Some((direction, interval)) =
             self.phases.direction(top_of_phases(self.row.eta), lost)
         {
@@ -431,9 +436,13 @@ impl FinishedSet {
         self.row.length_interval = interval.map(|ends| self.phases.with_zero(ends));
     }
 
+    fn lost_of_phases(&self, phases: &Units) -> f64 {
+        lost(resultant_at_random(self.row.eta), OF_PHASES, phases)
+    }
+
     /// Length of vectors of phases.
     pub(super) fn length_of_phases(&self, phases: &Units) -> Option<Estimate> {
-        let lost = lost(resultant_at_random(self.row.eta), OF_PHASES, phases);
+        let lost = self.lost_of_phases(phases);
         Some(phases.estimate(length)?.allowing_for(lost))
     }
 
@@ -881,6 +890,38 @@ pub(super) mod tests {
                 assert!(coverage > 87.5, "{jitter} {share} {count}: {coverage}");
             }
         }
+    }
+
+    #[test]
+    fn seeds_that_share_their_start_are_found_and_those_that_have_forgotten_it_are_not() {
+        // Each slip a tenth of a turn after the one before, from one phase or from a phase of each job.
+        let shares_start = |spread: f64, jitter: f64| {
+            let mut draws = Draws::new(1);
+            let slips = (0..8).flat_map(|_| {
+                let start = spread * draws.uniform();
+                let phases: Vec<f64> = (0..15)
+                    .map(|number| 0.1 * TAU * f64::from(number) + start + jitter * draws.normal())
+                    .collect();
+                (0..).zip(phases)
+            });
+            let slips: Vec<Slip> = slips
+                .map(|(number, phase)| Slip {
+                    number,
+                    ..slip(Some(0.1), Some(phase))
+                })
+                .collect();
+            reduced(&jobs(1e-6, 0.01), slips).shares_start
+        };
+        assert!(shares_start(0.0, 0.1) && shares_start(0.0, 0.5));
+        assert!(!shares_start(TAU, 0.1) && !shares_start(0.0, 3.0));
+        // Locked slips differ neither between numbers nor between seeds.
+        let locked = (0..8).flat_map(|_| {
+            (0..15).map(|number| Slip {
+                number,
+                ..slip(Some(0.1), Some(-1.0))
+            })
+        });
+        assert!(!reduced(&jobs(1e-6, 0.01), locked).shares_start);
     }
 
     #[test]
