@@ -59,7 +59,10 @@ def pulses(results: Path) -> Section:
         )
     strongest = rows[rows["Delta"] == rows["Delta"].max()]
     by_frequency = dict(list(strongest.groupby("Hz")))
-    excess = {frequency: of_mean(mine, "triggered", "triggered_drive").among(COMPARISONS) for frequency, mine in by_frequency.items()}
+    excess = {
+        frequency: of_mean(mine, "triggered", "triggered_drive").among(COMPARISONS)
+        for frequency, mine in by_frequency.items()
+    }
     section.check(
         "pulses trigger slips",
         "more of them than the drive alone, at 1 µm",
@@ -67,7 +70,8 @@ def pulses(results: Path) -> Section:
         *(found.lies(above=0) for found in excess.values()),
     )
     short, long = (by_frequency[frequency] for frequency in (max(by_frequency), min(by_frequency)))
-    gain = jackknife(lambda short, long: short["triggered"].mean() - long["triggered"].mean(), short, long).among(COMPARISONS)
+    gain = jackknife(lambda short, long: short["triggered"].mean() - long["triggered"].mean(), short, long)
+    gain = gain.among(COMPARISONS)
     section.check(
         "short pulses trigger more",
         "share at 116 Hz above that at 29 Hz, at 1 µm",
@@ -90,7 +94,10 @@ def pulses(results: Path) -> Section:
         advance.lies(above=0),
     )
     weakest = rows[rows["Delta"] == rows["Delta"].min()]
-    beyond = {frequency: of_mean(mine, "advance", "advance_drive").among(COMPARISONS) for frequency, mine in weakest.groupby("Hz")}
+    beyond = {
+        frequency: of_mean(mine, "advance", "advance_drive").among(COMPARISONS)
+        for frequency, mine in weakest.groupby("Hz")
+    }
     section.check(
         "what weak pulses do is the drive's",
         "mean advance beyond the drive's within ±0.01 ⟨τ⟩, at 0.1 µm",
@@ -117,7 +124,10 @@ def pulses(results: Path) -> Section:
         f"Pulses of no size advance slips by up to {1e3 * all_rows['noise'].max():.1f} ms, by the error of the solver.",
     )
     section.remark("Intervals of the criteria, not of the table, are corrected for the 36 comparisons of the table (Bonferroni).")
-    section.why = "weak pulses do what the drive does; in the middle of the cycle strong ones hold slips up at 29 Hz, and trigger most beyond the drive at 116 Hz"
+    section.why = (
+        "weak pulses do what the drive does; in the middle of the cycle strong ones hold slips up at 29 Hz,"
+        " and trigger most beyond the drive at 116 Hz"
+    )
     return section
 
 
