@@ -4,8 +4,8 @@
 //! A break is identified by block, contact and generation, which mean the same contact in every solver. It is missing
 //! if it has not come a tenth of the wave crossing time after the last of the reference.
 //!
-//! Errors are those of the estimator of a sweep's statistics, with realisations as its units. A difference has the degrees
-//! of freedom of the smaller ensemble: those of Welch are too many far out, where many comparisons look.
+//! Errors are those of a sweep's statistics: units are realisations, or stretches of few. A difference has the degrees of
+//! freedom of the smaller ensemble: those of Welch are too many far out, where many comparisons look.
 
 use crate::model::{Change, ContactEvent, Parameters};
 use crate::reduce::{Estimate, Numbers, student_at};
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn few_values_have_no_error_and_none_no_sample() {
+    fn two_values_have_an_error_and_one_is_no_sample() {
         let two = Sample::of(vec![vec![1.0, 2.0]]).unwrap();
         let bias = Bias::of(&two, &realisations(5, 1.0, 0.0, 1));
         assert!(bias.half_width_among(3).is_some());

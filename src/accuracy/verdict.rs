@@ -2,7 +2,7 @@
 //! whether the statistical error of a sweep is larger.
 //!
 //! A bias counts if it is significant at 5 % after Bonferroni's correction for the number of comparisons: of a solver
-//! without bias, one study in twenty reports one by chance. With few slips, or one realisation, no bias counts.
+//! without bias, one study in twenty reports one by chance. With few slips no bias counts.
 
 use super::{BiasRow, Findings, MethodRow, SolverColumns, Study, set_in_words};
 

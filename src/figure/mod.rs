@@ -132,7 +132,8 @@ pub fn remarks(pictures: &[Picture]) -> Vec<String> {
     remarks
 }
 
-/// Draws the figures of a results directory into `figures/`, each in these formats: those whose data are there.
+/// Draws the figures of a results directory into `figures/`, each in these formats: those whose data are there. Standing
+/// figures without data go, in all formats.
 ///
 /// Returns the files, in the order in which they were written.
 pub fn draw_all(
