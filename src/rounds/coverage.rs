@@ -192,7 +192,7 @@ const MAX_WIDTH: f64 = 6.0;
 /// Jobs from which fewer are promised to do, in the same.
 const FEW: usize = 3;
 /// The pools that `scripts/coverage` makes, each with one of long jobs.
-const POOLS: [&str; 11] = [
+const POOLS: [&str; 12] = [
     "locking",
     "deep",
     "short",
@@ -201,6 +201,7 @@ const POOLS: [&str; 11] = [
     "two",
     "two-large",
     "strong",
+    "strong-large",
     "long-periods",
     "fast",
     "rare",
