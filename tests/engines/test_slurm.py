@@ -27,8 +27,8 @@ COMPLETED = {element: ["COMPLETED"] for element in ELEMENTS}
 # Some 24 s of CPU time, so that all elements start before the end, also on a busy machine.
 SLIPS = 300
 
-# Before the worker in a script: stops its process but for 2 % of the time, so that some work is left on any machine.
-SLOWLY = "(trap '' TERM USR1; while kill -STOP $$; do sleep 0.98; kill -CONT $$; sleep 0.02; done) 2>/dev/null &\n"
+# Before the worker in a script: stops its process but for 4 % of the time, so that some work is left on any machine.
+SLOWLY = "(trap '' TERM USR1; while kill -STOP $$; do sleep 0.96; kill -CONT $$; sleep 0.04; done) 2>/dev/null &\n"
 
 
 @pytest.fixture(scope="module")
