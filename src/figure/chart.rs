@@ -2,15 +2,15 @@
 //! custom figures are charts.
 
 use super::axis::Axis;
-use super::frame::{Ends, LEFT, Layout, Place};
+use super::frame::{Ends, LEFT, Layout};
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Quantity, belongs_to_all, distinct, parameter, shows_phase, without_value};
 use super::style::{
-    BAR_WIDTH, BLACK, DARK_GREY, Dot, GREY, INKS, Ink, Look, RADIUS, REFERENCE, STRIPE, Stroke,
-    WHITE, drive_alone,
+    BAR_WIDTH, BLACK, DARK_GREY, Dot, GREY, INKS, Ink, Look, Place, RADIUS, REFERENCE, STRIPE,
+    Stroke, WHITE, drive_alone,
 };
 use super::{BadOption, Beside};
 use crate::model::Symbol;

@@ -5,11 +5,9 @@ use super::axis::Axis;
 use super::legend::{self, Entry, draw_legend, legend_rows};
 use super::picture::{Anchor, Picture, snapped};
 use super::style::{
-    AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT, text_width,
+    AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Place, Style, TICK_TEXT, text_width,
 };
 
-/// A point of data.
-pub(super) type Place = (f64, f64);
 /// Lower and upper end.
 pub(super) type Ends = (f64, f64);
 /// A rectangle of data: its ends along x and along y.

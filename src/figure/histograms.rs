@@ -1,11 +1,13 @@
 //! Histograms of τ (Fig. 2d-f): one panel per set, one under the other on a common axis.
 
 use super::axis::{Axis, bounds, widened};
-use super::frame::{Frame, Layout, OVERLAP, Place};
+use super::frame::{Frame, Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer};
 use super::picture::{Anchor, Picture};
-use super::style::{BLACK, Fill, Ink, LEGEND_TEXT, Look, RED, REFERENCE, Stroke, text_width};
+use super::style::{
+    BLACK, Fill, Ink, LEGEND_TEXT, Look, Place, RED, REFERENCE, Stroke, text_width,
+};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{FREQUENCY, HistogramBin, SetRow, Values, differing};
 use crate::sets::label;

@@ -3,13 +3,13 @@
 use super::Beside;
 use super::axis::{Axis, logarithmic_bounds};
 use super::beside::Other;
-use super::frame::{Layout, Place};
+use super::frame::Layout;
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
-use super::style::{DARK_GREY, Dot, GREY, GRID, LIGHT_GREY, Look};
+use super::style::{DARK_GREY, Dot, GREY, GRID, LIGHT_GREY, Look, Place};
 use crate::reduce::{Point, SetRow, ascending, is_same};
 use crate::sets::{Digits, label};
 

@@ -2,13 +2,13 @@
 //! and amplitude of the modulation, a regime map over two other parameters.
 
 use super::axis::{Axis, bounds, is_wide};
-use super::frame::{Cell, Layout, OVERLAP, Place};
+use super::frame::{Cell, Layout, OVERLAP};
 use super::hues::ColourBar;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Grid, Quantity};
-use super::style::{BLACK, Dot, Fill, Ink, Look, Stroke, WHITE, cell_shade, diverging};
+use super::style::{BLACK, Dot, Fill, Ink, Look, Place, Stroke, WHITE, cell_shade, diverging};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{FREQUENCY, SetRow, Values, differing, has_even_steps};

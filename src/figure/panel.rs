@@ -1,11 +1,11 @@
 //! Panels as data: axes and what lies between them, layer by layer. One engine draws the panels of every figure.
 
 use super::axis::Axis;
-use super::frame::{Cell, Ends, Frame, HEADING, Layout, Place};
+use super::frame::{Cell, Ends, Frame, HEADING, Layout};
 use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::{Entry, Mark};
 use super::picture::Picture;
-use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, Look, Stroke, WHITE, hollow};
+use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, Look, Place, Stroke, WHITE, hollow};
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 

@@ -3,13 +3,13 @@
 use super::Beside;
 use super::axis::{Axis, angle_bounds, bounds};
 use super::beside::Other;
-use super::frame::{Cell, Ends, Layout, OVERLAP, Place};
+use super::frame::{Cell, Ends, Layout, OVERLAP};
 use super::hues::ColourBar;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::style::{
-    BAR_WIDTH, BLUE, Dot, Fill, Look, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
+    BAR_WIDTH, BLUE, Dot, Fill, Look, Place, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
 };
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point};

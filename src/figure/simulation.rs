@@ -3,12 +3,12 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::common;
-use super::frame::{Cell, Layout, OVERLAP, Place};
+use super::frame::{Cell, Layout, OVERLAP};
 use super::hues::ColourBar;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::style::{BLACK, BLUE, GRID, INKS, Ink, Look, RED, REFERENCE, Stroke, shade};
+use super::style::{BLACK, BLUE, GRID, INKS, Ink, Look, Place, RED, REFERENCE, Stroke, shade};
 use crate::model::Parameters;
 use crate::observe::MapRow;
 use crate::sets::label;

@@ -1,12 +1,14 @@
 //! The look of all figures: paper, font, sizes of text, strokes, dots, colours. Lengths on a sheet are units; a style
 //! says how long a unit is. Text has the same size in every figure, whatever the size of the sheet.
 
-use super::frame::Place;
 use crate::table::value::{floored, words};
 use std::f64::consts::TAU;
 use std::fmt;
 use std::sync::LazyLock;
 use ttf_parser::{Face, GlyphId};
+
+/// A point of data, or of a sheet.
+pub(super) type Place = (f64, f64);
 
 words! {
     /// What a figure is for.

@@ -7,7 +7,6 @@
 
 use super::estimate::{Estimate, Sums, Units, length, unit};
 use super::set::{ANY, FinishedSet, SHARE};
-use super::triggers::{Cycle, Excluded};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
 use crate::results::ResultsError;
@@ -68,8 +67,7 @@ impl Controls {
         let count = intervals.clone().count();
         explained.tau_control = (count > 0).then(|| intervals.sum::<f64>() / count as f64);
         if parameters.pulse_start.is_some() {
-            let cycle = |(&seed, slips): (&u64, &Vec<Times>)| (seed, Cycle::of(parameters, slips));
-            explained.cycles = control.iter().map(cycle).collect();
+            explained.control.clone_from(control);
         } else {
             let passage =
                 |(&seed, slips): (&u64, &Vec<Times>)| (seed, Passage::of(parameters, slips));
@@ -86,8 +84,8 @@ pub(super) struct Explained {
     pub(super) tau_control: Option<f64>,
     /// By their seeds; `None` without a control, or if the modulation is a pulse.
     passages: Option<BTreeMap<u64, Passage>>,
-    /// The cycle of the control in which a pulse begins, by their seeds.
-    pub(super) cycles: BTreeMap<u64, Result<Cycle, Excluded>>,
+    /// The slips of the control of a pulse, by their seeds.
+    pub(super) control: BTreeMap<u64, Vec<Times>>,
 }
 
 impl Explained {

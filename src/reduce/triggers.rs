@@ -2,8 +2,8 @@
 //!
 //! The control of a pulsed job is the same run until the pulse begins, so that its next slip has the same number: its
 //! onset may lie just before the pulse that makes it. By the drive alone it comes when the pulsed drive first gets as
-//! far as the control's had at its onset. Without an exact counterfactual, experiments compare catalogues before and after waves (van der Elst
-//! and Savage, J. Geophys. Res. 120 (2015), 10.1002/2014JB011611).
+//! far as the control's had at its onset. Without an exact counterfactual, experiments compare catalogues before and after
+//! waves (van der Elst and Savage, J. Geophys. Res. 120 (2015), 10.1002/2014JB011611).
 
 use super::drive_alone::{Explained, Times};
 use super::estimate::{Estimate, MAX_UNSEEN, Sums, Units, plus};
@@ -59,7 +59,7 @@ tables! { TriggerRow = "triggers", "One row per job with a pulse, if there are a
 
 /// The cycle of a control in which a pulse begins, with what the drive alone makes of its next slip. Times in s.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cycle {
+struct Cycle {
     /// Onsets before and after the pulse begins, and the one after, if there is one.
     last: f64,
     free: f64,
@@ -72,7 +72,7 @@ pub(super) struct Cycle {
 
 impl Cycle {
     /// Of the slips of the control of a job with these parameters, in order.
-    pub(super) fn of(parameters: &Parameters, control: &[Times]) -> Result<Self, Excluded> {
+    fn of(parameters: &Parameters, control: &[Times]) -> Result<Self, Excluded> {
         let drive = Drive::new(parameters);
         let pulse = drive.pulse().unwrap_or_default();
         let [start, _] = pulse;
@@ -122,8 +122,8 @@ pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<Trigger
     let row = |&seed: &u64| {
         let onsets = slips.of_job(seed).iter().map(|slip| slip.onset);
         let onsets = onsets.collect::<Vec<_>>();
-        let cycle = explained.cycles.get(&seed).copied();
-        let cycle = cycle.unwrap_or(Err(Excluded::NoControl));
+        let control = explained.control.get(&seed).ok_or(Excluded::NoControl);
+        let cycle = control.and_then(|control| Cycle::of(&jobs.parameters, control));
         let row = cycle.and_then(|cycle| cycle.row(&onsets));
         let parameters = jobs.parameters.with_seed(seed);
         TriggerRow {

@@ -12,6 +12,7 @@ use super::job::{Identity, Job, settings, solver_settings};
 use super::measured::Measured;
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
+use super::source::SweepError;
 use crate::model::theory::to_twelve_digits;
 use crate::model::{Parameters, Selection, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
@@ -182,6 +183,18 @@ impl Sweep {
         let measured = self.measured.as_ref();
         self.identity = Identity::new(versions, self.solver, &self.recording, measured);
         self
+    }
+
+    /// The same, if its slips are to be computed.
+    pub fn computed(self) -> Result<Self, SweepError> {
+        if self.measured.is_none() {
+            return Ok(self);
+        }
+        let problem = format!(
+            "{}: its slips were measured, and nothing is to be run; `stickslip measured` reads their files again",
+            self.name
+        );
+        Err(SweepError::Made(problem))
     }
 
     /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in

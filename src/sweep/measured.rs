@@ -1,7 +1,6 @@
 //! `[measured]`: the slips of a sweep were measured, not computed. `stickslip measured` writes it.
 
-use super::grid::Sweep;
-use super::source::{Entry, Refused, Section, SweepError, all};
+use super::source::{Entry, Refused, Section, all};
 
 /// Where measured slips come from.
 #[derive(Clone, Debug)]
@@ -84,19 +83,5 @@ impl Measured {
     /// Whether a column of slips or jobs is known.
     pub fn has(&self, column: &str) -> bool {
         KNOWN.contains(&column) || self.columns.iter().any(|known| known == column)
-    }
-}
-
-impl Sweep {
-    /// The same, if its slips are to be computed.
-    pub fn computed(self) -> Result<Self, SweepError> {
-        if self.measured.is_none() {
-            return Ok(self);
-        }
-        let problem = format!(
-            "{}: its slips were measured, and nothing is to be run; `stickslip measured` reads their files again",
-            self.name
-        );
-        Err(SweepError::Made(problem))
     }
 }
