@@ -15,7 +15,7 @@ use stickslip::reduce::{
 };
 use stickslip::results::exported::{JoinedTable, with_columns};
 use stickslip::results::layout::Layout;
-use stickslip::results::tables::{JOBS, TABLES, gaps, recorded_schema};
+use stickslip::results::tables::{RecordedTable, gaps};
 use stickslip::results::{Results, ResultsError};
 use stickslip::table::Table as TableRow;
 use stickslip::table::arrow::{Gaps, RowBuffer, schema};
@@ -89,7 +89,10 @@ pub fn read(
     let layout = Layout::new(&Disk, &directory);
     let results = py.detach(|| Results::read(&layout)).map_err(Error::from)?;
     let columns = columns.as_deref();
-    let found = if let Some(table) = TABLES.into_iter().find(|known| *known == table) {
+    let found = if let Some(table) = RecordedTable::ALL
+        .into_iter()
+        .find(|known| known.name() == table)
+    {
         let columns = columns_of_table(&results, table, columns, join)?;
         watched::<_, ()>(
             py,
@@ -133,26 +136,26 @@ fn named(table: &str, all: &[FieldRef], names: &[String]) -> PyResult<Vec<FieldR
 /// The columns of slips, precursors or jobs to read: by default its own, and of the jobs whether they are controls.
 fn columns_of_table(
     results: &Results<'_>,
-    table: &str,
+    table: RecordedTable,
     names: Option<&[String]>,
     join: bool,
 ) -> PyResult<Vec<FieldRef>> {
-    let recorded = recorded_schema(table, results.sweep());
+    let recorded = table.schema(results.sweep());
     let is_own = |field: &FieldRef| recorded.field_with_name(field.name()).is_ok();
     let mut all = JoinedTable::columns(results, table);
     if let Some(names) = names {
-        let mut chosen = named(table, &all, names)?;
+        let mut chosen = named(table.name(), &all, names)?;
         all.retain(|field| join && !is_own(field) && !chosen.contains(field));
         chosen.append(&mut all);
         return Ok(chosen);
     }
-    all.retain(|field| join || is_own(field) || table == JOBS);
+    all.retain(|field| join || is_own(field) || table == RecordedTable::Jobs);
     Ok(all)
 }
 
 fn read_table(
     results: &Results<'_>,
-    table: &'static str,
+    table: RecordedTable,
     columns: &[FieldRef],
     stop: &AtomicBool,
 ) -> Result<Table, Error> {
@@ -162,7 +165,7 @@ fn read_table(
     }
     let joined = JoinedTable::new(results, table, columns);
     let mut batches = Vec::new();
-    for part in results.parts_of(JOBS)? {
+    for part in results.parts_of(RecordedTable::Jobs)? {
         if stop.load(Ordering::Relaxed) {
             return Err(Error::Results("interrupted".to_owned()));
         }
@@ -172,7 +175,7 @@ fn read_table(
         })?;
     }
     Ok(Table::new(
-        table,
+        table.name(),
         SchemaRef::clone(joined.schema()),
         batches,
     ))

@@ -3,7 +3,7 @@
 use super::{UsageError, layout, output};
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::results::tables::{recorded_schema, tables_of};
+use crate::results::tables::RecordedTable;
 use crate::single_job;
 use crate::sweep::{Change, Sweep, SweepError, varied};
 use crate::table::shown::shown;
@@ -137,7 +137,7 @@ pub fn root(file: Option<&Path>, sweep: &Sweep) -> PathBuf {
 /// Warns of a folder in the path of a results directory whose name DuckDB takes for the value of a column in all rows.
 pub fn warn_of_partitions(root: &Path, sweep: &Sweep) {
     let is_column = |name: &str| {
-        let mut schemas = tables_of(sweep.recording()).map(|table| recorded_schema(table, sweep));
+        let mut schemas = RecordedTable::of(sweep.recording()).map(|table| table.schema(sweep));
         let is_it = |field: &FieldRef| field.name().eq_ignore_ascii_case(name);
         schemas.any(|schema| schema.fields().iter().any(is_it))
     };

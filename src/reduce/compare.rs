@@ -10,7 +10,7 @@ use super::gather::{Gathering, MAX_SLIPS, sets_of};
 use super::set::{FinishedSet, SetJobs};
 use super::values::Values;
 use crate::model::{Parameters, Symbol};
-use crate::results::tables::JOBS;
+use crate::results::tables::RecordedTable;
 use crate::results::{Results, ResultsError};
 use crate::sets::{SetRow, column_of};
 use crate::table::columns::Kind;
@@ -22,7 +22,9 @@ const STATISTICS: [&str; 3] = ["tau_mean", "mean_friction", "resultant_length"];
 /// The sets of a directory with a job that did not fail, controls left out.
 fn sets_in(results: &Results<'_>) -> Result<Vec<SetJobs>, ResultsError> {
     let plan = results.plan();
-    let mut sets = sets_of(&results.dataset(JOBS)?, &|set| !plan.is_control(set))?;
+    let mut sets = sets_of(&results.dataset(RecordedTable::Jobs)?, &|set| {
+        !plan.is_control(set)
+    })?;
     sets.retain(|set| !set.finished.is_empty());
     Ok(sets)
 }

@@ -13,7 +13,7 @@ use super::drive_alone::{Controls, Explained};
 use super::set::{FinishedSet, JobFacts, SetJobs, SetSlips};
 use crate::model::{Parameters, Selected, Selection as _, Symbol, Value};
 use crate::observe::Slip;
-use crate::results::tables::{All, JOBS, JobOfSlip, SLIPS};
+use crate::results::tables::{All, JobOfSlip, RecordedTable};
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, SetRow};
 use crate::sweep::Plan;
@@ -32,7 +32,7 @@ type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 /// Whether a directory has its tables, and not reduced data alone.
 pub(super) fn has_jobs(results: &Results<'_>) -> Result<bool, ResultsError> {
     let layout = results.layout();
-    Ok(layout.storage.exists(&layout.table(JOBS))?)
+    Ok(layout.storage.exists(&layout.table(RecordedTable::Jobs))?)
 }
 
 /// The sets that the rounds of a directory have chosen, by their numbers, controls left out: of the chosen jobs alone.
@@ -80,8 +80,8 @@ impl<'a> Gathering<'a> {
     ) -> Result<Self, ResultsError> {
         let plan = results.plan();
         // Listed once: what other runs commit meanwhile is left out as a whole.
-        let jobs = results.dataset(JOBS)?;
-        let slips = results.committed_files(SLIPS, &jobs)?;
+        let jobs = results.dataset(RecordedTable::Jobs)?;
+        let slips = results.committed_files(RecordedTable::Slips, &jobs)?;
         let sets = sets_of(&jobs, is_wanted)?;
         let controls = Controls::read(slips.clone(), plan, sets.iter().map(|set| &set.parameters))?;
         Ok(Self {

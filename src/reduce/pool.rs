@@ -8,7 +8,7 @@ use super::set::{JobFacts, SetJobs};
 use crate::model::{Parameters, Selected};
 use crate::observe::Slip;
 use crate::results::layout::Layout;
-use crate::results::tables::{All, JOBS, JobOfSlip, SLIPS};
+use crate::results::tables::{All, JobOfSlip, RecordedTable};
 use crate::results::{Results, ResultsError};
 use crate::sets::SetRow;
 use std::collections::BTreeMap;
@@ -33,8 +33,8 @@ impl Pool {
     pub(crate) fn of(layout: &Layout<'_>) -> Result<Self, ResultsError> {
         let results = Results::read(layout)?;
         let plan = results.plan();
-        let jobs = results.dataset(JOBS)?;
-        let slips = results.committed_files(SLIPS, &jobs)?;
+        let jobs = results.dataset(RecordedTable::Jobs)?;
+        let slips = results.committed_files(RecordedTable::Slips, &jobs)?;
         let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
         for row in jobs.rows::<(JobFacts, Selected<All>)>() {
             let (facts, Selected { parameters, .. }) = row?;

@@ -11,7 +11,7 @@ use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
 use super::triggers::{note_noise, trigger_rows};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
-use crate::results::tables::{JOBS, gaps};
+use crate::results::tables::{RecordedTable, gaps};
 use crate::results::{ErrorKind, Results, ResultsError};
 use crate::sets::SetRow;
 use crate::sweep::{Goal, Precision, Sweep, Target};
@@ -88,7 +88,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
         bail!(NoJobs {
-            tables: layout.table(JOBS)
+            tables: layout.table(RecordedTable::Jobs)
         });
     }
     let slips = all_jobs.iter().map(|set| set.slips);
@@ -312,7 +312,7 @@ fn source(results: &Results<'_>) -> Result<String, ResultsError> {
     for sweep in results.plan().sweeps() {
         digest.update(sweep.text());
     }
-    for path in results.dataset(JOBS)?.files() {
+    for path in results.dataset(RecordedTable::Jobs)?.files() {
         digest.update(path.file_name().unwrap_or_default().as_encoded_bytes());
         digest.update(results.layout().storage.length(path)?.to_le_bytes());
     }
@@ -324,7 +324,7 @@ fn source(results: &Results<'_>) -> Result<String, ResultsError> {
 pub fn renew<'a>(results: &Results<'a>) -> Result<Results<'a>> {
     let layout = results.layout();
     let is_there = layout.storage.exists(&layout.reduced_file(SetRow::NAME))?;
-    if is_there && !layout.storage.exists(&layout.table(JOBS))? {
+    if is_there && !layout.storage.exists(&layout.table(RecordedTable::Jobs))? {
         return Ok(results.clone());
     }
     let source = Footer::empty().with(SOURCE, &source(results)?);
@@ -414,7 +414,7 @@ mod tests {
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{
-        DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, SlipRow, relabel,
+        DriveAndSeed, JobLabel, JobRecord, JobRow, Loading, Names, RecordedTable, SlipRow, relabel,
     };
     use crate::results::workers::tests::open;
     use crate::solver::Summary;
@@ -499,11 +499,11 @@ mod tests {
     fn directory_of(slips: u32, seeds: [u64; 3]) -> (tempfile::TempDir, Results<'static>) {
         let (root, results) = without_jobs();
         let layout = results.layout();
-        fs::create_dir_all(layout.table("slips")).unwrap();
-        fs::create_dir_all(layout.table("jobs")).unwrap();
+        fs::create_dir_all(layout.table(RecordedTable::Slips)).unwrap();
+        fs::create_dir_all(layout.table(RecordedTable::Jobs)).unwrap();
         for (part, seed) in (0..).zip(seeds) {
             let name = format!("part-000-{part:06}.parquet");
-            let path = layout.table("slips").join(&name);
+            let path = layout.table(RecordedTable::Slips).join(&name);
             let file = Disk.create(&path).unwrap();
             let mut slip_writer =
                 TableWriter::<SlipRow<'_>>::new(&Gaps::default(), &path, file, &Footer::default())
@@ -523,7 +523,7 @@ mod tests {
             }
             slip_writer.finish().unwrap();
             if part < 2 {
-                let path = layout.table("jobs").join(&name);
+                let path = layout.table(RecordedTable::Jobs).join(&name);
                 let file = Disk.create(&path).unwrap();
                 let mut job_writer =
                     TableWriter::<JobRow>::new(&Gaps::default(), &path, file, &Footer::default())

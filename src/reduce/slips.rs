@@ -6,7 +6,7 @@ use super::gather::{Gathering, MAX_SLIPS as MAX_SLIPS_AT_ONCE, has_jobs};
 use super::values::{Values, formula};
 use crate::model::Selected;
 use crate::observe::Slip;
-use crate::results::tables::{JOBS, JobOfSlip, Loading, SLIPS, gaps};
+use crate::results::tables::{JobOfSlip, Loading, RecordedTable, gaps};
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, SetRow, Statistic};
 use crate::sweep::Expression;
@@ -39,7 +39,8 @@ fn each_slip(
     let ids = sets.iter().map(|set| &*set.set_id);
     let places: HashMap<&str, usize> = ids.zip(0..).collect();
     let mut last: Option<(usize, SlipOfSet)> = None;
-    let files = results.committed_files(SLIPS, &results.dataset(JOBS)?)?;
+    let files =
+        results.committed_files(RecordedTable::Slips, &results.dataset(RecordedTable::Jobs)?)?;
     for row in files.rows::<(JobOfSlip, Slip)>() {
         let (job, slip) = row?;
         let Some(&place) = places.get(&*job.set_id) else {

@@ -3,7 +3,7 @@
 use crate::observe::{Regime, Slip};
 use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, read_sets, swept};
 use crate::results::layout::Layout;
-use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
+use crate::results::tables::{JobOfSlip, RecordedTable};
 use crate::results::{Results, ResultsError};
 use crate::sets::{Label, label};
 use crate::sweep::Sweep;
@@ -224,7 +224,8 @@ impl Slips {
         };
         let mut number = 0_u64;
         let mut last: Option<JobOfSlip> = None;
-        let files = results.committed_files(SLIPS, &results.dataset(JOBS)?)?;
+        let files = results
+            .committed_files(RecordedTable::Slips, &results.dataset(RecordedTable::Jobs)?)?;
         for row in files.rows::<(JobOfSlip, Slip)>() {
             let (job, slip) = row?;
             let Some(&place) = places.get(&job.set_id) else {

@@ -11,7 +11,7 @@
 //! marks, too. A run that ends in order removes the marks of parts that are done.
 
 use crate::results::layout::{Layout, claim};
-use crate::results::tables;
+use crate::results::tables::RecordedTable;
 use crate::results::workers::{Living, Member, PREFIX};
 use crate::sweep::PartName;
 use crate::table::error::ResultsError;
@@ -207,7 +207,7 @@ impl Layout<'_> {
         if marks.is_empty() {
             return Ok(());
         }
-        let done = self.parts_in(&self.table(tables::JOBS))?;
+        let done = self.parts_in(&self.table(RecordedTable::Jobs))?;
         let of_done = marks.into_iter().filter(|(part, _)| done.contains(part));
         for mark in of_done.flat_map(|(_, marks)| marks) {
             self.remove(&self.deaths().join(mark))?;

@@ -5,7 +5,7 @@ use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden, is_table_file};
-use crate::results::tables::{JOBS, TABLES, tables_of};
+use crate::results::tables::RecordedTable;
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
@@ -275,7 +275,7 @@ impl<'a> Results<'a> {
     }
 
     /// The parts that have a file in a table. Names that no part of this directory can have are damage.
-    pub fn parts_of(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
+    pub fn parts_of(&self, table: RecordedTable) -> Result<BTreeSet<PartName>, ResultsError> {
         let folder = self.layout.table(table);
         let mut parts = BTreeSet::new();
         let names = self.layout.names_in(&folder)?.into_iter();
@@ -290,22 +290,22 @@ impl<'a> Results<'a> {
         Ok(parts)
     }
 
-    pub fn dataset(&self, table: &str) -> Result<Dataset<'a>, ResultsError> {
+    pub fn dataset(&self, table: RecordedTable) -> Result<Dataset<'a>, ResultsError> {
         let tables = self.layout.tables();
         let parts = self.parts_of(table)?.into_iter();
         let files = parts.map(|part| self.file_in(&tables, table, part));
         Ok(Dataset::of(self.layout.storage, files.collect()))
     }
 
-    pub(super) fn dataset_of(&self, table: &str, part: PartName) -> Dataset<'a> {
+    pub(super) fn dataset_of(&self, table: RecordedTable, part: PartName) -> Dataset<'a> {
         let file = self.file_in(&self.layout.tables(), table, part);
         Dataset::of(self.layout.storage, vec![file])
     }
 
     /// The file of a part of a table, below the tables or the spill.
-    pub(super) fn file_in(&self, place: &Path, table: &str, part: PartName) -> DataFile {
+    pub(super) fn file_in(&self, place: &Path, table: RecordedTable, part: PartName) -> DataFile {
         DataFile {
-            path: place.join(table).join(part.file()),
+            path: place.join(table.name()).join(part.file()),
             rows: 0..=u64::MAX,
             footer: Arc::clone(&self.footers[part.extension]),
         }
@@ -316,8 +316,8 @@ impl<'a> Results<'a> {
             return Ok(BTreeSet::new());
         }
         // The jobs first: a part that has its jobs had its other files before.
-        let mut done = self.parts_of(JOBS)?;
-        for table in self.tables().filter(|table| *table != JOBS) {
+        let mut done = self.parts_of(RecordedTable::Jobs)?;
+        for table in self.tables().filter(|table| *table != RecordedTable::Jobs) {
             done = &done & &self.parts_of(table)?;
         }
         Ok(done)
@@ -328,7 +328,7 @@ impl<'a> Results<'a> {
         let layout = &self.layout;
         let spill = layout.spill();
         for above in [layout.tables(), spill.clone()] {
-            for folder in TABLES.map(|table| above.join(table)) {
+            for folder in RecordedTable::ALL.map(|table| above.join(table.name())) {
                 let mut parts = layout.parts_in(&folder)?;
                 // A worker that begins the same sweep now may run parts of the next extension.
                 parts.retain(|part| part.extension < self.extensions.len());
@@ -353,7 +353,7 @@ impl<'a> Results<'a> {
             layout.reduced(),
             layout.figures(),
         ];
-        folders.extend(TABLES.map(|table| layout.table(table)));
+        folders.extend(RecordedTable::ALL.map(|table| layout.table(table)));
         let staging = disk(&layout.staging(""));
         for folder in folders {
             let found = disk(&folder);
@@ -402,9 +402,9 @@ impl<'a> Results<'a> {
         Footer::default().with_sweep(self.sweep().name(), self.sweep().text())
     }
 
-    /// Names of the tables, that of the jobs last.
-    pub fn tables(&self) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
-        tables_of(self.sweep().recording())
+    /// The tables, that of the jobs last.
+    pub fn tables(&self) -> impl DoubleEndedIterator<Item = RecordedTable> {
+        RecordedTable::of(self.sweep().recording())
     }
 
     /// Reduced tables that not all directories have, and whether this one has them.
@@ -433,7 +433,7 @@ impl<'a> Results<'a> {
             layout.copies(),
             layout.tables(),
         ];
-        folders.extend(TABLES.map(|table| layout.table(table)));
+        folders.extend(RecordedTable::ALL.map(|table| layout.table(table)));
         for folder in folders {
             gone_is_fine(layout.storage.sync_folder(&folder))?;
         }

@@ -11,7 +11,7 @@ use crate::model::Selected;
 use crate::results::destination::{NewFolder, refuse_stopped};
 use crate::results::directory::Results;
 use crate::results::parts::row_count;
-use crate::results::tables::{All, JOBS, JobRow, recorded_schema};
+use crate::results::tables::{All, JobRow, RecordedTable};
 use crate::sweep::PartName;
 use crate::table::arrow::{DESCRIPTION, UNIT, schema, schema_of};
 use crate::table::columns::columns;
@@ -58,7 +58,7 @@ impl Results<'_> {
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
         let storage = self.layout().storage;
-        let parts = self.parts_of(JOBS)?;
+        let parts = self.parts_of(RecordedTable::Jobs)?;
         let overview = self.overview()?;
         let mut exported = Exported {
             parts: parts.len() as u64,
@@ -71,7 +71,9 @@ impl Results<'_> {
         let mut done = 0;
         let mut columns = vec!["table,column,unit,meaning\n".to_owned()];
         let joined = |table| JoinedTable::new(self, table, &self.exported_columns(table));
-        let joined = self.tables().map(|table| (table, Some(joined(table))));
+        let joined = self
+            .tables()
+            .map(|table| (table.name(), Some(joined(table))));
         let optional = self.optional_tables().into_iter();
         let optional = optional.filter_map(|(table, is_there)| is_there.then_some(table));
         let reduced = iter::once("sets")
@@ -109,7 +111,7 @@ impl Results<'_> {
                 }
             }
             writer.finish()?;
-            if table == JOBS {
+            if table == RecordedTable::Jobs.name() {
                 exported.jobs = rows;
             }
             let bytes = storage.length(&path)?;
@@ -128,8 +130,8 @@ impl Results<'_> {
     }
 
     /// The columns of a table, all that were swept, and whether a row belongs to a control.
-    fn exported_columns(&self, table: &str) -> Vec<FieldRef> {
-        let own = recorded_schema(table, self.sweep());
+    fn exported_columns(&self, table: RecordedTable) -> Vec<FieldRef> {
+        let own = table.schema(self.sweep());
         let extensions = self.extensions().iter();
         let swept = extensions.flat_map(|extension| extension.sweep.swept());
         let swept: HashSet<&str> = swept.collect();
@@ -156,7 +158,7 @@ columns! {
 /// Columns of a table: its own, and those of the jobs of its rows.
 pub struct JoinedTable<'a> {
     results: &'a Results<'a>,
-    table: &'static str,
+    table: RecordedTable,
     schema: SchemaRef,
     /// Columns of the table that are read.
     own: Vec<String>,
@@ -168,16 +170,19 @@ pub struct JoinedTable<'a> {
 
 impl<'a> JoinedTable<'a> {
     /// All columns that a table can have: its own, those of the jobs, and `control`.
-    pub fn columns(results: &Results<'_>, table: &str) -> Vec<FieldRef> {
-        let own = recorded_schema(table, results.sweep());
-        let others = [recorded_schema(JOBS, results.sweep()), schema::<OfSet>()];
+    pub fn columns(results: &Results<'_>, table: RecordedTable) -> Vec<FieldRef> {
+        let own = table.schema(results.sweep());
+        let others = [
+            RecordedTable::Jobs.schema(results.sweep()),
+            schema::<OfSet>(),
+        ];
         let others = others.iter().flat_map(|schema| schema.fields());
         let others = others.filter(|field| own.field_with_name(field.name()).is_err());
         own.fields().iter().chain(others).cloned().collect()
     }
 
-    pub fn new(results: &'a Results<'a>, table: &'static str, columns: &[FieldRef]) -> Self {
-        let recorded = recorded_schema(table, results.sweep());
+    pub fn new(results: &'a Results<'a>, table: RecordedTable, columns: &[FieldRef]) -> Self {
+        let recorded = table.schema(results.sweep());
         let names = columns.iter().map(|field| field.name().clone());
         let (mut own, mut of_jobs): (Vec<_>, Vec<_>) =
             names.partition(|name| recorded.field_with_name(name).is_ok());
@@ -217,8 +222,8 @@ impl<'a> JoinedTable<'a> {
         let layout = self.results.layout();
         let jobs = self.read_jobs(part).map_err(unread)?;
         let mut file = (self.results).file_in(&layout.tables(), self.table, part);
-        if self.table != JOBS {
-            let jobs = self.results.dataset_of(JOBS, part);
+        if self.table != RecordedTable::Jobs {
+            let jobs = self.results.dataset_of(RecordedTable::Jobs, part);
             file.rows = row_count(jobs, self.table).map_err(unread)?;
         }
         for batch in Dataset::of(layout.storage, vec![file]).columns(&self.own) {
@@ -238,7 +243,11 @@ impl<'a> JoinedTable<'a> {
         names.push(JOB_ID.to_owned());
         let mut batches = Vec::new();
         let mut controls = Vec::new();
-        for batch in self.results.dataset_of(JOBS, part).columns(&names) {
+        for batch in self
+            .results
+            .dataset_of(RecordedTable::Jobs, part)
+            .columns(&names)
+        {
             let batch = batch?;
             if self.has_controls {
                 let jobs: Vec<Selected<All>> = batch.rows_of()?;
@@ -252,7 +261,8 @@ impl<'a> JoinedTable<'a> {
             .map_or_else(schema::<JobRow>, RecordBatch::schema);
         let jobs = concat_batches(&columns, &batches)
             .and_then(|columns| Jobs::new(columns, controls.into()));
-        let path = (self.results).file_in(&self.results.layout().tables(), JOBS, part);
+        let path =
+            (self.results).file_in(&self.results.layout().tables(), RecordedTable::Jobs, part);
         jobs.map(Some).map_err(ResultsError::damage_at(&path.path))
     }
 

@@ -13,7 +13,7 @@ pub(super) mod tests;
 
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
 use crate::results::layout::{Layout, settled};
-use crate::results::tables::{recorded_schema, tables_of};
+use crate::results::tables::RecordedTable;
 use crate::sweep::{Extension, PLAN_VERSION, Round, Sweep};
 use crate::table::checksum;
 use crate::table::error::ResultsError;
@@ -60,12 +60,12 @@ struct Format {
 }
 
 fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
-    let columns = |table: &str| {
-        let schema = recorded_schema(table, sweep);
+    let columns = |table: RecordedTable| {
+        let schema = table.schema(sweep);
         let names = schema.fields().iter().map(|field| field.name().clone());
-        (table.to_owned(), names.collect())
+        (table.name().to_owned(), names.collect())
     };
-    tables_of(sweep.recording()).map(columns).collect()
+    RecordedTable::of(sweep.recording()).map(columns).collect()
 }
 
 impl Record {

@@ -4,6 +4,7 @@
 //! Staging lies on the same file system as the tables, so that a rename moves a whole file at once, but outside their
 //! folders: a stray file there breaks some reader.
 
+use crate::results::tables::RecordedTable;
 use crate::sweep::{PartName, Sweep};
 use crate::table::error::ResultsError;
 use crate::table::file::FILE_EXTENSION;
@@ -82,8 +83,8 @@ impl<'a> Layout<'a> {
         ResultsError::refused(&self.root, problem)
     }
 
-    pub fn table(&self, name: &str) -> PathBuf {
-        self.tables().join(name)
+    pub fn table(&self, table: RecordedTable) -> PathBuf {
+        self.tables().join(table.name())
     }
 
     /// The names in a folder; none where another program's file stands in its place.

@@ -7,7 +7,8 @@
 use crate::observe::Measurements;
 use crate::results::directory::Results;
 use crate::results::tables::{
-    self, DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, RowOfJob, label, relabel,
+    DriveAndSeed, JobLabel, JobOutcome, JobRecord, JobRow, RecordedTable, RowOfJob, gaps, label,
+    relabel,
 };
 use crate::results::workers::Member;
 use crate::sweep::{Job, Outline, Part, PartName};
@@ -33,7 +34,7 @@ impl<'a> Results<'a> {
     /// A run killed in between leaves the slips of a part without its jobs. A part without its slips is damaged.
     pub fn committed_files(
         &self,
-        table: &str,
+        table: RecordedTable,
         jobs: &Dataset<'_>,
     ) -> Result<Dataset<'a>, ResultsError> {
         let there = self.layout().parts_in(&self.layout().table(table))?;
@@ -44,13 +45,13 @@ impl<'a> Results<'a> {
                 let problem = "it is missing, though the jobs of its part are there";
                 return Err(ResultsError::damaged(&file.path, problem));
             }
-            file.rows = row_count(self.dataset_of(tables::JOBS, part), table)?;
+            file.rows = row_count(self.dataset_of(RecordedTable::Jobs, part), table)?;
             files.push(file);
         }
         Ok(Dataset::of(self.layout().storage, files))
     }
 
-    pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
+    pub fn part_file(&self, table: RecordedTable, part: &Outline) -> PathBuf {
         self.layout().table(table).join(part.name.file())
     }
 
@@ -78,20 +79,20 @@ impl<'a> Results<'a> {
         let labels: Vec<JobLabel<DriveAndSeed>> = part.jobs.iter().map(label).collect();
         let outcomes = (0..).map(|position| outcomes.get(&position));
         let jobs: Jobs<'_> = labels.iter().zip(outcomes).collect();
-        let gaps = tables::gaps(sweep);
+        let gaps = gaps(sweep);
         let encoded = |table| {
             let file = self.file_in(place, table, part.name);
-            let kept = &kept[table];
+            let kept = &kept[&table];
             match table {
-                tables::SLIPS => encoded(file, &gaps, &jobs, kept, |job, outcome| {
+                RecordedTable::Slips => encoded(file, &gaps, &jobs, kept, |job, outcome| {
                     let slips = outcome.iter().flat_map(Measurements::all_slips);
                     slips.map(move |slip| (Cow::Borrowed(job), slip))
                 }),
-                tables::PRECURSORS => encoded(file, &gaps, &jobs, kept, |job, outcome| {
+                RecordedTable::Precursors => encoded(file, &gaps, &jobs, kept, |job, outcome| {
                     let precursors = outcome.iter().flat_map(|measured| &measured.precursors);
                     precursors.map(move |precursor| (Cow::Borrowed(job), Cow::Borrowed(precursor)))
                 }),
-                _ => encoded(file, &gaps, &jobs, kept, |job, outcome| {
+                RecordedTable::Jobs => encoded(file, &gaps, &jobs, kept, |job, outcome| {
                     let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
                     let row: JobRow = (relabel(job), record);
                     [row]
@@ -150,7 +151,7 @@ impl<'a> Results<'a> {
 pub type PartFiles = Vec<(PathBuf, Vec<u8>)>;
 
 /// Rows of jobs that are there already, by table.
-pub type Kept = HashMap<&'static str, KeptRows>;
+pub type Kept = HashMap<RecordedTable, KeptRows>;
 
 /// The jobs of a part, those that were run with their outcomes.
 type Jobs<'a> = Vec<(&'a JobLabel<DriveAndSeed>, Option<&'a Outcome>)>;
@@ -190,11 +191,11 @@ columns! {
 impl RowsOfJob {
     /// The fewest and the most rows of the job in a table. One that may run again may have more, which a killed run
     /// wrote.
-    pub(super) fn count(&self, table: &str) -> RangeInclusive<u64> {
-        let rows = if table == tables::SLIPS {
-            self.slips
-        } else {
-            self.precursors
+    pub(super) fn count(&self, table: RecordedTable) -> RangeInclusive<u64> {
+        let rows = match table {
+            RecordedTable::Slips => self.slips,
+            RecordedTable::Precursors => self.precursors,
+            RecordedTable::Jobs => Some(1),
         };
         let least = rows.unwrap_or(0);
         match self.outcome {
@@ -207,7 +208,7 @@ impl RowsOfJob {
 /// The fewest and the most rows of the jobs of a part in a table, as its jobs file says.
 pub(super) fn row_count(
     jobs: Dataset<'_>,
-    table: &str,
+    table: RecordedTable,
 ) -> Result<RangeInclusive<u64>, ResultsError> {
     let mut least = 0_u64;
     let mut most = 0_u64;

@@ -13,7 +13,7 @@
 use crate::results::claims::{Deaths, Marked};
 use crate::results::directory::Results;
 use crate::results::layout::settled;
-use crate::results::tables::{self, JobOutcome, RowOfJob};
+use crate::results::tables::{JobOutcome, RecordedTable, RowOfJob};
 use crate::sweep::{Extension, Job, LARGE, Outline, Part, PartName, certain_memory};
 use crate::table::columns::columns;
 use crate::table::error::{ErrorKind, ResultsError};
@@ -117,7 +117,7 @@ impl<'a> Pending<'a> {
     }
 
     pub fn look_at_spill(&self) -> Result<(), ResultsError> {
-        *self.spilled.borrow_mut() = self.results.spilled_parts(tables::JOBS)?;
+        *self.spilled.borrow_mut() = self.results.spilled_parts(RecordedTable::Jobs)?;
         Ok(())
     }
 
@@ -314,7 +314,7 @@ impl Results<'_> {
         let is_cut_off = |time: f64| time < max_time * (1.0 - SAME_TIME);
         let mut again = BTreeMap::new();
         let mut rows = 0;
-        let jobs = self.dataset_of(tables::JOBS, part.name);
+        let jobs = self.dataset_of(RecordedTable::Jobs, part.name);
         for row in jobs.rows::<OutcomeRow>() {
             let row = row?;
             let is_cut_off = row.simulated_time.is_some_and(is_cut_off);
@@ -327,7 +327,7 @@ impl Results<'_> {
             rows += 1;
         }
         if rows != part.job_count {
-            let file = self.part_file(tables::JOBS, part);
+            let file = self.part_file(RecordedTable::Jobs, part);
             let problem = format!("{rows} jobs where the plan has {}", part.job_count);
             return Err(ResultsError::damaged(&file, problem));
         }
@@ -339,15 +339,20 @@ impl Results<'_> {
     }
 
     /// The parts with spilled rows of this table.
-    pub(super) fn spilled_parts(&self, table: &str) -> Result<BTreeSet<PartName>, ResultsError> {
-        Ok(self.layout().parts_in(&self.layout().spill().join(table))?)
+    pub(super) fn spilled_parts(
+        &self,
+        table: RecordedTable,
+    ) -> Result<BTreeSet<PartName>, ResultsError> {
+        Ok(self
+            .layout()
+            .parts_in(&self.layout().spill().join(table.name()))?)
     }
 
     /// The ids in a file of the spill; `None` if this host does not see it yet.
     fn spilled_ids(
         &self,
         outline: &Outline,
-        table: &str,
+        table: RecordedTable,
     ) -> Result<Option<HashSet<String>>, ResultsError> {
         let file = self.file_in(&self.layout().spill(), table, outline.name);
         let rows = Dataset::of(self.layout().storage, vec![file]).rows::<RowOfJob>();

@@ -81,18 +81,48 @@ impl Selection for All {
 /// What every row says about its job: names, parameters, η.
 pub type JobLabel<S> = (Names, Selected<S>, Loading);
 
-/// Names of the tables, which are those of their folders.
-pub const SLIPS: &str = <SlipRow<'_> as Table>::NAME;
-pub const PRECURSORS: &str = <PrecursorRow<'_> as Table>::NAME;
-pub const JOBS: &str = JobRow::NAME;
-pub const TABLES: [&str; 3] = [SLIPS, PRECURSORS, JOBS];
+/// A table that jobs write, that of the jobs last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RecordedTable {
+    Slips,
+    Precursors,
+    Jobs,
+}
 
-/// Names of the tables of a recording, that of the jobs last.
-pub fn tables_of(recording: &Recording) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
-    let has_precursors = recording.precursors;
-    TABLES
-        .into_iter()
-        .filter(move |table| has_precursors || *table != PRECURSORS)
+impl RecordedTable {
+    pub const ALL: [Self; 3] = [Self::Slips, Self::Precursors, Self::Jobs];
+
+    /// Its name, and that of its folder.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Slips => <SlipRow<'_> as Table>::NAME,
+            Self::Precursors => <PrecursorRow<'_> as Table>::NAME,
+            Self::Jobs => JobRow::NAME,
+        }
+    }
+
+    const fn is_recorded(self, recording: &Recording) -> bool {
+        match self {
+            Self::Precursors => recording.precursors,
+            Self::Slips | Self::Jobs => true,
+        }
+    }
+
+    /// Those of a recording.
+    pub fn of(recording: &Recording) -> impl DoubleEndedIterator<Item = Self> {
+        let all = Self::ALL.into_iter();
+        all.filter(|table| table.is_recorded(recording))
+    }
+
+    /// The columns, with units and meanings, as a sweep has them.
+    pub fn schema(self, sweep: &Sweep) -> SchemaRef {
+        let buffer = match self {
+            Self::Slips => RowBuffer::new::<SlipRow<'_>>(),
+            Self::Precursors => RowBuffer::new::<PrecursorRow<'_>>(),
+            Self::Jobs => RowBuffer::new::<JobRow>(),
+        };
+        SchemaRef::clone(buffer.with(&gaps(sweep)).schema())
+    }
 }
 
 /// What sets say of drops in N.
@@ -126,16 +156,6 @@ pub fn gaps(sweep: &Sweep) -> Gaps {
         unknown,
         pure: measured.map_or_else(Vec::new, |measured| measured.pure.clone()),
     }
-}
-
-/// The columns of the table of this name, with units and meanings, as a sweep has it.
-pub fn recorded_schema(table: &str, sweep: &Sweep) -> SchemaRef {
-    let buffer = match table {
-        SLIPS => RowBuffer::new::<SlipRow<'_>>(),
-        PRECURSORS => RowBuffer::new::<PrecursorRow<'_>>(),
-        _ => RowBuffer::new::<JobRow>(),
-    };
-    SchemaRef::clone(buffer.with(&gaps(sweep)).schema())
 }
 
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> JobLabel<S> {

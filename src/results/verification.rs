@@ -9,7 +9,7 @@ use crate::results::extension_file;
 use crate::results::layout::{Layout, is_table_file};
 use crate::results::parts::RowsOfJob;
 use crate::results::pending::{Pending, Retry};
-use crate::results::tables::{self, RowOfJob};
+use crate::results::tables::{RecordedTable, RowOfJob};
 use crate::sweep::{Outline, Part, PartName};
 use crate::table::error::ResultsError;
 use crate::table::file::{DataFile, Footer, check_count};
@@ -165,7 +165,7 @@ fn table_files(
 fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), ResultsError> {
     let layout = results.layout();
     for name in layout.storage.list(&layout.tables())? {
-        if !results.tables().any(|table| name == table) {
+        if !results.tables().any(|table| name == table.name()) {
             let path = layout.tables().join(name);
             found.passed_over.push(shown(&path).to_string());
         }
@@ -178,11 +178,11 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
     let mut sound: Vec<Outline> = Vec::new();
     let mut done = BTreeSet::new();
     for part in results.plan().parts() {
-        let is_there = |table: &&str| there.remove(&results.part_file(table, &part));
-        let tables: Vec<&'static str> = results.tables().filter(is_there).collect();
+        let is_there = |table: &RecordedTable| there.remove(&results.part_file(*table, &part));
+        let tables: Vec<RecordedTable> = results.tables().filter(is_there).collect();
         if verify_part(results, &part, &tables, found)? {
             sound.push((*part).clone());
-            if tables.contains(&tables::JOBS) {
+            if tables.contains(&RecordedTable::Jobs) {
                 done.insert(part.name);
             }
         }
@@ -203,7 +203,7 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
 fn verify_part(
     results: &Results<'_>,
     part: &Part,
-    tables: &[&'static str],
+    tables: &[RecordedTable],
     found: &mut Verification,
 ) -> Result<bool, ResultsError> {
     let name = part.name.to_string();
@@ -220,7 +220,7 @@ fn verify_part(
         found.problems.extend(damage);
         return Ok(false);
     }
-    if !tables.contains(&tables::JOBS) {
+    if !tables.contains(&RecordedTable::Jobs) {
         found.missing.push(name);
         return Ok(true);
     }
@@ -228,7 +228,7 @@ fn verify_part(
     found.jobs += part.jobs.len() as u64;
     found.files += tables.len() as u64;
     for table in tables {
-        let file = results.part_file(table, part);
+        let file = results.part_file(*table, part);
         found.bytes += results.layout().storage.length(&file)?;
     }
     Ok(true)
@@ -242,10 +242,10 @@ fn ids(results: &Results<'_>, part: &Part) -> impl Iterator<Item = String> {
 fn damage_of(
     results: &Results<'_>,
     part: &Part,
-    tables: &[&'static str],
+    tables: &[RecordedTable],
 ) -> Result<Vec<Problem>, ResultsError> {
     let layout = results.layout();
-    let has_jobs = tables.contains(&tables::JOBS);
+    let has_jobs = tables.contains(&RecordedTable::Jobs);
     let mut damage = Vec::new();
     for table in results.tables() {
         let file = results.file_in(&layout.tables(), table, part.name);
@@ -265,9 +265,9 @@ fn damage_of(
 
 /// Compares the rows of all tables of a part with each other, and with the plan.
 fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
-    let path = results.part_file(tables::JOBS, part);
+    let path = results.part_file(RecordedTable::Jobs, part);
     let damaged = |problem: String| Err(ResultsError::damaged(&path, problem));
-    let jobs = results.dataset_of(tables::JOBS, part.name).rows();
+    let jobs = results.dataset_of(RecordedTable::Jobs, part.name).rows();
     let jobs: Vec<RowsOfJob> = jobs.collect::<Result<_, _>>()?;
     for (expected, job) in ids(results, part).zip(&jobs) {
         if job.job_id != expected {
@@ -280,7 +280,9 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
         let planned = part.jobs.len();
         return damaged(format!("it has {found} jobs, and its part {planned}"));
     }
-    let mut others = results.tables().filter(|table| *table != tables::JOBS);
+    let mut others = results
+        .tables()
+        .filter(|table| *table != RecordedTable::Jobs);
     others.try_for_each(|table| check_counts(results, part, &jobs, table))
 }
 
@@ -289,7 +291,7 @@ fn check_counts(
     results: &Results<'_>,
     part: &Part,
     jobs: &[RowsOfJob],
-    table: &str,
+    table: RecordedTable,
 ) -> Result<(), ResultsError> {
     let path = results.part_file(table, part);
     let mut counts = vec![0; jobs.len()];

@@ -4,7 +4,7 @@ use crate::results::claims::Marked;
 use crate::results::log::RunEvent;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::pending::{Again, Overview, Pending, Retry};
-use crate::results::tables::{JOBS, JobOutcome};
+use crate::results::tables::{JobOutcome, RecordedTable};
 use crate::results::workers::Living;
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Extension, Outline};
@@ -75,7 +75,7 @@ impl Cut {
         if !results.extensions().iter().any(has_time) {
             return Ok(cut);
         }
-        for job in results.dataset(JOBS)?.rows::<Ended>() {
+        for job in results.dataset(RecordedTable::Jobs)?.rows::<Ended>() {
             let job = job?;
             if job.outcome == JobOutcome::TimeLimit {
                 cut.jobs += 1;

@@ -11,12 +11,13 @@
 //! function of the plan alone, so each part belongs to one shard of N whatever the others do; an extension deals on,
 //! and changes nothing that was dealt before; no two shards differ by more than the costliest part.
 
+use crate::results::ResultsError;
 use crate::results::claims::{ClaimState, Claims};
 use crate::results::commit::own_number;
 use crate::results::layout::shorter_in_tests;
 use crate::results::pending::Pending;
+use crate::results::tables::RecordedTable;
 use crate::results::workers::{Living, Member};
-use crate::results::{ResultsError, tables};
 use crate::run::Joined;
 use crate::run::limits::beside_threads;
 use crate::sweep::{Job, Outline, Part, predicted_memory};
@@ -102,7 +103,7 @@ impl Pending<'_> {
                 }
                 ClaimState::Free(_) => left.has_abandoned = true,
                 ClaimState::Own => {
-                    let path = self.results.part_file(tables::JOBS, part);
+                    let path = self.results.part_file(RecordedTable::Jobs, part);
                     return Err(ResultsError::damaged(&path, "it was committed and is gone"));
                 }
             }

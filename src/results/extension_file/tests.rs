@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::results::commit::Commit;
-use crate::results::tables::JOBS;
+use crate::results::tables::RecordedTable;
 use crate::results::workers::tests::open;
 use crate::results::{ErrorKind, Results};
 use crate::table::storage::Disk;
@@ -70,7 +70,7 @@ pub(crate) fn of_other_versions(text: &str, column: &str) -> String {
     (record.model_version, record.plan_version) = (0, 0);
     record
         .tables
-        .get_mut(JOBS)
+        .get_mut(RecordedTable::Jobs.name())
         .unwrap()
         .retain(|other| other != column);
     record.text()

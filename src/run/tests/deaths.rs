@@ -3,6 +3,7 @@
 use super::*;
 use crate::results::claims::Marked;
 use crate::results::pending::{Pending, Retry};
+use crate::results::tables::RecordedTable;
 use crate::results::workers::tests::lose;
 use crate::sweep::Part;
 
@@ -224,7 +225,7 @@ fn what_memory_forbids_fails_with_its_reason_and_runs_again_by_itself_where_it_f
         (6, 2, 0)
     );
     assert_eq!(blocks, [3, 3, 4, 4]);
-    let reasons = texts(root.path(), "jobs", "reason");
+    let reasons = texts(root.path(), RecordedTable::Jobs, "reason");
     let reason =
         "memory: needs at least 1.2 GB, 700 MB allowed here; run it again where more is allowed";
     assert_eq!(

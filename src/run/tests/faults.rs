@@ -162,7 +162,7 @@ fn committed_jobs(root: &Path) -> u64 {
     if !root.join("tables/jobs").exists() {
         return 0;
     }
-    texts(root, "jobs", "outcome")
+    texts(root, RecordedTable::Jobs, "outcome")
         .iter()
         .filter(|outcome| *outcome != "failed")
         .count() as u64

@@ -5,7 +5,7 @@ use crate::observe::Measurements;
 use crate::reduce::reduce;
 use crate::results::destination::NewFolder;
 use crate::results::layout::Layout;
-use crate::results::tables::Names;
+use crate::results::tables::{Names, RecordedTable};
 use crate::results::{ErrorKind, Results};
 use crate::run::{Kernel, Options, Shard};
 use crate::solver::{SimulationError, Summary};
@@ -186,7 +186,11 @@ fn run_all(root: &Path, seeds: u64) -> u64 {
 fn ids(root: &Path) -> Vec<String> {
     let mut ids = Vec::new();
     let results = Results::read(&Layout::new(&Disk, root)).unwrap();
-    for names in results.dataset("jobs").unwrap().rows::<Names>() {
+    for names in results
+        .dataset(RecordedTable::Jobs)
+        .unwrap()
+        .rows::<Names>()
+    {
         ids.push(names.unwrap().job_id);
     }
     ids.sort();
@@ -338,8 +342,8 @@ fn a_retry_that_ends_at_any_operation_keeps_every_good_row() {
         root
     };
     let good = |root: &Path| {
-        let outcomes = super::texts(root, "jobs", "outcome");
-        let ids = super::texts(root, "jobs", "job_id");
+        let outcomes = super::texts(root, RecordedTable::Jobs, "outcome");
+        let ids = super::texts(root, RecordedTable::Jobs, "job_id");
         ids.into_iter()
             .zip(outcomes)
             .filter(|(_, outcome)| outcome == "done")

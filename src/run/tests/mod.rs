@@ -16,7 +16,7 @@ use crate::model::Parameters;
 use crate::observe::{Measurements, Precursor, Slip};
 use crate::reduce::SetRow;
 use crate::results::ErrorKind;
-use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
+use crate::results::tables::{JobRow, PrecursorRow, RecordedTable, SlipRow};
 use crate::results::workers::SILENCE;
 use crate::results::workers::tests::{leave, open};
 use crate::solver::{SimulationError, Summary};
@@ -151,7 +151,7 @@ fn tables_of(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files
 }
 
-fn texts(root: &Path, table: &str, column: &str) -> Vec<String> {
+fn texts(root: &Path, table: RecordedTable, column: &str) -> Vec<String> {
     let mut texts = Vec::new();
     let results = Results::read(&Layout::new(&Disk, root)).unwrap();
     for batch in results.dataset(table).unwrap().batches() {
@@ -326,7 +326,9 @@ fn failing_and_panicking_jobs_become_rows_others_continue_and_a_retry_mends_them
         (report.jobs_run, report.jobs_failed, report.jobs_left),
         (2 * SEEDS, 4, 0)
     );
-    let reasons: BTreeSet<String> = texts(root.path(), "jobs", "reason").into_iter().collect();
+    let reasons: BTreeSet<String> = texts(root.path(), RecordedTable::Jobs, "reason")
+        .into_iter()
+        .collect();
     assert!(
         reasons.contains("panic: index 99 out of bounds"),
         "{reasons:?}"
@@ -382,7 +384,7 @@ fn an_extension_runs_the_new_jobs_alone_and_every_job_is_there_once() {
     assert_eq!(report.jobs_failed, 0);
     let after = tables_of(root.path());
     assert!(before.iter().all(|(path, bytes)| after[path] == *bytes));
-    let ids = texts(root.path(), "jobs", "job_id");
+    let ids = texts(root.path(), RecordedTable::Jobs, "job_id");
     assert_eq!(
         (
             ids.len() as u64,
@@ -441,7 +443,7 @@ fn what_is_taken_out_of_the_sweep_is_kept_if_done_and_else_not_run() {
         begun.jobs_run + narrowed.jobs_run + whole.jobs_run,
         2 * SEEDS
     );
-    let ids = texts(root.path(), "jobs", "job_id");
+    let ids = texts(root.path(), RecordedTable::Jobs, "job_id");
     assert_eq!(ids.iter().collect::<BTreeSet<_>>().len() as u64, 2 * SEEDS);
     assert_eq!(ids.len() as u64, 2 * SEEDS);
     assert!(
@@ -474,7 +476,7 @@ fn a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others() 
         }
     };
     run_all(root.path(), &bounded("max_time = 40"), &until(40.0));
-    let cut = texts(root.path(), "jobs", "outcome")
+    let cut = texts(root.path(), RecordedTable::Jobs, "outcome")
         .iter()
         .filter(|outcome| *outcome == "time limit")
         .count() as u64;
@@ -488,8 +490,11 @@ fn a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others() 
     );
     let longer = run_all(root.path(), &bounded(""), &fine);
     assert_eq!((longer.jobs_run, longer.jobs_left), (cut, 0));
-    assert!(!texts(root.path(), "jobs", "outcome").contains(&"time limit".to_owned()));
-    assert_eq!(texts(root.path(), "jobs", "job_id").len() as u64, 2 * SEEDS);
+    assert!(!texts(root.path(), RecordedTable::Jobs, "outcome").contains(&"time limit".to_owned()));
+    assert_eq!(
+        texts(root.path(), RecordedTable::Jobs, "job_id").len() as u64,
+        2 * SEEDS
+    );
     assert!(
         Results::verify(&Layout::new(&Disk, root.path()))
             .unwrap()
@@ -925,7 +930,7 @@ fn the_status_reports_what_is_there_and_what_is_missing() {
     )
     .unwrap();
     let overview = status.overview;
-    let rows = texts(root.path(), "jobs", "outcome");
+    let rows = texts(root.path(), RecordedTable::Jobs, "outcome");
     let failed = rows.iter().filter(|outcome| *outcome == "failed").count() as u64;
     assert_eq!(
         (overview.jobs_failed, overview.jobs_done),
@@ -1044,7 +1049,7 @@ fn all_tables_have_the_described_columns() {
     });
     let expected = [slips, columns::<PrecursorRow<'_>>(), columns::<JobRow>()];
     let mut all: BTreeSet<String> = columns::<SetRow>().into_iter().collect();
-    for (table, expected) in ["slips", "precursors", "jobs"].into_iter().zip(expected) {
+    for (table, expected) in RecordedTable::ALL.into_iter().zip(expected) {
         let results = Results::read(&Layout::new(&Disk, root.path())).unwrap();
         let dataset = results.dataset(table).unwrap();
         let batch = dataset.batches().next().unwrap().unwrap();

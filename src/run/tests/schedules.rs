@@ -9,7 +9,7 @@ use super::*;
 use crate::reduce::{NoJobs, reduce, renew};
 use crate::results::commit::tests::{KNOWN_NUMBER, own_number};
 use crate::results::destination::NewFolder;
-use crate::results::tables::Names;
+use crate::results::tables::{Names, RecordedTable};
 use crate::results::verification::Verification;
 use crate::table::formats::Format;
 use rand_chacha::ChaCha8Rng;
@@ -99,7 +99,7 @@ impl Process {
             Self::Verify => assert_sound(&Results::verify(layout)?),
             Self::Reduce => Ok(reduce(&Results::read(layout)?).map(|_| ())?),
             Self::Read => Ok(Results::read(layout)?
-                .dataset("jobs")?
+                .dataset(RecordedTable::Jobs)?
                 .rows::<Names>()
                 .try_for_each(|names| names.map(drop))?),
         }
@@ -343,9 +343,12 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
     let ids = |of: &BTreeMap<PathBuf, Vec<u8>>| {
         let folder = self::folder();
         write_files(folder.path(), of);
-        let mut ids = texts(folder.path(), "jobs", "job_id");
+        let mut ids = texts(folder.path(), RecordedTable::Jobs, "job_id");
         ids.sort();
-        (ids, texts(folder.path(), "slips", "job_id").len())
+        (
+            ids,
+            texts(folder.path(), RecordedTable::Slips, "job_id").len(),
+        )
     };
     let runs = runs.into_inner().unwrap();
     if processes.contains(&Process::RunFewer) {

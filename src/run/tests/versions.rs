@@ -4,7 +4,7 @@ use super::{fine, options, run, run_all, sweep};
 use crate::reduce::{SetRow, read_reduced, reduce};
 use crate::results::destination::NewFolder;
 use crate::results::layout::Layout;
-use crate::results::tables::{JobRow, Names, PrecursorRow, SlipRow, gaps};
+use crate::results::tables::{JobRow, Names, PrecursorRow, RecordedTable, SlipRow, gaps};
 use crate::results::{ErrorKind, Results, of_other_versions};
 use crate::table::columns::Row;
 use crate::table::file::{Dataset, Footer, TableWriter};
@@ -22,7 +22,7 @@ const MISSING: &str = "grid_steps";
 fn make_older(root: &Path) {
     let layout = Layout::new(&Disk, root);
     let results = Results::read(&layout).unwrap();
-    let [slips, precursors, jobs] = ["slips", "precursors", "jobs"].map(|table| {
+    let [slips, precursors, jobs] = RecordedTable::ALL.map(|table| {
         let files = results.dataset(table).unwrap();
         files.files().cloned().collect::<Vec<_>>()
     });
@@ -123,7 +123,7 @@ fn a_directory_of_another_version_is_reduced_and_exported_unchanged_and_not_run(
     }
     // Ids of its jobs are those of its version.
     let ids: Vec<String> = own
-        .dataset("jobs")
+        .dataset(RecordedTable::Jobs)
         .unwrap()
         .rows::<Names>()
         .map(|names| names.unwrap().job_id)
