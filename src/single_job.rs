@@ -7,7 +7,7 @@ use crate::observe::{
     Recording, SlipObserver, Trace, TraceRow,
 };
 use crate::solver::{Observer, SimulationError};
-use crate::sweep::{Change, Job, Sweep};
+use crate::sweep::{Job, KeyChange, Sweep};
 use crate::table::tables;
 use std::sync::atomic::AtomicBool;
 
@@ -38,7 +38,7 @@ pub enum RequestError {
 }
 
 /// The text of a sweep with one point. Without a number of slips it records 20, or with a time all slips until then.
-pub fn sweep_text(changes: &[Change]) -> String {
+pub fn sweep_text(changes: &[KeyChange]) -> String {
     let is_given = |key: &str| changes.iter().any(|change| change.key == key);
     let slips = if is_given("slips") || is_given("time") {
         ""
@@ -50,7 +50,7 @@ pub fn sweep_text(changes: &[Change]) -> String {
     };
     let of = |section: &str| {
         let own = changes.iter().filter(|change| change.section == section);
-        own.flat_map(|Change { key, value, .. }| [key, " = ", value, "\n"])
+        own.flat_map(|KeyChange { key, value, .. }| [key, " = ", value, "\n"])
             .collect::<String>()
     };
     let [model, record, solver] = ["model", "record", "solver"].map(of);
@@ -74,7 +74,7 @@ pub fn only_job(sweep: &Sweep) -> Result<Job, RequestError> {
     clippy::struct_excessive_bools,
     reason = "one for each table that may be recorded"
 )]
-pub struct Request {
+pub struct RecordRequest {
     /// Time between samples of trace and map, in s.
     pub sample: f64,
     /// Shear force, displacement and attached fraction over time.
@@ -86,7 +86,7 @@ pub struct Request {
     pub contacts: bool,
 }
 
-impl Request {
+impl RecordRequest {
     /// Makes sure that what is recorded fits into memory.
     pub fn check(
         &self,
@@ -112,7 +112,7 @@ impl Request {
 
 /// Records beside slips; empty unless requested.
 #[derive(Clone, Debug, Default)]
-pub struct Records {
+pub struct JobRecords {
     pub trace: Vec<TraceRow>,
     /// Cells of the map, instant by instant.
     pub map: Vec<MapRow>,
@@ -124,9 +124,9 @@ pub struct Records {
 pub fn simulate(
     sweep: &Sweep,
     parameters: &Parameters,
-    request: Request,
+    request: RecordRequest,
     interrupt: &AtomicBool,
-) -> Result<(Measurements, Records), SimulationError> {
+) -> Result<(Measurements, JobRecords), SimulationError> {
     let recording = sweep.recording();
     let mut slips = SlipObserver::new(parameters, recording);
     let mut trace = Trace::new(parameters, request.sample);
@@ -145,7 +145,7 @@ pub fn simulate(
     let solver = sweep.solver();
     let observer = &mut Observers(observers);
     let summary = recording.simulate(parameters, solver, interrupt, observer)?;
-    let records = Records {
+    let records = JobRecords {
         trace: trace.rows,
         map: map.rows,
         profile: profile.rows,

@@ -8,7 +8,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
-use stickslip::figure::{Beside, Format, Look, draw_all};
+use stickslip::figure::{Beside, Look, PictureFormat, draw_all};
 use stickslip::observe::measure;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
@@ -81,7 +81,7 @@ pub fn reduce_and_draw(layout: &Layout<'_>, name: &str) -> Result<(), Error> {
         layout,
         &Beside::default(),
         &Look::of_sweep(name),
-        &Format::DEFAULT,
+        &PictureFormat::DEFAULT,
     )?;
     Ok(())
 }

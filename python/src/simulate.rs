@@ -13,8 +13,8 @@ use stickslip::observe::ContactRow;
 use stickslip::results::tables::{
     All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, gaps, label,
 };
-use stickslip::single_job::{self, Records, Request, only_job};
-use stickslip::sweep::{Change, Sweep};
+use stickslip::single_job::{self, JobRecords, RecordRequest, only_job};
+use stickslip::sweep::{KeyChange, Sweep};
 use stickslip::table::columns::{Row, Value};
 
 /// The text of a sweep with one job, from keys and their values as TOML.
@@ -24,7 +24,7 @@ pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
     let mut unknown = Vec::new();
     for (key, value) in keys {
         match section(&key) {
-            Some(section) => changes.push(Change {
+            Some(section) => changes.push(KeyChange {
                 section,
                 key,
                 value,
@@ -80,7 +80,7 @@ pub fn simulate<'py>(
 ) -> PyResult<Simulated<'py>> {
     let sweep = read_sweep(file.as_deref(), text, source)?;
     let parameters = only_job(&sweep).map_err(Error::from)?.parameters;
-    let request = Request {
+    let request = RecordRequest {
         sample,
         trace,
         map,
@@ -99,7 +99,7 @@ pub fn simulate<'py>(
                 label::<All>(&sweep, &parameters),
                 JobRecord::new(Ok(&measured)),
             );
-            let Records {
+            let JobRecords {
                 trace: samples,
                 map: cells,
                 profile: blocks,

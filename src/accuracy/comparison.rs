@@ -17,9 +17,9 @@ use std::collections::HashMap;
 const LATE: f64 = 0.1;
 
 /// One attachment of a contact: block, contact, generation.
-type Key = (usize, usize, u32);
+type Life = (usize, usize, u32);
 
-fn key(event: &ContactEvent) -> Key {
+fn key(event: &ContactEvent) -> Life {
     (event.block, event.contact, event.generation)
 }
 
@@ -29,7 +29,7 @@ pub struct Reference {
     wanted: usize,
     /// How long to wait for a break, in s.
     late: f64,
-    order: HashMap<Key, usize>,
+    order: HashMap<Life, usize>,
     times: Vec<f64>,
 }
 
@@ -59,7 +59,7 @@ impl Observer for Reference {
 
 /// An observer that compares breaks with those of a reference.
 #[derive(Clone, Debug)]
-pub struct Comparison<'a> {
+pub struct BreakComparison<'a> {
     reference: &'a Reference,
     /// Error of each break of the reference, in s; NaN until the break occurs.
     errors: Vec<f64>,
@@ -78,7 +78,7 @@ columns! {
     }
 }
 
-impl<'a> Comparison<'a> {
+impl<'a> BreakComparison<'a> {
     pub fn new(reference: &'a Reference) -> Self {
         Self {
             reference,
@@ -100,7 +100,7 @@ impl<'a> Comparison<'a> {
     }
 }
 
-impl Observer for Comparison<'_> {
+impl Observer for BreakComparison<'_> {
     fn advance(&mut self, segment: &Segment<'_>) {
         self.now = segment.end();
     }
@@ -231,7 +231,7 @@ mod tests {
             reference.contact(&break_at(0.1 * (contact + 1) as f64, contact));
         }
         assert!(reference.is_satisfied());
-        let mut comparison = Comparison::new(&reference);
+        let mut comparison = BreakComparison::new(&reference);
         for &(time, contact) in times {
             comparison.contact(&break_at(time, contact));
         }

@@ -6,7 +6,7 @@
 //! large enough to show a bias of some parts in a thousand. A fixed step at low velocity would take hours for its
 //! slips: it is timed over a short stretch, and its cost per slip follows from the steps of an interval.
 
-use super::comparison::{Bias, BreakErrors, Comparison, Reference, Sample};
+use super::comparison::{Bias, BreakComparison, BreakErrors, Reference, Sample};
 use super::{BiasRow, Cost, Findings, MethodRow, SolverColumns, set_in_words};
 use crate::model::{Parameters, Selected};
 use crate::observe::{Measurements, Recording, Slip, SlipObserver, measure};
@@ -155,10 +155,10 @@ const fn event_driven(resolve: Resolve, tolerance: f64) -> Solver {
 }
 
 /// A quantity of slips whose distributions are compared.
-type Quantity = (&'static str, fn(&Slip) -> Option<f64>);
+type SlipQuantity = (&'static str, fn(&Slip) -> Option<f64>);
 
 /// By their columns in the table of slips.
-const QUANTITIES: [Quantity; 6] = [
+const QUANTITIES: [SlipQuantity; 6] = [
     ("interval", |slip| slip.interval),
     ("phase", |slip| slip.phase),
     ("drop", |slip| Some(slip.drop)),
@@ -304,7 +304,7 @@ impl Study {
         if takes_too_long && solver.time_step.is_some() {
             return Ok(BreakErrors::default());
         }
-        let mut comparison = Comparison::new(reference);
+        let mut comparison = BreakComparison::new(reference);
         simulated(parameters, solver, &mut comparison)?;
         Ok(comparison.errors())
     }
@@ -400,7 +400,7 @@ fn bias_rows(
         let values = realisations.map(|slips| slips.iter().filter_map(value).collect());
         Sample::of(values.collect())
     };
-    let row = |(quantity, value): Quantity| {
+    let row = |(quantity, value): SlipQuantity| {
         let found = sample(slips, value)?;
         let reference = sample(reference, value)?;
         Some(BiasRow {

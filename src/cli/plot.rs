@@ -3,8 +3,8 @@
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
-    Beside, CustomFigure, Dots, Drawn, Format, Limits, Look, Size, Style, draw_all, draw_custom,
-    remarks, write_custom,
+    Beside, CustomFigure, Dots, Drawn, Limits, Look, PictureFormat, Size, Style, draw_all,
+    draw_custom, remarks, write_custom,
 };
 use crate::reduce::{SetRow, SlipOfSet, renew};
 use crate::results::Results;
@@ -31,9 +31,9 @@ pub struct Arguments {
         long,
         value_delimiter = ',',
         default_value = "svg,png",
-        value_parser = choice(&Format::ALL, Format::word, Format::description)
+        value_parser = choice(&PictureFormat::ALL, PictureFormat::word, PictureFormat::description)
     )]
-    format: Vec<Format>,
+    format: Vec<PictureFormat>,
     /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: what the data need; in print one or two columns wide]
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     size: Option<Size>,
@@ -138,9 +138,9 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
 }
 
 /// Where a picture goes, and the format that the name ends in.
-pub fn picture_file(file: &Path) -> Result<(Destination, Format)> {
+pub fn picture_file(file: &Path) -> Result<(Destination, PictureFormat)> {
     let extension = file.extension().and_then(|extension| extension.to_str());
-    match extension.and_then(Format::from_word) {
+    match extension.and_then(PictureFormat::from_word) {
         Some(format) => Ok((Destination::new(file, format.word())?, format)),
         None => Err(UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into()),
     }

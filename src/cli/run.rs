@@ -4,7 +4,7 @@ use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, PresetFlag, Variation};
 use super::{Exit, UsageError, batch, catch_signals, is_cancelled, output, reduce, show};
-use crate::figure::{Beside, Format, Look, draw_all};
+use crate::figure::{Beside, Look, PictureFormat, draw_all};
 use crate::observe::measure;
 use crate::reduce::NoJobs;
 use crate::results::Results;
@@ -284,7 +284,7 @@ pub fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
         summary => summary?,
     };
     let look = Look::of_sweep(results.sweep().name());
-    let figures = draw_all(layout, &Beside::default(), &look, &Format::DEFAULT)?.files;
+    let figures = draw_all(layout, &Beside::default(), &look, &PictureFormat::DEFAULT)?.files;
     Ok(Some(Reduced {
         lines: reduce::summary_lines(&summary, layout),
         result: show::summary(&results, summary.sets)?,

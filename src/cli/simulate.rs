@@ -13,9 +13,9 @@ use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
 use crate::results::destination::Destination;
 use crate::results::tables::{self, All, DriveAndSeed, JobOutcome, SlipRow};
 use crate::sets::Digits;
-use crate::single_job::{self, Records, Request};
+use crate::single_job::{self, JobRecords, RecordRequest};
 use crate::solver::{Method, SolverKey};
-use crate::sweep::{Change, Sweep};
+use crate::sweep::{KeyChange, Sweep};
 use crate::table::Table;
 use crate::table::arrow::{self, Gaps};
 use crate::table::file::{Footer, TableWriter};
@@ -105,8 +105,8 @@ struct PlotFlags {
     #[arg(long = "plot", value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Panels of the plot
-    #[arg(long, value_enum, default_value_t = Panel::Both, requires = "files")]
-    panel: Panel,
+    #[arg(long, value_enum, default_value_t = PlotPanel::Both, requires = "files")]
+    panel: PlotPanel,
     /// First instant of the plot, in s
     #[arg(
         long,
@@ -127,12 +127,12 @@ struct PlotFlags {
 }
 
 impl Arguments {
-    fn request(&self) -> Request {
+    fn request(&self) -> RecordRequest {
         let tables = &self.tables;
-        Request {
+        RecordRequest {
             sample: tables.sample,
-            trace: tables.trace.is_some() || self.plot.draws(Panel::Force),
-            map: tables.map.is_some() || self.plot.draws(Panel::Map),
+            trace: tables.trace.is_some() || self.plot.draws(PlotPanel::Force),
+            map: tables.map.is_some() || self.plot.draws(PlotPanel::Map),
             profile: tables.profile.is_some(),
             contacts: tables.contacts.is_some(),
         }
@@ -158,8 +158,8 @@ impl PlotFlags {
     }
 
     /// Whether there is a plot with this panel.
-    fn draws(&self, panel: Panel) -> bool {
-        !self.files.is_empty() && (self.panel == panel || self.panel == Panel::Both)
+    fn draws(&self, panel: PlotPanel) -> bool {
+        !self.files.is_empty() && (self.panel == panel || self.panel == PlotPanel::Both)
     }
 }
 
@@ -188,7 +188,7 @@ Keys of --set, in SI units; and eta or frequency (Hz) in place of T:
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Panel {
+enum PlotPanel {
     Force,
     Map,
     Both,
@@ -234,7 +234,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     tables.write(files.slip_table.as_deref(), slips)?;
     arguments.write_plots(parameters, &records, &measured)?;
 
-    let report = Report::new(&label.0.job_id, &measured, wall);
+    let report = JobReport::new(&label.0.job_id, &measured, wall);
     if arguments.json {
         output::json(JSON_FORMAT, &report)?;
     } else {
@@ -293,7 +293,7 @@ impl Arguments {
     fn write_plots(
         &self,
         parameters: &Parameters,
-        records: &Records,
+        records: &JobRecords,
         measured: &Measurements,
     ) -> Result<()> {
         let PlotFlags { files, from, .. } = &self.plot;
@@ -318,8 +318,8 @@ impl Arguments {
         let map = records.map.iter().filter(|row| shown.contains(&row.time));
         let map: Vec<_> = map.copied().collect();
         let onsets: Vec<f64> = measured.slips.iter().map(|slip| slip.onset).collect();
-        let trace = self.plot.draws(Panel::Force).then_some(&*trace);
-        let map = self.plot.draws(Panel::Map).then_some(&*map);
+        let trace = self.plot.draws(PlotPanel::Force).then_some(&*trace);
+        let map = self.plot.draws(PlotPanel::Map).then_some(&*map);
         let picture = simulation(parameters, trace, map, [&measured.start_up, &onsets]);
         let picture = picture.map_err(|error| refused(error.to_string()))?;
         for path in files {
@@ -332,7 +332,7 @@ impl Arguments {
 
 impl JobFlags {
     /// What the flags set, each as a key of a sweep file.
-    fn changes(&self) -> Result<Vec<Change>, UsageError> {
+    fn changes(&self) -> Result<Vec<KeyChange>, UsageError> {
         let method = self.solver.as_deref().and_then(Method::from_word);
         let takes_steps =
             method.is_some_and(|method| method.settings().contains(&SolverKey::TimeStep));
@@ -356,7 +356,7 @@ impl JobFlags {
 
 /// What is printed of a job.
 #[derive(Serialize)]
-struct Report<'a> {
+struct JobReport<'a> {
     job_id: &'a str,
     simulated_seconds: f64,
     slips: usize,
@@ -374,7 +374,7 @@ struct Report<'a> {
     wall_seconds: f64,
 }
 
-impl<'a> Report<'a> {
+impl<'a> JobReport<'a> {
     fn new(job_id: &'a str, measured: &Measurements, wall_seconds: f64) -> Self {
         let summary = &measured.summary;
         let averages = measured.averages;

@@ -5,7 +5,7 @@ use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::results::tables::RecordedTable;
 use crate::single_job;
-use crate::sweep::{Change, Sweep, SweepError, varied};
+use crate::sweep::{KeyChange, Sweep, SweepError, varied};
 use crate::table::shown::shown;
 use anyhow::Result;
 use arrow_schema::FieldRef;
@@ -89,8 +89,8 @@ const IN_THE_FILE: &str =
     "; flags change no zip or sample: edit the file (`stickslip init` writes that of a preset)";
 
 /// What `--set` and `--axis` change.
-pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, UsageError> {
-    let mut changes: Vec<Change> = Vec::new();
+pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<KeyChange>, UsageError> {
+    let mut changes: Vec<KeyChange> = Vec::new();
     let settings = settings.iter().map(|text| ("--set", text));
     for (flag, text) in settings.chain(axes.iter().map(|text| ("--axis", text))) {
         let refused = |problem: String| UsageError(format!("{flag} {text}: {problem}"));
@@ -107,8 +107,8 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
             return Err(refused(format!("must be {form}")));
         }
         changes.push(match flag {
-            "--set" => Change::setting(key, value.trim()),
-            _ => Change::axis(key, value.trim())
+            "--set" => KeyChange::setting(key, value.trim()),
+            _ => KeyChange::axis(key, value.trim())
                 .map_err(|form| refused(format!("must be {key}={form}")))?,
         });
     }
@@ -117,7 +117,7 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
 
 /// Reads a sweep file or the sweep of a results directory, or takes a preset, with the changes. Without either, it is a
 /// sweep of the single point that the changes give.
-pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[Change]) -> Result<Sweep> {
+pub fn read(file: Option<&Path>, flag: PresetFlag, changes: &[KeyChange]) -> Result<Sweep> {
     let sweep = match (file, flag.preset) {
         // A results directory: its current sweep.
         (Some(folder), _) if folder.is_dir() => Ok(Results::read(&layout(folder))?.sweep().clone()),
@@ -153,7 +153,7 @@ pub fn warn_of_partitions(root: &Path, sweep: &Sweep) {
     }
 }
 
-pub fn vary(sweep: Sweep, changes: &[Change]) -> Result<Sweep> {
+pub fn vary(sweep: Sweep, changes: &[KeyChange]) -> Result<Sweep> {
     if changes.is_empty() {
         Ok(sweep)
     } else {

@@ -34,7 +34,7 @@ const MIN_INTERVALS: usize = 8;
 const OFFSETS: [f64; 2] = [-0.12, 0.12];
 
 /// A slip under a ramp, in the units of the axes.
-struct Slip {
+struct RampedSlip {
     /// Its place in [`STAGES`].
     stage: usize,
     /// T or Δ at the onset.
@@ -62,14 +62,14 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let longest = bounds(ramped().filter_map(|point| point.interval))?.1;
     let (factor, unit) = label("tau_mean").scale(longest);
     let slip = |point: &Point| {
-        Some(Slip {
+        Some(RampedSlip {
             stage: stage(point)?,
             x: x_factor * modulation(point)?,
             tau: factor * point.interval?,
             ratio: point.interval? / point.period?,
         })
     };
-    let slips: Vec<Slip> = ramped().filter_map(slip).collect();
+    let slips: Vec<RampedSlip> = ramped().filter_map(slip).collect();
     let ends = bounds(slips.iter().map(|slip| slip.x))?;
     let taus = widened(bounds(slips.iter().map(|slip| slip.tau))?);
     let ratios = ratios(slips.iter());
@@ -109,7 +109,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     }));
     let lines = multiples().map(|n| Layer::Curve(line(n).into(), GRID));
     let lines = Layer::Inside(lines.chain(dots).collect());
-    let tau = Axis::linear(&format!("Slip interval τ ({unit})"), taus.0, taus.1);
+    let tau = Axis::linear(&format!("RampedSlip interval τ ({unit})"), taus.0, taus.1);
     let upper = Panel::new(320.0, x.clone(), tau, vec![lines, numbers]);
     let ratio = Axis::linear("Median and quartiles of τ / T", least - 0.3, most + 0.3);
     let levels = multiples().map(|n| Layer::Level(n, GRID));
@@ -119,7 +119,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
 }
 
 /// Medians and quartiles of τ/T in bins of the modulation, of both stages.
-fn medians_of<'a>(slips: &[Slip], (low, high): Ends) -> Vec<Layer<'a>> {
+fn medians_of<'a>(slips: &[RampedSlip], (low, high): Ends) -> Vec<Layer<'a>> {
     let width = (high - low) / f64::from(BINS);
     let mut layers = Vec::new();
     for (stage, (_, _, ink)) in STAGES.into_iter().enumerate() {
@@ -131,7 +131,8 @@ fn medians_of<'a>(slips: &[Slip], (low, high): Ends) -> Vec<Layer<'a>> {
             } else {
                 start + width
             };
-            let is_in_bin = |slip: &&Slip| slip.stage == stage && (start..end).contains(&slip.x);
+            let is_in_bin =
+                |slip: &&RampedSlip| slip.stage == stage && (start..end).contains(&slip.x);
             let ratios = ratios(slips.iter().filter(is_in_bin));
             let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share));
             if let [Some(first), Some(median), Some(third)] = quartiles
@@ -148,7 +149,7 @@ fn medians_of<'a>(slips: &[Slip], (low, high): Ends) -> Vec<Layer<'a>> {
 }
 
 /// τ/T of some slips, ascending.
-fn ratios<'a>(slips: impl Iterator<Item = &'a Slip>) -> Vec<f64> {
+fn ratios<'a>(slips: impl Iterator<Item = &'a RampedSlip>) -> Vec<f64> {
     let mut ratios: Vec<f64> = slips.map(|slip| slip.ratio).collect();
     ratios.sort_by(f64::total_cmp);
     ratios

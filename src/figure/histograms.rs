@@ -33,7 +33,7 @@ const OVERLAY: Stroke = Stroke::dashed(RED, 2.0, (6.0, 3.5));
 
 /// A panel: a set and, if there is one, the set of identical contacts that it otherwise equals.
 #[derive(Clone, Debug, PartialEq)]
-struct Panel<'a> {
+struct HistogramPanel<'a> {
     /// What the set is, in symbols.
     title: String,
     /// Bins in ascending order; empty ones are left out.
@@ -44,7 +44,7 @@ struct Panel<'a> {
     period: Option<f64>,
 }
 
-impl<'a> Panel<'a> {
+impl<'a> HistogramPanel<'a> {
     fn all_bars(&self) -> impl Iterator<Item = &'a HistogramBin> {
         self.bars
             .iter()
@@ -77,9 +77,9 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
     if panels.len() > MAX_PANELS {
         return None;
     }
-    let all = panels.iter().flat_map(Panel::all_bars);
+    let all = panels.iter().flat_map(HistogramPanel::all_bars);
     let (low, high) = widened(bounds(all.flat_map(|bar| [bar.low, bar.high]))?);
-    let panel = |(index, panel): (usize, &Panel<'_>)| {
+    let panel = |(index, panel): (usize, &HistogramPanel<'_>)| {
         let x = Axis::linear(&format!("Slip interval τ ({unit})"), low.max(0.0), high);
         let period = factor * panel.period.unwrap_or(0.0);
         let multiples = panel.period.map(|_| x.multiples_of(period, MAX_MULTIPLES));
@@ -115,7 +115,7 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
 
 /// A panel per set by rising frequency, as in Fig. 2. One of identical contacts goes onto the panel of the set that it
 /// otherwise equals.
-fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
+fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<HistogramPanel<'a>> {
     let bars = |set: &SetRow| bins.iter().filter(|bin| bin.set_id == set.set_id).collect();
     let is_identical = |set: &&SetRow| set.parameters.threshold_deviation == 0.0;
     let (identical, others): (Vec<&SetRow>, Vec<&SetRow>) = sets.iter().partition(is_identical);
@@ -152,7 +152,7 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
         let twin = identical
             .iter()
             .find(|twin| !is_identical(&set) && is_twin(twin, set));
-        Panel {
+        HistogramPanel {
             title: title(set),
             bars: bars(set),
             overlay: twin.map(|twin| bars(twin)),
@@ -167,7 +167,7 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
         .collect()
 }
 
-fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
+fn legend(panels: &[HistogramPanel<'_>]) -> Vec<Entry> {
     let has_overlay = panels.iter().any(|panel| panel.overlay.is_some());
     let overlay = has_overlay.then(|| entry(Mark::Line(OVERLAY), "identical contacts, Δfₛ = 0"));
     let multiples = panels.iter().any(|panel| panel.period.is_some());

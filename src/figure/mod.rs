@@ -35,7 +35,7 @@ mod work_precision;
 
 pub use beside::Beside;
 pub use custom::{CustomFigure, Dots};
-pub use picture::{Format, Picture};
+pub use picture::{Picture, PictureFormat};
 pub use quantity::Limits;
 pub use simulation::simulation;
 pub use style::{INKS, Ink, Look, SCALE, Size, Style};
@@ -140,7 +140,7 @@ pub fn draw_all(
     layout: &Layout<'_>,
     beside: &Beside,
     look: &Look,
-    formats: &[Format],
+    formats: &[PictureFormat],
 ) -> Result<Drawn> {
     let _alone = exclusive_lock(layout, WRITER)?;
     let points = read(layout)?;
@@ -298,7 +298,7 @@ pub fn write_custom(
     layout: &Layout<'_>,
     picture: Picture,
     look: &Look,
-    formats: &[Format],
+    formats: &[PictureFormat],
 ) -> Result<Vec<PathBuf>> {
     let _alone = exclusive_lock(layout, WRITER)?;
     write(layout, &[picture], look, formats)
@@ -345,7 +345,7 @@ fn write(
     layout: &Layout<'_>,
     pictures: &[Picture],
     look: &Look,
-    formats: &[Format],
+    formats: &[PictureFormat],
 ) -> Result<Vec<PathBuf>> {
     pictures
         .iter()
@@ -426,7 +426,11 @@ mod tests {
         (root, layout)
     }
 
-    fn files_of(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
+    fn files_of(
+        layout: &Layout<'_>,
+        look: &Look,
+        formats: &[PictureFormat],
+    ) -> Result<Vec<PathBuf>> {
         Ok(draw_all(layout, &Beside::default(), look, formats)?.files)
     }
 
@@ -449,7 +453,7 @@ mod tests {
     #[test]
     fn figures_are_byte_identical_when_drawn_again() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
-        let files = files_of(&layout, &Look::default(), &Format::DEFAULT).unwrap();
+        let files = files_of(&layout, &Look::default(), &PictureFormat::DEFAULT).unwrap();
         let names: Vec<_> = files
             .iter()
             .map(|file| file.file_name().unwrap().to_string_lossy().into_owned())
@@ -471,7 +475,7 @@ mod tests {
         };
         let before = bytes();
         assert_eq!(
-            files_of(&layout, &Look::default(), &Format::DEFAULT).unwrap(),
+            files_of(&layout, &Look::default(), &PictureFormat::DEFAULT).unwrap(),
             files
         );
         assert!(bytes() == before);
@@ -489,14 +493,14 @@ mod tests {
             ..Look::default()
         };
         let drawn = || {
-            let files = files_of(&layout, &look, &[Format::Pdf]).unwrap();
+            let files = files_of(&layout, &look, &[PictureFormat::Pdf]).unwrap();
             fs::read(&files[0]).unwrap()
         };
         let pdf = drawn();
         assert!(pdf.starts_with(b"%PDF-") && pdf.trim_ascii_end().ends_with(b"%%EOF"));
         assert!(drawn() == pdf);
-        let svg =
-            fs::read_to_string(&files_of(&layout, &look, &[Format::Svg]).unwrap()[0]).unwrap();
+        let svg = fs::read_to_string(&files_of(&layout, &look, &[PictureFormat::Svg]).unwrap()[0])
+            .unwrap();
         assert!(svg.contains(r#"width="86.00mm""#), "{}", &svg[..200]);
     }
 
@@ -510,7 +514,7 @@ mod tests {
                     size: Some(Size { width, height }),
                     ..Look::default()
                 },
-                &[Format::Svg],
+                &[PictureFormat::Svg],
             )
         };
         let error = drawn(5.0, 5.0).unwrap_err().to_string();
@@ -535,7 +539,7 @@ mod tests {
             fs::write(layout.figures().join(name), "earlier").unwrap();
         }
         assert!(
-            files_of(&layout, &Look::default(), &Format::DEFAULT)
+            files_of(&layout, &Look::default(), &PictureFormat::DEFAULT)
                 .unwrap()
                 .is_empty()
         );

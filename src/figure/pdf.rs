@@ -26,7 +26,7 @@ const COMPRESSION: u8 = 8;
 
 /// The scene, with this many points per unit.
 pub(super) fn pdf(scene: &Scene, points: f64) -> Vec<u8> {
-    let mut page = Page {
+    let mut page = PdfPage {
         content: Content::new(),
         glyphs: GlyphRemapper::new(),
         letters: BTreeMap::new(),
@@ -60,7 +60,7 @@ fn parts(color: &Color) -> [f32; 3] {
     }
 }
 
-struct Page {
+struct PdfPage {
     content: Content,
     /// Numbers of the letters in the embedded font.
     glyphs: GlyphRemapper,
@@ -70,7 +70,7 @@ struct Page {
     opacities: Vec<f64>,
 }
 
-impl Page {
+impl PdfPage {
     fn draw(&mut self, element: &Primitive) {
         match element {
             Primitive::PolyLine {

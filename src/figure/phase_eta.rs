@@ -37,7 +37,7 @@ const WIDEST: f64 = 1.2;
 const ROWS: f64 = 36.0;
 
 /// Slips at neighbouring η.
-struct Column {
+struct DensityColumn {
     /// Least and largest η of its slips.
     values: Ends,
     /// Halfway to the neighbours' slips.
@@ -125,9 +125,10 @@ fn phases(points: &[Point]) -> Vec<Place> {
 }
 
 /// The middle of the η of each column's slips, their mean phase in rad, and its interval, unless that is the whole turn.
-fn averages(bins: &[BackboneBin], columns: &[Column]) -> Vec<MeanPlace> {
+fn averages(bins: &[BackboneBin], columns: &[DensityColumn]) -> Vec<MeanPlace> {
     let average = |bin: &BackboneBin| {
-        let is_of_bin = |column: &&Column| (bin.eta_low..bin.eta_high).contains(&column.values.0);
+        let is_of_bin =
+            |column: &&DensityColumn| (bin.eta_low..bin.eta_high).contains(&column.values.0);
         let (low, high) = columns.iter().find(is_of_bin)?.values;
         let ends = bin.phase_mean_low.zip(bin.phase_mean_high);
         let known = ends.filter(|(low, high)| high - low < 0.999 * TAU);
@@ -137,7 +138,7 @@ fn averages(bins: &[BackboneBin], columns: &[Column]) -> Vec<MeanPlace> {
 }
 
 /// Cells of a column, from φ_min at its least η on, and their densities in 1/rad.
-fn cells(column: &Column) -> Vec<(Cell, f64)> {
+fn cells(column: &DensityColumn) -> Vec<(Cell, f64)> {
     let height = PI / ROWS;
     let base = column.least.unwrap_or(0.0);
     let mut counts: BTreeMap<i64, u32> = BTreeMap::new();
@@ -158,7 +159,7 @@ fn cells(column: &Column) -> Vec<(Cell, f64)> {
 }
 
 /// Slips in columns along η.
-fn columns(slips: &[Place], per_decade: f64) -> Vec<Column> {
+fn columns(slips: &[Place], per_decade: f64) -> Vec<DensityColumn> {
     let mut bins: BTreeMap<i32, Vec<Place>> = BTreeMap::new();
     for &slip in slips {
         #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
@@ -178,7 +179,7 @@ fn columns(slips: &[Place], per_decade: f64) -> Vec<Column> {
         let side: fn(f64, f64) -> f64 = if low < 1.0 { f64::min } else { f64::max };
         let is_above =
             |&(eta, phase): &Place| minimum_phase(eta).is_some_and(|least| phase >= least);
-        Column {
+        DensityColumn {
             values: (low, high),
             edges: (side(low / nearest, 1.0), side(high * nearest, 1.0)),
             least: minimum_phase(low).filter(|_| slips.iter().all(is_above)),

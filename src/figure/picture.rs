@@ -39,14 +39,14 @@ pub struct Picture {
 
 words! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Format {
+    pub enum PictureFormat {
         Svg = "svg",
         Png = "png",
         Pdf = "pdf",
     }
 }
 
-impl Format {
+impl PictureFormat {
     /// Those that figures get if none is asked for.
     pub const DEFAULT: [Self; 2] = [Self::Svg, Self::Png];
 
@@ -97,11 +97,11 @@ impl Picture {
         Size { width, height }
     }
 
-    pub fn encoded(&self, format: Format) -> Result<Vec<u8>> {
+    pub fn encoded(&self, format: PictureFormat) -> Result<Vec<u8>> {
         match format {
-            Format::Svg => Ok(self.svg().into_bytes()),
-            Format::Png => self.png(),
-            Format::Pdf => Ok(pdf(&self.scene, self.style.points())),
+            PictureFormat::Svg => Ok(self.svg().into_bytes()),
+            PictureFormat::Png => self.png(),
+            PictureFormat::Pdf => Ok(pdf(&self.scene, self.style.points())),
         }
     }
 

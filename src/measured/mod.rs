@@ -55,7 +55,7 @@ pub struct Request {
 #[derive(Debug)]
 pub struct Experiment {
     pub sweep: Sweep,
-    slips: Arc<Slips>,
+    slips: Arc<SlipColumns>,
     series: Vec<Series>,
     /// What was read, each with its heading.
     pub read: Vec<(String, String)>,
@@ -63,7 +63,7 @@ pub struct Experiment {
 
 /// Numbers of slips, each list empty if no table has them, NaN where one is missing.
 #[derive(Debug, Default)]
-struct Slips {
+struct SlipColumns {
     onsets: Vec<f64>,
     drops: Vec<f64>,
     peak_forces: Vec<f64>,
@@ -71,7 +71,7 @@ struct Slips {
     maxima: Vec<f64>,
 }
 
-impl Slips {
+impl SlipColumns {
     fn of_keys(&mut self) -> [(Key, &mut Vec<f64>); 4] {
         [
             (Key::Onset, &mut self.onsets),
@@ -154,7 +154,7 @@ impl Experiment {
 /// The slips of a series under its modulation.
 #[derive(Debug)]
 struct SlipsOfSeries {
-    slips: Arc<Slips>,
+    slips: Arc<SlipColumns>,
     rows: Range<usize>,
     modulation: Modulation,
     eta: f64,
@@ -191,7 +191,7 @@ impl MakesSlips for SlipsOfSeries {
 /// What has been read of some tables.
 #[derive(Debug, Default)]
 struct Reading {
-    slips: Slips,
+    slips: SlipColumns,
     series: Vec<Series>,
     /// The column of each key, and the range of its numbers.
     columns: Vec<(Given, [f64; 2])>,
@@ -252,7 +252,7 @@ impl Reading {
     /// The checksum of the slips of all series, on which ids depend.
     fn checksum(&self) -> String {
         let mut hasher = Sha256::new();
-        let Slips {
+        let SlipColumns {
             onsets,
             drops,
             peak_forces,
@@ -262,7 +262,8 @@ impl Reading {
             hasher.update(series.rows.len().to_le_bytes());
             hasher.update(series.end.unwrap_or(f64::NAN).to_bits().to_le_bytes());
             for column in [onsets, drops, peak_forces, maxima] {
-                Slips::bits(column, series).for_each(|bits| hasher.update(bits.to_le_bytes()));
+                SlipColumns::bits(column, series)
+                    .for_each(|bits| hasher.update(bits.to_le_bytes()));
             }
         }
         hexadecimal(&hasher.finalize())
@@ -283,9 +284,9 @@ impl Reading {
             if is_short || !has_drops || series.is_regular(&self.slips.onsets) {
                 continue;
             }
-            let onsets = Slips::bits(&self.slips.onsets, series);
+            let onsets = SlipColumns::bits(&self.slips.onsets, series);
             let numbers: Vec<u64> = onsets
-                .chain(Slips::bits(&self.slips.drops, series))
+                .chain(SlipColumns::bits(&self.slips.drops, series))
                 .collect();
             if let Some(twin) = seen.insert(numbers, &series.place) {
                 let place = &series.place;

@@ -18,7 +18,7 @@ use std::fmt::Display;
 #[derive(Debug)]
 pub struct Rows {
     /// Those that give a key, then the values for all rows.
-    pub columns: Vec<Column>,
+    pub columns: Vec<KeyColumn>,
     /// Names of the other columns.
     pub unused: Vec<String>,
     /// The run of each row, by its place among the names; empty without runs.
@@ -31,7 +31,7 @@ pub struct Rows {
 
 /// A key of all rows.
 #[derive(Debug)]
-pub struct Column {
+pub struct KeyColumn {
     pub given: Given,
     /// Its place in the table; `None` of one value for all rows.
     pub place: Option<usize>,
@@ -45,12 +45,12 @@ impl Rows {
         let chosen = sources.choose(names)?.into_iter();
         let chosen = chosen.map(|(given, place)| (given, Some(place)));
         let settings = sources.settings.iter().map(|set| (set.clone(), None));
-        let columns = chosen.chain(settings).map(|(given, place)| Column {
+        let columns = chosen.chain(settings).map(|(given, place)| KeyColumn {
             given,
             place,
             numbers: Vec::new(),
         });
-        let columns: Vec<Column> = columns.collect();
+        let columns: Vec<KeyColumn> = columns.collect();
         let is_unused = |place: &usize| columns.iter().all(|column| column.place != Some(*place));
         let unused = (0..names.len()).filter(is_unused);
         Ok(Self {
@@ -118,7 +118,7 @@ impl Rows {
         number: impl Fn(&str) -> Result<f64>,
     ) -> Result<()> {
         let mut run = None;
-        for Column {
+        for KeyColumn {
             given,
             place,
             numbers,
@@ -150,7 +150,7 @@ impl Rows {
         for (array, place) in batch.columns().iter().zip(self.places()) {
             let mut columns = self.columns.iter_mut();
             let column = columns.find(|column| column.place == Some(place));
-            let Column { given, numbers, .. } = column.context("a batch has another column")?;
+            let KeyColumn { given, numbers, .. } = column.context("a batch has another column")?;
             let name = &given.from;
             let in_column = || format!("column {name} ({})", array.data_type());
             if given.key == Key::Run {
@@ -180,7 +180,7 @@ impl Rows {
     /// All rows are there: values for all of them become columns.
     pub fn finish(&mut self) -> Result<()> {
         ensure!(self.count > 0, "has no slips below its names of columns");
-        for Column {
+        for KeyColumn {
             given,
             place,
             numbers,

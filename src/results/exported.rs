@@ -235,7 +235,7 @@ impl<'a> JoinedTable<'a> {
     }
 
     /// The columns of the jobs of a part; `None` if no row needs them.
-    fn read_jobs(&self, part: PartName) -> Result<Option<Jobs>, ResultsError> {
+    fn read_jobs(&self, part: PartName) -> Result<Option<JobRows>, ResultsError> {
         if self.of_jobs.is_empty() {
             return Ok(None);
         }
@@ -260,13 +260,13 @@ impl<'a> JoinedTable<'a> {
             .first()
             .map_or_else(schema::<JobRow>, RecordBatch::schema);
         let jobs = concat_batches(&columns, &batches)
-            .and_then(|columns| Jobs::new(columns, controls.into()));
+            .and_then(|columns| JobRows::new(columns, controls.into()));
         let path =
             (self.results).file_in(&self.results.layout().tables(), RecordedTable::Jobs, part);
         jobs.map(Some).map_err(ResultsError::damage_at(&path.path))
     }
 
-    fn join(&self, rows: &RecordBatch, jobs: Option<&Jobs>) -> Result<RecordBatch, ArrowError> {
+    fn join(&self, rows: &RecordBatch, jobs: Option<&JobRows>) -> Result<RecordBatch, ArrowError> {
         let places = jobs.map(|jobs| jobs.places(rows)).transpose()?;
         let jobs = jobs.zip(places.as_ref());
         with_columns(rows, &self.schema, |name| {
@@ -306,14 +306,14 @@ pub fn with_columns(
     RecordBatch::try_new(SchemaRef::clone(schema), columns.collect::<Result<_, _>>()?)
 }
 
-struct Jobs {
+struct JobRows {
     columns: RecordBatch,
     /// Whether each is a control; empty if no sweep has controls.
     controls: BooleanArray,
     by_id: HashMap<String, u32>,
 }
 
-impl Jobs {
+impl JobRows {
     fn new(columns: RecordBatch, controls: BooleanArray) -> Result<Self, ArrowError> {
         let ids = ids(&columns)?.iter().zip(0..);
         let by_id = ids.filter_map(|(id, place)| Some((id?.to_owned(), place)));

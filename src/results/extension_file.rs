@@ -55,7 +55,7 @@ pub(super) struct Record {
 
 /// The format alone, read first: a newer file may have keys that are not known here.
 #[derive(Deserialize)]
-struct Format {
+struct FormatNumber {
     format: u32,
 }
 
@@ -156,7 +156,7 @@ impl Record {
         // First: in a damaged text, the format may be what is damaged.
         let text = checksum::checked(&text).map_err(|problem| damaged(problem.to_owned()))?;
         let unreadable = |error: serde_json::Error| damaged(error.to_string());
-        let Format { format } = serde_json::from_str(&text).map_err(unreadable)?;
+        let FormatNumber { format } = serde_json::from_str(&text).map_err(unreadable)?;
         if format != FORMAT {
             let problem = format!(
                 "has format {format}, this program knows {FORMAT}; use the program that wrote it, or choose another \

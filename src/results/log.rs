@@ -116,7 +116,7 @@ pub struct RunReport {
 const MAX_LINE: u64 = 1 << 24;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Line {
+struct LogLine {
     /// Seconds since 1970 UTC.
     time: f64,
     #[serde(flatten)]
@@ -144,7 +144,7 @@ impl Log {
         let time = now();
         let event = event.clone();
         // Texts and numbers always have a form as JSON.
-        let line = serde_json::to_string(&Line { time, event }).unwrap_or_default();
+        let line = serde_json::to_string(&LogLine { time, event }).unwrap_or_default();
         self.0.write(format!("{line}\n").as_bytes())
     }
 }
@@ -176,7 +176,7 @@ impl Results<'_> {
                 let mut line = Vec::new();
                 let read = log.by_ref().take(MAX_LINE).read_until(b'\n', &mut line);
                 let length = read.map_err(StorageError::at("read", &path))? as u64;
-                if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
+                if let Ok(LogLine { event, .. }) = serde_json::from_slice(&line) {
                     visit(event);
                 }
                 // The end of the file, or a file that is no log.

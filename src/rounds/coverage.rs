@@ -262,14 +262,14 @@ impl Repetition {
 
 /// What the repetitions of a cell came to.
 #[derive(Clone, Copy, Debug)]
-struct Cell {
+struct CoverageCell {
     /// Share of intervals that hold the true value, in %.
     coverage: f64,
     /// Mean half-width over 1.96 times the root of the mean square error.
     width: f64,
 }
 
-impl Cell {
+impl CoverageCell {
     /// `None` if fewer than half of the repetitions have an interval.
     fn of(all: &[Option<Repetition>]) -> Option<Self> {
         let found: Vec<Repetition> = all.iter().copied().flatten().collect();
@@ -294,7 +294,7 @@ fn cells(
     set: usize,
     truth: &SetRow,
     statistics: &[Statistic],
-) -> Vec<Vec<Option<Cell>>> {
+) -> Vec<Vec<Option<CoverageCell>>> {
     let jobs = &pool.sets[set].1;
     let mut found = vec![Vec::new(); statistics.len()];
     for (count, slips) in SIZES {
@@ -314,7 +314,7 @@ fn cells(
             .collect();
         for (index, of_statistic) in found.iter_mut().enumerate() {
             let all: Vec<_> = repetitions.iter().map(|one| one[index]).collect();
-            of_statistic.push(Cell::of(&all));
+            of_statistic.push(CoverageCell::of(&all));
         }
     }
     if SHARED as u64 * MAX_JOBS <= jobs.len() as u64 {
@@ -326,7 +326,7 @@ fn cells(
 }
 
 /// The cell of sets that end once a statistic is as precise as [`BY_RULE`] jobs make it on average.
-fn by_rule(pool: &Pool, set: usize, truth: &SetRow, statistic: Statistic) -> Option<Cell> {
+fn by_rule(pool: &Pool, set: usize, truth: &SetRow, statistic: Statistic) -> Option<CoverageCell> {
     let jobs = &pool.sets[set].1;
     let of_all = Repetition::of(&pool.row(set, jobs, SLIPS_BY_RULE), truth, statistic)?;
     let half = 0.5 * (of_all.high - of_all.low) * (jobs.len() as f64 / BY_RULE).sqrt();
@@ -350,7 +350,7 @@ fn by_rule(pool: &Pool, set: usize, truth: &SetRow, statistic: Statistic) -> Opt
         .into_par_iter()
         .map(of_repetition)
         .collect();
-    Cell::of(&all)
+    CoverageCell::of(&all)
 }
 
 /// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to
@@ -378,15 +378,15 @@ fn of_backbone(pool: &Pool) -> [f64; 2] {
 }
 
 /// A cell with where it stands.
-struct Measured {
+struct CellOfSet {
     set: usize,
     statistic: &'static str,
     truth: f64,
     column: usize,
-    cell: Cell,
+    cell: CoverageCell,
 }
 
-impl Measured {
+impl CellOfSet {
     /// Whether it has as many jobs as are promised to do.
     fn is_of_many(&self) -> bool {
         SIZES.get(self.column).is_none_or(|&(jobs, _)| jobs >= MANY)
@@ -402,16 +402,16 @@ impl Measured {
 }
 
 /// Coverage and half-widths of some cells: least, middle and greatest.
-struct Summary {
+struct CellSummary {
     count: usize,
     coverage: [f64; 3],
     width: [f64; 3],
 }
 
-impl Summary {
-    fn of<'a>(cells: impl Iterator<Item = &'a Measured>) -> Self {
-        let cells: Vec<Cell> = cells.map(|measured| measured.cell).collect();
-        let quantiles = |of: fn(&Cell) -> f64| {
+impl CellSummary {
+    fn of<'a>(cells: impl Iterator<Item = &'a CellOfSet>) -> Self {
+        let cells: Vec<CoverageCell> = cells.map(|measured| measured.cell).collect();
+        let quantiles = |of: fn(&CoverageCell) -> f64| {
             let mut values: Vec<f64> = cells.iter().map(of).collect();
             values.sort_by(f64::total_cmp);
             [0.0, 0.5, 1.0].map(|share| quantile(&values, share).unwrap_or(f64::NAN))
@@ -425,7 +425,7 @@ impl Summary {
 }
 
 /// A line for each statistic: the coverage and half-width of its cells with many jobs, and with few.
-fn by_statistic(cells: &[Measured], statistics: &[Statistic]) -> String {
+fn by_statistic(cells: &[CellOfSet], statistics: &[Statistic]) -> String {
     let mut lines = vec![
         "| statistic | cells | least | median | half-width | widest | few jobs: least | median | half-width |"
             .to_owned(),
@@ -433,8 +433,8 @@ fn by_statistic(cells: &[Measured], statistics: &[Statistic]) -> String {
     ];
     for statistic in statistics {
         let own = || cells.iter().filter(|cell| cell.statistic == statistic.key);
-        let many = Summary::of(own().filter(|cell| cell.is_of_many()));
-        let few = Summary::of(own().filter(|cell| !cell.is_of_many()));
+        let many = CellSummary::of(own().filter(|cell| cell.is_of_many()));
+        let few = CellSummary::of(own().filter(|cell| !cell.is_of_many()));
         let [least, median, _] = many.coverage;
         let [_, width, widest] = many.width;
         let [few_least, few_median, _] = few.coverage;
@@ -448,7 +448,7 @@ fn by_statistic(cells: &[Measured], statistics: &[Statistic]) -> String {
 }
 
 /// A line for each set: what it is, how much it is locked, and the coverage of its cells with many jobs.
-fn by_set(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
+fn by_set(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> String {
     let mut lines = vec![
         "| N | N_s | V0 (m/s) | Δ (µm) | f (Hz) | η | n | R | locking index | least | median |"
             .to_owned(),
@@ -460,7 +460,7 @@ fn by_set(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
                 .map_or("–".into(), |number| format!("{number:.2}"))
         };
         let own = cells.iter().filter(|cell| cell.set == set);
-        let many = Summary::of(own.filter(|cell| cell.is_of_many()));
+        let many = CellSummary::of(own.filter(|cell| cell.is_of_many()));
         lines.push(format!(
             "| {} | {} | {:e} | {:.2} | {:.1} | {:.2} | {} | {} | {} | {:.1} | {:.1} |",
             parameters.blocks,
@@ -481,18 +481,18 @@ fn by_set(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
 
 /// The cells that are furthest from what is promised: those with the least coverage, then those with the widest
 /// intervals.
-fn worst(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
-    let jobs = |cell: &&Measured| SIZES.get(cell.column).map_or(MANY, |&(jobs, _)| jobs);
-    let least = |cell: &&Measured| match jobs(cell) {
+fn worst(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> String {
+    let jobs = |cell: &&CellOfSet| SIZES.get(cell.column).map_or(MANY, |&(jobs, _)| jobs);
+    let least = |cell: &&CellOfSet| match jobs(cell) {
         ..FEW => 0.0,
         FEW..MANY => MIN_COVERAGE_OF_FEW,
         MANY.. => MIN_COVERAGE,
     };
-    let is_wide = |cell: &&Measured| cell.is_of_many() && cell.cell.width > MAX_WIDTH;
+    let is_wide = |cell: &&CellOfSet| cell.is_of_many() && cell.cell.width > MAX_WIDTH;
     let low = cells.iter().filter(|cell| cell.cell.coverage < least(cell));
-    let mut low: Vec<&Measured> = low.collect();
+    let mut low: Vec<&CellOfSet> = low.collect();
     low.sort_by(|a, b| a.cell.coverage.total_cmp(&b.cell.coverage));
-    let mut wide: Vec<&Measured> = cells.iter().filter(is_wide).collect();
+    let mut wide: Vec<&CellOfSet> = cells.iter().filter(is_wide).collect();
     wide.sort_by(|a, b| b.cell.width.total_cmp(&a.cell.width));
     let mut lines = vec![
         "| N | V0 (m/s) | Δ (µm) | f (Hz) | τ_r (ms) | statistic | jobs × slips | coverage | half-width |"
@@ -520,7 +520,7 @@ fn worst(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
 }
 
 /// Every cell, for `docs/coverage.csv`.
-fn csv(cells: &[Measured], sets: &[(Parameters, SetRow)]) -> String {
+fn csv(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> String {
     let mut lines = vec![
         "N,Ns,V0,Delta,frequency,statistic,true_value,jobs,slips,coverage,half_width".to_owned(),
     ];
@@ -570,7 +570,7 @@ fn coverage_is_measured() {
                     continue;
                 };
                 for (column, cell) in cells.into_iter().enumerate() {
-                    all.extend(cell.map(|cell| Measured {
+                    all.extend(cell.map(|cell| CellOfSet {
                         set: sets.len(),
                         statistic: statistic.key,
                         truth,
@@ -583,11 +583,11 @@ fn coverage_is_measured() {
             sets.push((parameters.clone(), row));
         }
     }
-    let many = Summary::of(all.iter().filter(|cell| cell.is_of_many()));
-    let few = Summary::of(all.iter().filter(|cell| !cell.is_of_many()));
-    let is_low = |cell: &&Measured| cell.is_of_many() && cell.cell.coverage < MIN_COVERAGE;
+    let many = CellSummary::of(all.iter().filter(|cell| cell.is_of_many()));
+    let few = CellSummary::of(all.iter().filter(|cell| !cell.is_of_many()));
+    let is_low = |cell: &&CellOfSet| cell.is_of_many() && cell.cell.coverage < MIN_COVERAGE;
     let low = all.iter().filter(is_low).count();
-    let is_narrow = |cell: &&Measured| cell.is_of_many() && cell.cell.width <= 3.0;
+    let is_narrow = |cell: &&CellOfSet| cell.is_of_many() && cell.cell.width <= 3.0;
     let narrow = 100.0 * all.iter().filter(is_narrow).count() as f64 / many.count as f64;
     let [slips, means] = of_backbone(&read_pool(folder, "dense"));
     let text = format!(

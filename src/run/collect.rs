@@ -39,7 +39,7 @@ enum Task {
 }
 
 /// What they have done.
-enum Ended {
+enum Finished {
     Job {
         job: PartJob,
         /// `None` if it was interrupted.
@@ -184,7 +184,7 @@ impl Collector<'_, '_> {
                             let begin = Instant::now();
                             let encode = || encode(results, &whole, &kept);
                             let files = catch_unwind(AssertUnwindSafe(encode));
-                            Ended::Part {
+                            Finished::Part {
                                 whole,
                                 begin,
                                 files,
@@ -243,7 +243,7 @@ impl Collector<'_, '_> {
         mut work: Work<'_>,
         threads: usize,
         hand_out: impl Fn(Task),
-        ended: &Receiver<Ended>,
+        ended: &Receiver<Finished>,
         under_way: &AllUnderWay,
         interrupt: &AtomicBool,
     ) -> Result<bool, ResultsError> {
@@ -280,13 +280,13 @@ impl Collector<'_, '_> {
             }
             match next(ended) {
                 None => (),
-                Some(Ended::Job { job, outcome, time }) => {
+                Some(Finished::Job { job, outcome, time }) => {
                     out.remove(&job);
                     if let Some(outcome) = outcome {
                         self.take(&job, outcome, time, &mut out, &hand_out)?;
                     }
                 }
-                Some(Ended::Part {
+                Some(Finished::Part {
                     whole,
                     begin,
                     files,
@@ -453,7 +453,7 @@ fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(PartName, usize),
 }
 
 /// What ended next, if anything does soon.
-fn next(ended: &Receiver<Ended>) -> Option<Ended> {
+fn next(ended: &Receiver<Finished>) -> Option<Finished> {
     ended.try_recv().ok().or_else(|| {
         // A sender is kept, so an error means that there is nothing yet.
         let next = ended.recv_timeout(STOP_POLL).ok();
@@ -474,9 +474,9 @@ fn run_job(
     kernel: &Kernel<'_>,
     interrupt: &AtomicBool,
     under_way: &AllUnderWay,
-) -> Ended {
+) -> Finished {
     if interrupt.load(Ordering::Relaxed) {
-        return Ended::Job {
+        return Finished::Job {
             job,
             outcome: None,
             time: JobTime::default(),
@@ -496,7 +496,7 @@ fn run_job(
     locked(under_way).remove(&key);
     let wall = begin.elapsed().as_secs_f64();
     let time = JobTime { cpu, wall };
-    Ended::Job { job, outcome, time }
+    Finished::Job { job, outcome, time }
 }
 
 /// `None` for a job that was interrupted.

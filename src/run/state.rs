@@ -55,7 +55,7 @@ pub struct Failure {
 }
 
 columns! {
-    struct Ended {
+    struct EndedJob {
         outcome: JobOutcome;
         slips: Option<u64>;
     }
@@ -75,7 +75,7 @@ impl Cut {
         if !results.extensions().iter().any(has_time) {
             return Ok(cut);
         }
-        for job in results.dataset(RecordedTable::Jobs)?.rows::<Ended>() {
+        for job in results.dataset(RecordedTable::Jobs)?.rows::<EndedJob>() {
             let job = job?;
             if job.outcome == JobOutcome::TimeLimit {
                 cut.jobs += 1;

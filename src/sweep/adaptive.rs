@@ -6,7 +6,7 @@
 
 use super::axes::Axis;
 use super::grid::{Sweep, find_rows};
-use super::quantity::{Point, Quantity};
+use super::quantity::{GridPoint, Quantity};
 use super::rounds::{Bounds, Goal, Refinement, Round, Rounds, Standing};
 use crate::model::Parameters;
 use std::collections::BTreeSet;
@@ -53,7 +53,7 @@ impl Sweep {
 
     /// Key and value of the first quantity of an axis at a row; NaN for a word.
     pub fn value_at(&self, axis: usize, row: u64) -> (&'static str, f64) {
-        let mut point = Point::default();
+        let mut point = GridPoint::default();
         self.axes[axis].apply(row, &mut point);
         let quantity = self.axes[axis].quantities()[0];
         let period = point.fixes_period.map(|(_, value)| value);

@@ -9,7 +9,7 @@
 //! Owen-scrambled (B. Burley, JCGT 9(4), 2020; crate `sobol_burley`). The first points of a longer sample are those of
 //! a shorter one. Logarithms and exponentials come from `libm`: the same bits on every machine.
 
-use super::quantity::{Point, Quantity};
+use super::quantity::{GridPoint, Quantity};
 use crate::model::theory::to_twelve_digits;
 use crate::model::{Parameters, Symbol, Value};
 use crate::table::value::Field as _;
@@ -20,7 +20,7 @@ pub(super) const MAX_ROWS: u64 = 1_000_000;
 
 /// A column of an axis. Values are checked and canonical.
 #[derive(Clone, Debug)]
-pub(super) struct Column {
+pub(super) struct AxisColumn {
     pub quantity: Quantity,
     pub values: Vec<Value>,
 }
@@ -33,13 +33,13 @@ pub(super) enum Axis {
         symbol: Symbol,
         values: std::ops::Range<u64>,
     },
-    Table(Table),
+    ListedRows(ListedRows),
 }
 
 /// Listed rows and their order for look-up.
 #[derive(Clone, Debug)]
-pub(super) struct Table {
-    pub columns: Vec<Column>,
+pub(super) struct ListedRows {
+    pub columns: Vec<AxisColumn>,
     /// Rows in the order of the parameters that they lead to, the seed and then the period last.
     sorted: Vec<u32>,
     /// For each row, whether no earlier one equals it in all but what fixes the period.
@@ -55,7 +55,7 @@ pub(super) struct Repeated {
 
 impl Axis {
     /// An axis of columns of equal length, 1 to [`MAX_ROWS`].
-    pub fn table(columns: Vec<Column>) -> Result<Self, Repeated> {
+    pub fn table(columns: Vec<AxisColumn>) -> Result<Self, Repeated> {
         let period = columns.iter().find(|column| column.quantity.is_period());
         let ranks = |row: u32| {
             let others = but_seed(&columns).chain(columns.iter().filter(|column| column.is_seed()));
@@ -77,7 +77,7 @@ impl Axis {
         if let Some((later, earlier)) = repeated.into_iter().min() {
             return Err(Repeated { earlier, later });
         }
-        Ok(Self::Table(Table {
+        Ok(Self::ListedRows(ListedRows {
             columns,
             sorted: ranked.into_iter().map(|(.., row)| row).collect(),
             is_first,
@@ -87,24 +87,24 @@ impl Axis {
     pub fn quantities(&self) -> Vec<Quantity> {
         match self {
             Self::Counted { symbol, .. } => vec![Quantity::Parameter(*symbol)],
-            Self::Table(table) => table.columns.iter().map(|column| column.quantity).collect(),
+            Self::ListedRows(table) => table.columns.iter().map(|column| column.quantity).collect(),
         }
     }
 
     pub fn len(&self) -> u64 {
         match self {
             Self::Counted { values, .. } => values.end - values.start,
-            Self::Table(table) => table.sorted.len() as u64,
+            Self::ListedRows(table) => table.sorted.len() as u64,
         }
     }
 
-    pub fn apply(&self, row: u64, point: &mut Point) {
+    pub fn apply(&self, row: u64, point: &mut GridPoint) {
         match self {
             Self::Counted { symbol, values } => {
                 let value = Value::Count(values.start + row);
                 point.set(Quantity::Parameter(*symbol), value);
             }
-            Self::Table(table) => {
+            Self::ListedRows(table) => {
                 for column in &table.columns {
                     point.set(column.quantity, column.values[index(row)]);
                 }
@@ -116,13 +116,13 @@ impl Axis {
     pub fn is_first(&self, row: u64) -> bool {
         match self {
             Self::Counted { .. } => true,
-            Self::Table(table) => table.is_first[index(row)],
+            Self::ListedRows(table) => table.is_first[index(row)],
         }
     }
 
     /// The values of a quantity that it moves by a list.
     pub fn values_of(&self, quantity: Quantity) -> Option<&[Value]> {
-        let Self::Table(table) = self else {
+        let Self::ListedRows(table) = self else {
             return None;
         };
         let mut columns = table.columns.iter();
@@ -137,7 +137,7 @@ impl Axis {
             Self::Counted { symbol, values } => {
                 return (*symbol == Symbol::Seed).then(|| values.clone().take(most).collect());
             }
-            Self::Table(table) => table,
+            Self::ListedRows(table) => table,
         };
         let seeds = table.columns.iter().find(|column| column.is_seed())?;
         let order = |row: &u32| table.compare_but_seed(*row, wanted);
@@ -159,7 +159,7 @@ impl Axis {
                 Value::Count(value) if values.contains(&value) => Some(value - values.start),
                 _ => None,
             },
-            Self::Table(table) => {
+            Self::ListedRows(table) => {
                 let order = |row: &u32| table.compare(*row, wanted);
                 let begin = table.sorted.partition_point(|row| order(row).is_lt());
                 let found = table.sorted[begin..].iter();
@@ -173,18 +173,18 @@ impl Axis {
 }
 
 /// The columns that fix neither the seed nor the period.
-fn but_seed(columns: &[Column]) -> impl Iterator<Item = &Column> {
+fn but_seed(columns: &[AxisColumn]) -> impl Iterator<Item = &AxisColumn> {
     let columns = columns.iter();
     columns.filter(|column| !column.is_seed() && !column.quantity.is_period())
 }
 
-impl Table {
+impl ListedRows {
     /// Where a row stands among the sorted rows, compared with a row that leads to these parameters.
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
         let seed = self.columns.iter().find(|column| column.is_seed());
         let mut columns = self.columns.iter();
         let period = columns.find(|column| column.quantity.is_period());
-        let of = |column: &Column| column.compare(row, wanted);
+        let of = |column: &AxisColumn| column.compare(row, wanted);
         self.compare_but_seed(row, wanted)
             .then_with(|| seed.map_or(Ordering::Equal, of))
             .then_with(|| period.map_or(Ordering::Equal, of))
@@ -198,8 +198,8 @@ impl Table {
     }
 }
 
-impl Column {
-    /// Orders the rows as [`Column::compare`] does: a larger η or frequency is a shorter period.
+impl AxisColumn {
+    /// Orders the rows as [`AxisColumn::compare`] does: a larger η or frequency is a shorter period.
     fn rank(&self, row: u32) -> Value {
         match (self.quantity, self.values[row as usize]) {
             (Quantity::Eta | Quantity::Frequency, Value::Real(real)) => Value::Real(-real),
@@ -237,7 +237,7 @@ pub(super) const MAX_SAMPLE: u64 = 1 << 16;
 
 /// A range of a quantity, low < high.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Range {
+pub(super) struct AxisRange {
     pub low: f64,
     pub high: f64,
     /// Even in the logarithm; both ends are > 0.
@@ -246,7 +246,7 @@ pub(super) struct Range {
     pub whole: bool,
 }
 
-impl Range {
+impl AxisRange {
     /// The value at a fraction of the way, 0 to 1, rounded: 1e-4 as people write it, not what a logarithm makes of it.
     /// The ends are exact.
     pub fn at(&self, fraction: f64) -> f64 {
@@ -283,10 +283,10 @@ impl Range {
 mod tests {
     use super::*;
 
-    fn column(key: &str, values: &[f64]) -> Column {
+    fn column(key: &str, values: &[f64]) -> AxisColumn {
         let quantity = Quantity::from_key(key).unwrap();
         let checked = |&value: &f64| quantity.checked(Value::Real(value)).unwrap();
-        Column {
+        AxisColumn {
             quantity,
             values: values.iter().map(checked).collect(),
         }
@@ -348,7 +348,7 @@ mod tests {
     #[test]
     fn the_ends_of_a_range_are_exact_and_its_steps_even() {
         for logarithmic in [false, true] {
-            let range = Range {
+            let range = AxisRange {
                 low: 3e-7,
                 high: 1e-4,
                 logarithmic,
@@ -367,7 +367,7 @@ mod tests {
             }
         }
         let ends = (1.234_567_890_123_456_7, 9.876_543_210_987_654);
-        let long = Range {
+        let long = AxisRange {
             low: ends.0,
             high: ends.1,
             logarithmic: true,
@@ -377,7 +377,7 @@ mod tests {
             (long.at(0.0), long.at(1.0), long.at(1e-15)),
             (ends.0, ends.1, ends.0)
         );
-        let widest = Range {
+        let widest = AxisRange {
             low: -f64::MAX,
             high: f64::MAX,
             logarithmic: false,

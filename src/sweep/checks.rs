@@ -9,7 +9,7 @@
 
 use super::axes::Axis;
 use super::grid::Sweep;
-use super::quantity::{DERIVABLE, Point, Quantity};
+use super::quantity::{DERIVABLE, GridPoint, Quantity};
 use super::rounds::{Goal, MAX_SETS, Rounds};
 use super::source::{Refused, Section, Source};
 use crate::model::theory::typical_interval;
@@ -22,10 +22,10 @@ use std::ops::RangeInclusive;
 
 pub(super) struct Places<'a> {
     source: &'a Source<'a>,
-    set: Vec<Place>,
+    set: Vec<KeyPlace>,
 }
 
-struct Place {
+struct KeyPlace {
     quantity: Quantity,
     /// Byte of the text.
     at: usize,
@@ -42,7 +42,7 @@ impl<'a> Places<'a> {
 
     /// A quantity is set in a section; refused if something else sets it, or the period, already.
     pub fn set(&mut self, quantity: Quantity, at: usize, section: &'static str) {
-        let clash = |place: &&Place| {
+        let clash = |place: &&KeyPlace| {
             place.quantity == quantity || (place.quantity.is_period() && quantity.is_period())
         };
         if let Some(place) = self.set.iter().find(clash) {
@@ -58,7 +58,7 @@ impl<'a> Places<'a> {
             };
             self.source.refuse(at, problem);
         } else {
-            self.set.push(Place {
+            self.set.push(KeyPlace {
                 quantity,
                 at,
                 section,
@@ -131,7 +131,7 @@ fn size(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
 
 /// Every job is valid and, in a new sweep, so fast that its times are resolved.
 fn points(sweep: &Sweep, places: &Places<'_>, is_new: bool) -> Result<(), Refused> {
-    let problem_at = |point: &Point| {
+    let problem_at = |point: &GridPoint| {
         invalid(point).or_else(|| too_slow(point, &sweep.recording).filter(|_| is_new))
     };
     let mut of_one_seed = sweep.points_of_one_seed();
@@ -196,7 +196,7 @@ const MAX_LOOKED_AT: usize = 100_000;
 impl Sweep {
     /// What is allowed, but hardly intended.
     pub fn warnings(&self) -> Vec<String> {
-        let points: Vec<Point> = self.points_of_one_seed().take(MAX_LOOKED_AT).collect();
+        let points: Vec<GridPoint> = self.points_of_one_seed().take(MAX_LOOKED_AT).collect();
         let values = |quantity| points.iter().map(move |point| point.number(quantity));
         let fast = values(Quantity::Parameter(Symbol::V0)).find(|velocity| *velocity >= FAST);
         let fast = fast.map(|velocity| {
@@ -274,7 +274,7 @@ fn without_controls(rounds: &Rounds, file: &Section<'_>) -> Result<(), Refused> 
 }
 
 /// What is wrong with a canonical point, and the quantity to blame.
-fn invalid(point: &Point) -> Option<(Quantity, String)> {
+fn invalid(point: &GridPoint) -> Option<(Quantity, String)> {
     let period = point.parameters.modulation_period;
     if let (Some((Quantity::Eta, _)), Some(period)) = (point.fixes_period, period)
         && !DERIVABLE.contains(&period)
@@ -291,7 +291,7 @@ fn invalid(point: &Point) -> Option<(Quantity, String)> {
 const RESOLUTION: f64 = 1e-3;
 
 /// A drive so slow that the doubles which hold the time of a job do not resolve its slips.
-fn too_slow(point: &Point, recording: &Recording) -> Option<(Quantity, String)> {
+fn too_slow(point: &GridPoint, recording: &Recording) -> Option<(Quantity, String)> {
     let parameters = &point.parameters;
     let time = recording.expected_time(typical_interval(parameters));
     let longest = RESOLUTION * parameters.wave_crossing_time() / f64::EPSILON;
@@ -311,7 +311,7 @@ fn too_slow(point: &Point, recording: &Recording) -> Option<(Quantity, String)> 
 }
 
 /// Where a point lies on the axes, and the way out.
-fn place(sweep: &Sweep, point: &Point) -> String {
+fn place(sweep: &Sweep, point: &GridPoint) -> String {
     let mut quantities: Vec<Quantity> = sweep.axes.iter().flat_map(Axis::quantities).collect();
     quantities.retain(|quantity| *quantity != Quantity::BREAK_ON);
     let value = |quantity: &Quantity| {

@@ -4,10 +4,10 @@
 //! that name none of them, as far as a modulated job needs them. A job of the grid is no control, nor is a set that the
 //! grid of any sweep in the directory has.
 
-use super::axes::{Axis, Column};
+use super::axes::{Axis, AxisColumn};
 use super::grid::Sweep;
 use super::plan::Plan;
-use super::quantity::Point;
+use super::quantity::GridPoint;
 use super::rounds::merged;
 use crate::model::Parameters;
 use std::collections::{BTreeSet, HashSet};
@@ -16,11 +16,11 @@ use std::ops::RangeInclusive;
 impl Axis {
     /// What is left of it without modulation; `None` if nothing is.
     fn unmodulated(&self) -> Option<Self> {
-        let Self::Table(table) = self else {
+        let Self::ListedRows(table) = self else {
             return Some(self.clone());
         };
         let columns = table.columns.iter();
-        let kept: Vec<&Column> = columns
+        let kept: Vec<&AxisColumn> = columns
             .filter(|column| !column.quantity.is_of_modulation())
             .collect();
         let rows = kept.first()?.values.len();
@@ -31,8 +31,8 @@ impl Axis {
                 .collect::<Vec<_>>()
         };
         let rows: Vec<usize> = (0..rows).filter(|&index| seen.insert(row(index))).collect();
-        let values = |column: &Column| rows.iter().map(|&row| column.values[row]).collect();
-        let columns = kept.into_iter().map(|column| Column {
+        let values = |column: &AxisColumn| rows.iter().map(|&row| column.values[row]).collect();
+        let columns = kept.into_iter().map(|column| AxisColumn {
             quantity: column.quantity,
             values: values(column),
         });
@@ -62,7 +62,7 @@ impl Sweep {
 
     /// The sets of the sweep of its controls that its modulated jobs need, in order.
     fn needed_of(&self, controls: &Self) -> Vec<u64> {
-        let set = |point: Point| {
+        let set = |point: GridPoint| {
             (point.is_modulated() && self.admits(&point))
                 .then(|| controls.set_with(&point.parameters.without_modulation()))
                 .flatten()

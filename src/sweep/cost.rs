@@ -59,7 +59,7 @@ const RESTLESS_BLOCKS: f64 = 12.0;
 /// Predicted CPU time of a job, in s.
 pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: Solver) -> f64 {
     let blocks = parameters.blocks as f64;
-    let motion = Motion::of(parameters, recording);
+    let motion = ExpectedMotion::of(parameters, recording);
     let fourth_root = |ratio: f64| ratio.sqrt().sqrt();
     let setting = solver.setting();
     let of_motion = match solver.method {
@@ -94,7 +94,7 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
 }
 
 /// What a slider is expected to do in a job.
-struct Motion {
+struct ExpectedMotion {
     /// Model time to its end, and the part of it that is not quiet, in s.
     time: f64,
     resolved: f64,
@@ -103,7 +103,7 @@ struct Motion {
     steps_of_periods: f64,
 }
 
-impl Motion {
+impl ExpectedMotion {
     /// Motion with no steps beside those that resolve it.
     const fn resolved(time: f64, resolved: f64, breaks: f64) -> Self {
         Self {
@@ -356,7 +356,8 @@ mod tests {
                 drive_velocity,
                 ..Parameters::default()
             };
-            Motion::of(&parameters, &Recording::default()).time / typical_interval(&parameters)
+            ExpectedMotion::of(&parameters, &Recording::default()).time
+                / typical_interval(&parameters)
         };
         assert_eq!((at(1e-4).round(), at(1e-2).round()), (45.0, 20.0));
     }

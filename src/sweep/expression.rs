@@ -86,18 +86,18 @@ fn at(position: usize, problem: &str) -> String {
 }
 
 /// What a name means, or what is wrong with it.
-type Names<'a, N> = &'a dyn Fn(&str) -> Result<N, String>;
+type Meanings<'a, N> = &'a dyn Fn(&str) -> Result<N, String>;
 
 impl<N> Expression<N> {
-    pub fn condition(text: &str, names: Names<'_, N>) -> Result<Self, String> {
+    pub fn condition(text: &str, names: Meanings<'_, N>) -> Result<Self, String> {
         Self::parse(text, names, true)
     }
 
-    pub fn formula(text: &str, names: Names<'_, N>) -> Result<Self, String> {
+    pub fn formula(text: &str, names: Meanings<'_, N>) -> Result<Self, String> {
         Self::parse(text, names, false)
     }
 
-    fn parse(text: &str, names: Names<'_, N>, is_condition: bool) -> Result<Self, String> {
+    fn parse(text: &str, names: Meanings<'_, N>, is_condition: bool) -> Result<Self, String> {
         let mut reader = Reader {
             text,
             next: text.len() - text.trim_start().len(),
@@ -174,7 +174,7 @@ struct Reader<'a, N> {
     /// Byte at which the next word or sign begins.
     next: usize,
     words: usize,
-    names: Names<'a, N>,
+    names: Meanings<'a, N>,
 }
 
 impl<'a, N> Reader<'a, N> {
@@ -319,7 +319,7 @@ impl<'a, N> Reader<'a, N> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::quantity::{Point, Quantity};
+    use super::super::quantity::{GridPoint, Quantity};
     use super::*;
     use crate::model::Parameters;
 
@@ -334,7 +334,7 @@ mod tests {
             modulation_amplitude: amplitude,
             ..Parameters::default()
         };
-        let point = Point {
+        let point = GridPoint {
             parameters,
             fixes_period: Some(period),
         }

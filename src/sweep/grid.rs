@@ -10,7 +10,7 @@ use super::cost::predicted_cost;
 use super::expression::Expression;
 use super::job::{Identity, Job, settings, solver_settings};
 use super::measured::Measured;
-use super::quantity::{Point, Quantity};
+use super::quantity::{GridPoint, Quantity};
 use super::rounds::Rounds;
 use super::source::SweepError;
 use crate::model::theory::to_twelve_digits;
@@ -115,9 +115,9 @@ impl Sweep {
         let controls = self.controls.iter();
         let controls = controls.flat_map(move |controls| controls.admitted(others.clone()));
         let controls = controls.map(move |(number, point)| (count + number, point));
-        let is_own = |(_, point): &(u64, Point)| self.find_in_grid(&point.parameters).is_none();
+        let is_own = |(_, point): &(u64, GridPoint)| self.find_in_grid(&point.parameters).is_none();
         let points = of_grid.chain(controls.filter(is_own));
-        points.map(|(point, Point { parameters, .. })| Job {
+        points.map(|(point, GridPoint { parameters, .. })| Job {
             point,
             // To look slips up takes no time.
             cost: match self.measured {
@@ -303,13 +303,13 @@ impl Sweep {
     pub(super) fn admitted(
         &self,
         points: Range<u64>,
-    ) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
+    ) -> impl Iterator<Item = (u64, GridPoint)> + Clone + Send + '_ {
         self.walk(self.row_counts(), points)
             .filter(|(number, point)| self.admits(point) && self.is_needed(*number))
     }
 
     /// The points of one seed that are jobs if the conditions hold, in canonical form.
-    pub(super) fn points_of_one_seed(&self) -> impl Iterator<Item = Point> {
+    pub(super) fn points_of_one_seed(&self) -> impl Iterator<Item = GridPoint> {
         let mut counts = self.row_counts();
         if let Some(axis) = self.seed_axis() {
             counts[axis] = 1;
@@ -324,7 +324,7 @@ impl Sweep {
         &self,
         counts: Vec<u64>,
         points: Range<u64>,
-    ) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
+    ) -> impl Iterator<Item = (u64, GridPoint)> + Clone + Send + '_ {
         let mut rows = vec![0; counts.len()];
         points.filter_map(move |number| {
             find_rows(number, &counts, &mut rows);
@@ -335,8 +335,8 @@ impl Sweep {
         })
     }
 
-    pub(super) fn point(&self, rows: &[u64]) -> Point {
-        let mut point = Point {
+    pub(super) fn point(&self, rows: &[u64]) -> GridPoint {
+        let mut point = GridPoint {
             parameters: self.base.clone(),
             fixes_period: None,
         };
@@ -347,7 +347,7 @@ impl Sweep {
     }
 
     /// Whether a canonical point fulfils the conditions, which see η and the frequency as columns have them.
-    pub(super) fn admits(&self, point: &Point) -> bool {
+    pub(super) fn admits(&self, point: &GridPoint) -> bool {
         let number = |&quantity: &Quantity| {
             let number = point.number(quantity);
             match quantity {

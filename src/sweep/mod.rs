@@ -49,7 +49,7 @@ pub use rounds::{
     Bounds, Goal, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged,
 };
 pub use source::{Mistake, SweepError};
-pub use variation::{Change, varied};
+pub use variation::{KeyChange, varied};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <=
 /// fs`, is left to [`Sweep::parse`].

@@ -109,12 +109,12 @@ impl Quantity {
 
 /// A point of a sweep: parameters under construction, and η or the frequency where it fixes their period.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Point {
+pub(super) struct GridPoint {
     pub parameters: Parameters,
     pub fixes_period: Option<(Quantity, f64)>,
 }
 
-impl Point {
+impl GridPoint {
     /// Sets a quantity to a checked value.
     pub fn set(&mut self, quantity: Quantity, value: Value) {
         let fits = match quantity {

@@ -4,13 +4,13 @@
 //! out. All sections and entries are read, whatever was refused before; the sweep as a whole is checked if nothing was.
 //! Contract: every job of a sweep that was read has valid parameters (see `checks.rs`), and there is at least one.
 
-use super::axes::{Axis, Column};
+use super::axes::{Axis, AxisColumn};
 use super::checks::{self, Places};
 use super::expression::Expression;
 use super::grid::Sweep;
 use super::job::{Identity, VERSIONS};
 use super::measured::Measured;
-use super::quantity::{Point, Quantity};
+use super::quantity::{GridPoint, Quantity};
 use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{Goal, Rounds};
@@ -195,7 +195,7 @@ fn read_model(
     model: &Section<'_>,
     places: &mut Places<'_>,
 ) -> Result<(Parameters, Option<Axis>), Refused> {
-    let mut given = Point::default();
+    let mut given = GridPoint::default();
     all(model.entries().iter().map(|entry| {
         let quantity = read_axes::known(entry, model.title, &[], places)?;
         given.set(quantity, read_axes::read_value(entry, quantity)?);
@@ -203,7 +203,7 @@ fn read_model(
     }))?;
     let period = given.fixes_period.and_then(|(quantity, value)| {
         let values = vec![Value::Real(value)];
-        Axis::table(vec![Column { quantity, values }]).ok()
+        Axis::table(vec![AxisColumn { quantity, values }]).ok()
     });
     Ok((given.parameters, period))
 }

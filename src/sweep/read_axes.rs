@@ -1,7 +1,7 @@
 //! The `[axes]` of a sweep file: lists, ranges, counts, zips and samples become axes. `docs/sweeps.md` has their forms.
 //! An axis reports its first mistake, a zip or a sample that of each column.
 
-use super::axes::{Axis, Column, MAX_ROWS, MAX_SAMPLE, Range, Repeated};
+use super::axes::{Axis, AxisColumn, AxisRange, MAX_ROWS, MAX_SAMPLE, Repeated};
 use super::checks::Places;
 use super::quantity::Quantity;
 use super::source::{Entry, Refused, Section, all};
@@ -56,7 +56,7 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refus
     if let (Some(values), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
         return Ok(Axis::Counted { symbol, values });
     }
-    let column = Column {
+    let column = AxisColumn {
         quantity,
         values: read_values(entry, quantity)?,
     };
@@ -101,7 +101,10 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<Value>, Refu
 }
 
 /// Reads a range of an axis, and the number of its values.
-pub(super) fn read_spaced(entry: &Entry<'_>, quantity: Quantity) -> Result<(Range, u64), Refused> {
+pub(super) fn read_spaced(
+    entry: &Entry<'_>,
+    quantity: Quantity,
+) -> Result<(AxisRange, u64), Refused> {
     let table = entry.section("an axis");
     let table = table.ok_or_else(|| {
         entry.must_be(&format!("{AXIS_FORMS}; a single value belongs in [model]"))
@@ -114,10 +117,10 @@ pub(super) fn read_spaced(entry: &Entry<'_>, quantity: Quantity) -> Result<(Rang
 }
 
 /// The axis of a range with this many values; `None` if two of these are one.
-pub(super) fn spaced(range: &Range, points: u64, quantity: Quantity) -> Option<Axis> {
+pub(super) fn spaced(range: &AxisRange, points: u64, quantity: Quantity) -> Option<Axis> {
     let values = range.spaced(points).map(|value| ranged(quantity, value));
     let values = values.collect();
-    Axis::table(vec![Column { quantity, values }]).ok()
+    Axis::table(vec![AxisColumn { quantity, values }]).ok()
 }
 
 /// Reads counted values; `None` if the entry has another form.
@@ -167,7 +170,7 @@ pub(super) fn read_value(entry: &Entry<'_>, quantity: Quantity) -> Result<Value,
     value.ok_or_else(|| entry.must_be(&format!("{}{hint}", quantity.allowed())))
 }
 
-fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, Refused> {
+fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<AxisRange>, Refused> {
     let (entry, logarithmic) = match (table.entry("linear"), table.entry("log")) {
         (Some(entry), None) => (entry, false),
         (None, Some(entry)) => (entry, true),
@@ -188,7 +191,7 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
         let number = value.and_then(Value::number);
         number.ok_or_else(|| entry.refuse(problem))
     };
-    let range = Range {
+    let range = AxisRange {
         low: end(low)?,
         high: end(high)?,
         logarithmic,
@@ -223,7 +226,7 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
     let columns = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &[], places)?;
         let values = read_values(entry, quantity)?;
-        Ok(Column { quantity, values })
+        Ok(AxisColumn { quantity, values })
     }))?;
     let [first, _, ..] = columns.as_slice() else {
         let problem =
@@ -274,7 +277,7 @@ fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Ref
     let columns = (0..).zip(ranges).map(|(dimension, (quantity, range))| {
         let coordinates = (0..points).map(|point| sobol_burley::sample(point, dimension, seed));
         let values = coordinates.map(|x| ranged(quantity, range.at(f64::from(x))));
-        Column {
+        AxisColumn {
             quantity,
             values: values.collect(),
         }
@@ -282,7 +285,7 @@ fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Ref
     of_columns(table, columns.collect())
 }
 
-fn of_columns(table: &Section<'_>, columns: Vec<Column>) -> Result<Axis, Refused> {
+fn of_columns(table: &Section<'_>, columns: Vec<AxisColumn>) -> Result<Axis, Refused> {
     Axis::table(columns).map_err(|Repeated { earlier, later }| {
         let problem = format!(
             "{}: row {} repeats row {} (counted from 1); keep one, or take fewer points",

@@ -1,7 +1,7 @@
 //! The `[precision]` or the `[refine]` of a sweep file, see `docs/rounds.md`. The axis of `[refine]` becomes as
 //! fine as its `to`.
 
-use super::axes::{Axis, MAX_ROWS, Range};
+use super::axes::{Axis, AxisRange, MAX_ROWS};
 use super::checks::Places;
 use super::quantity::{Quantity, hint};
 use super::read_axes::{read_spaced, spaced};
@@ -223,7 +223,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// How often each step of a range is halved until it is as short as is wanted, and the axis of these steps.
 fn finer(
-    range: &Range,
+    range: &AxisRange,
     points: u64,
     quantity: Quantity,
     wanted: f64,

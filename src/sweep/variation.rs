@@ -7,7 +7,7 @@ use toml_edit::{DocumentMut, Item, Value};
 
 /// A key of a sweep file with its new value as TOML, and the section that it belongs to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Change {
+pub struct KeyChange {
     pub section: &'static str,
     pub key: String,
     pub value: String,
@@ -27,7 +27,7 @@ fn is_of_modulation(key: &str) -> bool {
     key == "control" || quantity.is_some_and(Quantity::is_of_modulation)
 }
 
-impl Change {
+impl KeyChange {
     /// A key with one value. The sweep file's reader refuses what is unknown, in the section of what it is nearest to.
     pub fn setting(key: &str, value: &str) -> Self {
         let recording = RecordingKey::ALL.map(RecordingKey::key);
@@ -98,16 +98,16 @@ fn scalar(text: &str) -> String {
 /// The text of a sweep file with these changes. A key leaves all other sections, so that an axis becomes a parameter,
 /// or the other way round; a new key for the period, the target or the seeds replaces the one that is there; Delta = 0
 /// removes all that has no effect without modulation. A text that is not TOML stays unchanged.
-pub fn varied(text: &str, changes: &[Change]) -> String {
+pub fn varied(text: &str, changes: &[KeyChange]) -> String {
     let Ok(mut document) = text.parse::<DocumentMut>() else {
         return text.to_owned();
     };
-    let is_zero = |change: &Change| matches!(change.value.parse(), Ok(0.0));
+    let is_zero = |change: &KeyChange| matches!(change.value.parse(), Ok(0.0));
     let is_still = changes
         .iter()
         .any(|change| change.key == "Delta" && is_zero(change));
     let is_refined = document.contains_key("refine");
-    let section_of = |change: &Change| match &*change.key {
+    let section_of = |change: &KeyChange| match &*change.key {
         "seeds" if is_refined => "refine",
         _ => change.section,
     };
@@ -116,14 +116,14 @@ pub fn varied(text: &str, changes: &[Change]) -> String {
             continue;
         };
         let is_set_here =
-            |change: &Change, key: &str| section_of(change) == section && change.key == key;
+            |change: &KeyChange, key: &str| section_of(change) == section && change.key == key;
         let stays = |key: &str| changes.iter().any(|change| is_set_here(change, key));
         let are_rivals = |new: &str, key: &str| {
             let mut rivals = RIVALS.iter();
             rivals.any(|keys| keys.contains(&new) && keys.contains(&key))
         };
         let goes = |key: &str| {
-            let replaces = |change: &Change| change.key == key || are_rivals(&change.key, key);
+            let replaces = |change: &KeyChange| change.key == key || are_rivals(&change.key, key);
             changes.iter().any(replaces) || is_still && is_of_modulation(key)
         };
         let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
@@ -131,7 +131,7 @@ pub fn varied(text: &str, changes: &[Change]) -> String {
             table.remove(key);
         }
     }
-    for change @ Change { key, value, .. } in changes {
+    for change @ KeyChange { key, value, .. } in changes {
         let section = section_of(change);
         let table = document.entry(section).or_insert_with(toml_edit::table);
         let Ok(mut value) = value.parse::<Value>() else {
@@ -164,18 +164,18 @@ mod tests {
                         # Slow and fast.\nV0    = [1e-5, 1e-4]  # two\nDelta = [1e-6]\nT     = [0.02]\n\
                         [record] # short\nslips = 3\n";
 
-    fn axis(key: &str, values: &str) -> Change {
-        Change::axis(key, values).unwrap()
+    fn axis(key: &str, values: &str) -> KeyChange {
+        KeyChange::axis(key, values).unwrap()
     }
 
     #[test]
     fn what_is_not_changed_stands_as_it_was() {
         assert_eq!(varied(TEXT, &[]), TEXT);
         let changes = [
-            Change::setting("V0", "2e-4"),
+            KeyChange::setting("V0", "2e-4"),
             axis("Kd", "1e7, 1e8"),
             axis("frequency", "log:20:80:5"),
-            Change::setting("slips", "7"),
+            KeyChange::setting("slips", "7"),
         ];
         let text = varied(TEXT, &changes);
         assert_eq!(
@@ -199,7 +199,7 @@ mod tests {
         let text = varied(
             TEXT,
             &[
-                Change::setting("Kd", "2e7"),
+                KeyChange::setting("Kd", "2e7"),
                 axis("V0", "linear:1e-5:2e-5:3"),
                 axis("seed", "count:4"),
             ],
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn what_has_no_effect_without_modulation_goes_with_it_unless_it_is_set() {
         let text = TEXT.replace("slips = 3\n", "slips = 3\ncontrol = true\n");
-        let still = varied(&text, &[Change::setting("Delta", "0")]);
+        let still = varied(&text, &[KeyChange::setting("Delta", "0")]);
         assert!(
             !still.contains("T ") && !still.contains("control"),
             "{still}"
@@ -240,23 +240,26 @@ mod tests {
         );
         let set = varied(
             &text,
-            &[Change::setting("Delta", "0.0"), Change::setting("T", "1")],
+            &[
+                KeyChange::setting("Delta", "0.0"),
+                KeyChange::setting("T", "1"),
+            ],
         );
         assert!(
             set.contains("T = 1  # --set") && set.contains("Delta = 0.0"),
             "{set}"
         );
-        assert!(varied(&text, &[Change::setting("Delta", "1e-7")]).contains("control"));
+        assert!(varied(&text, &[KeyChange::setting("Delta", "1e-7")]).contains("control"));
     }
 
     #[test]
     fn a_target_and_seeds_take_the_place_of_what_was_there() {
         let parsed = |text: &str| Sweep::parse(text, Path::new("mine.toml")).unwrap();
         let precise = [
-            Change::setting("of", "tau_mean"),
-            Change::setting("relative", "0.02"),
+            KeyChange::setting("of", "tau_mean"),
+            KeyChange::setting("relative", "0.02"),
         ];
-        let seeds = Change::setting("seeds", "{ from = 24, to = 48 }");
+        let seeds = KeyChange::setting("seeds", "{ from = 24, to = 48 }");
         let fixed = TEXT.replace("[record]", "seed = { count = 4 }\n[record]");
         let text = varied(&fixed, &[precise.as_slice(), &[seeds]].concat());
         assert!(!text.contains("seed = "), "{text}");
@@ -267,8 +270,8 @@ mod tests {
         let text = varied(
             &text,
             &[
-                Change::setting("absolute", "1e-3"),
-                Change::setting("seeds", "{ from = 30, to = 40 }"),
+                KeyChange::setting("absolute", "1e-3"),
+                KeyChange::setting("seeds", "{ from = 30, to = 40 }"),
             ],
         );
         assert!(
@@ -280,8 +283,8 @@ mod tests {
         let text = varied(
             refined,
             &[
-                Change::setting("axis", "V0"),
-                Change::setting("seeds", "{ from = 30, to = 40 }"),
+                KeyChange::setting("axis", "V0"),
+                KeyChange::setting("seeds", "{ from = 30, to = 40 }"),
             ],
         );
         let expected =
@@ -301,8 +304,8 @@ mod tests {
                 text,
                 &[
                     axis("V0", values),
-                    Change::setting("Ns", "9"),
-                    Change::setting("tolerance", "1e-5"),
+                    KeyChange::setting("Ns", "9"),
+                    KeyChange::setting("tolerance", "1e-5"),
                 ],
             );
             let sweep = Sweep::parse(&text, Path::new("mine.toml")).unwrap();
@@ -314,7 +317,10 @@ mod tests {
                 (count, 9)
             );
         }
-        assert!(Change::axis("V0", "[1e-5").is_err());
-        assert_eq!(Change::setting("break_on", "tension").value, "\"tension\"");
+        assert!(KeyChange::axis("V0", "[1e-5").is_err());
+        assert_eq!(
+            KeyChange::setting("break_on", "tension").value,
+            "\"tension\""
+        );
     }
 }

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::sync::LazyLock;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-use stickslip::figure::{Beside, Format, Look, draw_all};
+use stickslip::figure::{Beside, Look, PictureFormat, draw_all};
 use stickslip::observe::measure;
 use stickslip::reduce::{BackboneBin, HistogramBin, Point, SetRow, reduce};
 use stickslip::results::Results;
@@ -415,7 +415,12 @@ fn read_all(root: &Path, file: &Path) {
             let _ = next(&results);
         }
         if file.starts_with(layout.reduced()) {
-            let _ = draw_all(&layout, &Beside::default(), &Look::default(), &Format::ALL);
+            let _ = draw_all(
+                &layout,
+                &Beside::default(),
+                &Look::default(),
+                &PictureFormat::ALL,
+            );
         } else {
             let _ = status(&results, MAX_FAILURES);
             let _ = reduce(&results);

@@ -117,7 +117,7 @@ impl Attached {
 /// block, lane i mod 8. Lanes beyond the last contact stay detached for ever.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
-struct ContactRow {
+struct ContactLanes {
     /// Stiffness while attached, else 0.
     attached_stiffness: Row,
     anchor: Row,
@@ -134,7 +134,7 @@ struct Lives {
     generation: [u32; LANES],
 }
 
-impl ContactRow {
+impl ContactLanes {
     /// One bit a lane: whether its contact breaks up to a displacement in m.
     #[inline(always)]
     fn reached<S: Simd>(&self, simd: S, displacement: f64) -> u8 {
@@ -151,7 +151,7 @@ pub struct Interface {
     break_on: BreakOn,
     disorder: Disorder,
     /// The rows of the first block, then of the second, and so on.
-    rows: Vec<ContactRow>,
+    rows: Vec<ContactLanes>,
     lives: Vec<Lives>,
     reattachments: Reattachments,
     attached: Attached,
@@ -170,7 +170,7 @@ impl Interface {
     pub fn new(parameters: &Parameters) -> Self {
         let blocks = parameters.blocks;
         let rows_per_block = parameters.contacts_per_block.div_ceil(LANES);
-        let detached = ContactRow {
+        let detached = ContactLanes {
             attached_stiffness: Row::filled(0.0),
             anchor: Row::filled(0.0),
             upper: Row::filled(f64::INFINITY),
@@ -425,7 +425,7 @@ impl Interface {
 
     /// Elastic energy in the attached contacts for given displacements in m, in J.
     pub fn elastic_energy(&self, displacements: &[f64]) -> f64 {
-        let of_row = |displacement: f64, row: &ContactRow| -> [f64; LANES] {
+        let of_row = |displacement: f64, row: &ContactLanes| -> [f64; LANES] {
             array::from_fn(|lane| {
                 let elongation = displacement - row.anchor[lane];
                 0.5 * row.attached_stiffness[lane] * elongation * elongation
@@ -446,7 +446,7 @@ impl Interface {
     }
 
     #[inline(always)]
-    fn rows_of(&self, block: usize) -> &[ContactRow] {
+    fn rows_of(&self, block: usize) -> &[ContactLanes] {
         &self.rows[block * self.rows_per_block..][..self.rows_per_block]
     }
 

@@ -25,15 +25,20 @@ pub(super) struct Rupture {
     /// Least force so far, and up to the last break, in N.
     pub least: f64,
     pub least_at_last_break: f64,
-    pub first: Instant,
-    pub last: Instant,
+    pub first: RunningTotals,
+    pub last: RunningTotals,
     /// Whether the shear force was rising at the onset.
     pub onset_cut: bool,
 }
 
 impl Rupture {
     /// The rupture that begins with this break, not included yet, on a slider of `blocks` blocks.
-    pub fn new(event: &ContactEvent, first: Instant, precursor_onset: Peak, blocks: usize) -> Self {
+    pub fn new(
+        event: &ContactEvent,
+        first: RunningTotals,
+        precursor_onset: Peak,
+        blocks: usize,
+    ) -> Self {
         Self {
             first_block: event.block,
             size: 0,
@@ -104,7 +109,7 @@ impl Peak {
 
 /// An instant, and what has been counted up to it.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Instant {
+pub(super) struct RunningTotals {
     pub time: f64,
     /// Shear force, in N.
     pub force: f64,

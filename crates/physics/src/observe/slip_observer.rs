@@ -5,7 +5,7 @@
 //! rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::drops::{DropDetector, Drops};
-use super::rupture::{Instant, Peak, Rupture, advance_speed};
+use super::rupture::{Peak, RunningTotals, Rupture, advance_speed};
 use super::slip::{Energies, Modulation, Precursor, Slip, phase};
 use super::{Averages, Measurements, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
@@ -21,7 +21,7 @@ struct PeaksSince {
 
 /// Precursors of the slip to come.
 #[derive(Clone, Debug, Default)]
-struct Pending {
+struct PendingPrecursors {
     count: u64,
     /// Breaks in the largest.
     largest: u64,
@@ -35,11 +35,11 @@ struct Pending {
 /// The instants between which averages over time are taken.
 #[derive(Clone, Debug, Default)]
 struct Span {
-    start_up_end: Option<Instant>,
+    start_up_end: Option<RunningTotals>,
     /// The start, as long as there is no slip.
-    last_slip_end: Instant,
+    last_slip_end: RunningTotals,
     /// Halfway from the last slip to where the job gives up.
-    settled: Option<Instant>,
+    settled: Option<RunningTotals>,
 }
 
 #[derive(Clone, Debug)]
@@ -55,9 +55,9 @@ pub struct SlipObserver {
     /// The drive in its cycle at the last slip's end.
     drive: Drive,
     /// The end of the last segment, but for what is counted at events.
-    now: Instant,
+    now: RunningTotals,
     /// The last event, and the contacts attached after it.
-    at_event: Instant,
+    at_event: RunningTotals,
     attached: u64,
     peaks_since: PeaksSince,
     rupture: Option<Rupture>,
@@ -65,7 +65,7 @@ pub struct SlipObserver {
     last_onset: Option<f64>,
     /// What has been found so far.
     measured: Measurements,
-    pending: Pending,
+    pending: PendingPrecursors,
     span: Span,
     /// Drops, if they are recorded, and first and last break of every slip.
     drops: Option<DropDetector>,
@@ -85,15 +85,15 @@ impl SlipObserver {
             crossing_time: parameters.wave_crossing_time(),
             give_up_time: recording.give_up_time(parameters),
             drive: Drive::new(parameters),
-            now: Instant::default(),
-            at_event: Instant::default(),
+            now: RunningTotals::default(),
+            at_event: RunningTotals::default(),
             attached: contacts,
             peaks_since: PeaksSince::default(),
             rupture: None,
             slips_seen: 0,
             last_onset: None,
             measured: Measurements::default(),
-            pending: Pending::default(),
+            pending: PendingPrecursors::default(),
             span: Span::default(),
             drops: drops.map(|size| DropDetector::new(parameters, size)),
             breaks_of_slips: Vec::new(),
@@ -155,8 +155,8 @@ impl SlipObserver {
 
     /// The present instant with all that is counted, after sliding since the last slip; from the last event on at its
     /// rate.
-    fn sliding(&self) -> Instant {
-        Instant {
+    fn sliding(&self) -> RunningTotals {
+        RunningTotals {
             attached_time: self.at_event.attached_time
                 + self.attached as f64 * (self.now.time - self.at_event.time),
             slipping: self.span.last_slip_end.slipping + self.now.time
@@ -168,7 +168,7 @@ impl SlipObserver {
     fn begin_or_extend(&mut self, event: &ContactEvent) {
         self.finish_rupture_before(event.time);
         let blocks = self.parameters.blocks;
-        let here = Instant {
+        let here = RunningTotals {
             time: event.time,
             attached_time: event.attached_time,
             mean_displacement: event.mean_displacement,
@@ -223,7 +223,7 @@ impl SlipObserver {
             self.breaks_of_slips.push((first.time, last.time));
         }
         self.slips_seen += 1;
-        let end = Instant {
+        let end = RunningTotals {
             slipping: self.span.last_slip_end.slipping + (last.time - first.time),
             ..last
         };
@@ -236,7 +236,7 @@ impl SlipObserver {
         self.last_onset = Some(onset.time);
         self.peaks_since.slip = self.peaks_since.last_break;
         self.peaks_since.precursor = self.peaks_since.last_break;
-        self.pending = Pending::default();
+        self.pending = PendingPrecursors::default();
     }
 
     /// The row of a slip; drops are found at the end.
@@ -289,7 +289,7 @@ impl SlipObserver {
     }
 
     /// Displacement of the driven edge at an instant since the last slip's end, from the force and the drive, in m.
-    fn edge_displacement(&self, at: Instant) -> f64 {
+    fn edge_displacement(&self, at: RunningTotals) -> f64 {
         let drive = self.drive_at(at.time);
         drive.motion(at.time).0 - at.force / drive.stiffness
     }
@@ -358,7 +358,7 @@ impl Observer for SlipObserver {
             drops.advance(segment);
         }
         let impulse = self.now.impulse + segment.impulse();
-        self.now = Instant {
+        self.now = RunningTotals {
             time: segment.end(),
             force: segment.end_force(),
             impulse,

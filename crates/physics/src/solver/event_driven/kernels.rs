@@ -1,10 +1,10 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
 use super::grid::{Grid, GridStep, advance, velocity};
-use super::leap::{Bounds, Plan, Split, leap};
+use super::leap::{LeapBounds, PlannedLeap, Split, leap};
 use super::moving_frame::StepDrive;
 use super::slider::{Chain, Slider, State};
-use super::taylor::{Series, StepInput, evaluate, expand, reachable};
+use super::taylor::{StepInput, TaylorSeries, evaluate, expand, reachable};
 use crate::model::simd::Simd;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;
@@ -33,18 +33,18 @@ macro_rules! kernels {
 
 kernels! {
     /// Expands the state into a series; false if it does not converge within the largest order; see [`expand`].
-    fn expand(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool = expand::<S, R>;
+    fn expand(chain: &Chain, state: &State, input: &StepInput, series: &mut TaylorSeries) -> bool = expand::<S, R>;
     /// State at s in [0, 1] of a step of `length` s.
-    fn evaluate(series: &Series, s: f64, length: f64, state: &mut State) -> () = evaluate::<S, R>;
+    fn evaluate(series: &TaylorSeries, s: f64, length: f64, state: &mut State) -> () = evaluate::<S, R>;
     /// Row and lane of every block that may reach a break position within the step.
-    fn reachable(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) -> () = reachable::<S, R>;
+    fn reachable(chain: &Chain, series: &mut TaylorSeries, blocks: &mut Vec<(usize, usize)>) -> () = reachable::<S, R>;
     /// Takes up to `steps` steps of the grid; see [`advance`].
     fn advance(slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize = advance::<S, R>;
     /// Writes the velocities of a motion on the grid; see [`velocity`].
     fn velocity(chain: &Chain, step: &mut GridStep, drive: &StepDrive, state: &mut State) -> () = velocity::<S, R>;
     /// Tries to leap; see [`leap`].
-    fn leap(split: &mut Split, slider: &mut Slider, drive: &Harmonic, bounds: Bounds, audit: Option<&Audit>)
-        -> Result<Plan, f64> = leap::<S>;
+    fn leap(split: &mut Split, slider: &mut Slider, drive: &Harmonic, bounds: LeapBounds, audit: Option<&Audit>)
+        -> Result<PlannedLeap, f64> = leap::<S>;
 }
 
 /// The fastest loops that this processor can run for this many rows.

@@ -21,9 +21,9 @@ mod tolerances;
 
 use self::grid::Grid;
 use self::kernels::Kernels;
-use self::leap::{Bounds, Plan, Split};
-use self::moving_frame::Frame;
-use self::slider::{Layout, Slider};
+use self::leap::{LeapBounds, PlannedLeap, Split};
+use self::moving_frame::MovingFrame;
+use self::slider::{BlockLayout, Slider};
 use self::taylor::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
@@ -92,7 +92,7 @@ pub(super) fn run(
     let Solver {
         tolerance, resolve, ..
     } = solver;
-    let rows = Layout::new(parameters.blocks).rows;
+    let rows = BlockLayout::new(parameters.blocks).rows;
     let is_possible = resolve == Resolve::Grid || Grid::is_resolved(parameters, tolerance);
     let takes_grid = resolve.takes_grid(tolerance) && is_possible;
     let kernels = kernels::fastest(rows);
@@ -104,7 +104,7 @@ struct Integration<'a> {
     limits: Limits<'a>,
     kernels: Box<dyn Kernels>,
     tolerances: Tolerances,
-    frame: Frame,
+    frame: MovingFrame,
     slider: Slider,
     control: StepControl,
     step: Step,
@@ -143,7 +143,7 @@ impl<'a> Integration<'a> {
             limits,
             kernels,
             tolerances,
-            frame: Frame::new(Drive::new(parameters), span),
+            frame: MovingFrame::new(Drive::new(parameters), span),
             takes_grid,
             grid: Grid::new(parameters, tolerance, &slider.chain, &slider.state),
             split: Split::new(&slider.chain),
@@ -267,7 +267,7 @@ impl<'a> Integration<'a> {
             Some(_) => f64::INFINITY,
             None => self.frame.until(self.frame.drive.cycle_end),
         };
-        let bounds = Bounds {
+        let bounds = LeapBounds {
             start: began,
             horizon: horizon.min(until_cycle_end),
             until_cycle_end,
@@ -315,7 +315,7 @@ impl<'a> Integration<'a> {
     /// driven solution what it passed from the grid.
     fn report_leap(
         &mut self,
-        leap: &Plan,
+        leap: &PlannedLeap,
         drive: &Harmonic,
         [start, began]: [f64; 2],
         observer: &mut dyn Observer,
@@ -438,7 +438,7 @@ mod tests {
             (&modulated, false),
         ] {
             let logs: Vec<(&str, Vec<ContactEvent>)> =
-                kernels::available(Layout::new(parameters.blocks).rows)
+                kernels::available(BlockLayout::new(parameters.blocks).rows)
                     .into_iter()
                     .map(|(name, kernels)| {
                         let limits = Limits {
@@ -546,7 +546,7 @@ mod tests {
                     events: u64::MAX,
                     interrupt: None,
                 };
-                let kernels = kernels::fastest(Layout::new(parameters.blocks).rows);
+                let kernels = kernels::fastest(BlockLayout::new(parameters.blocks).rows);
                 let recording = Recording {
                     discard: 0,
                     ..Recording::default()

@@ -87,7 +87,7 @@ impl StepDrive {
 
 /// The frame, and the drive in it.
 #[derive(Clone, Debug)]
-pub(super) struct Frame {
+pub(super) struct MovingFrame {
     pub drive: Drive,
     /// Time in the frame at which it moves, in s.
     pub span: f64,
@@ -102,7 +102,7 @@ pub(super) struct Frame {
     swing: [f64; 2],
 }
 
-impl Frame {
+impl MovingFrame {
     /// The frame at the start of a run, which moves at a time of `span` s in it.
     pub fn new(drive: Drive, span: f64) -> Self {
         Self {

@@ -13,12 +13,12 @@ use pulp::Scalar512b;
 pub(super) const FIRST_BLOCK: Row = Row([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
+pub(super) struct BlockLayout {
     pub blocks: usize,
     pub rows: usize,
 }
 
-impl Layout {
+impl BlockLayout {
     pub fn new(blocks: usize) -> Self {
         Self {
             blocks,
@@ -53,7 +53,7 @@ pub(super) struct State {
 /// The chain's coefficients in lanes, all divided by the block mass.
 #[derive(Clone, Debug)]
 pub(super) struct Chain {
-    pub layout: Layout,
+    pub layout: BlockLayout,
     /// Block mass m, in kg.
     pub mass: f64,
     /// Diagonal of S without contacts, in N/m.
@@ -75,7 +75,7 @@ pub(super) struct Chain {
 
 impl Chain {
     /// The chain without contacts, driven at block 1.
-    pub fn new(parameters: &Parameters, layout: Layout) -> Self {
+    pub fn new(parameters: &Parameters, layout: BlockLayout) -> Self {
         let mut chain = Self {
             layout,
             mass: parameters.block_mass(),
@@ -136,7 +136,7 @@ pub(super) struct Slider {
 impl Slider {
     /// At rest, with all contacts attached.
     pub fn new(parameters: &Parameters) -> Self {
-        let layout = Layout::new(parameters.blocks);
+        let layout = BlockLayout::new(parameters.blocks);
         let interface = Interface::new(parameters);
         let mut chain = Chain::new(parameters, layout);
         for block in 0..layout.blocks {

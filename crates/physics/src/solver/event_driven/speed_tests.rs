@@ -2,7 +2,7 @@
 //! the loops made the grid eight times as slow. The limits are far from what is measured, so that no load breaks them.
 
 use super::kernels::{self, available};
-use super::slider::Layout;
+use super::slider::BlockLayout;
 use super::{Integration, Kernels};
 use crate::model::Parameters;
 use crate::solver::{Limits, Observer, Solver, simulate};
@@ -46,7 +46,7 @@ fn ratio(runs: [&dyn Fn(); 2]) -> f64 {
 #[cfg_attr(debug_assertions, ignore = "speed of optimized code")]
 fn loops_for_this_processor_are_faster_than_those_for_any() {
     let parameters = Parameters::default();
-    let rows = Layout::new(parameters.blocks).rows;
+    let rows = BlockLayout::new(parameters.blocks).rows;
     if available(rows).len() == 1 {
         return;
     }

@@ -13,7 +13,7 @@ pub(super) use self::step::{GridStep, velocity};
 use self::contacts::{StepEvents, change_contacts};
 use self::history::ForceHistory;
 use self::step::{MAX_RUN, march};
-use super::moving_frame::{Frame, MIN_RESOLUTION, StepDrive};
+use super::moving_frame::{MIN_RESOLUTION, MovingFrame, StepDrive};
 use super::slider::{Chain, Slider, State};
 use super::taylor::StepInput;
 use super::{Integration, WORTHWHILE_GRID_LEAP};
@@ -101,7 +101,7 @@ impl Grid {
     }
 
     /// Takes over a frame that has moved.
-    pub fn follow_frame(&mut self, chain: &Chain, frame: &Frame) {
+    pub fn follow_frame(&mut self, chain: &Chain, frame: &MovingFrame) {
         self.step.update_all(chain);
         self.drive = frame.step_drive(self.step.length);
         self.step.turn = libm::sincos(self.drive.angle).into();

@@ -17,14 +17,14 @@
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
 use crate::solver::event_driven::moving_frame::StepDrive;
-use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, Layout, State};
+use crate::solver::event_driven::slider::{BlockLayout, Chain, FIRST_BLOCK, State};
 
 /// Longest run of steps without a look at the clock.
 pub(super) const MAX_RUN: usize = 64;
 
 /// Row and lane of a block and of those beside.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct BlockPlace {
     pub slot: (usize, usize),
     pub before: (usize, usize),
     pub after: (usize, usize),
@@ -32,8 +32,8 @@ pub(super) struct Place {
     pub shares: [f64; 2],
 }
 
-impl Place {
-    fn new(layout: Layout, block: usize) -> Self {
+impl BlockPlace {
+    fn new(layout: BlockLayout, block: usize) -> Self {
         let before = block.checked_sub(1);
         let after = Some(block + 1).filter(|after| *after < layout.blocks);
         let slot = |beside: Option<usize>| layout.slot(beside.unwrap_or(block));
@@ -112,7 +112,7 @@ pub struct GridStep {
     pub dissipation: [f64; 2],
     /// Row and lane of every block that reached a break position in the last step.
     pub reached: Vec<(usize, usize)>,
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<BlockPlace>,
     saved_displacement: Vec<Row>,
     saved_increment: Vec<Row>,
 }
@@ -154,7 +154,7 @@ impl GridStep {
             dissipation: [0.0; 2],
             reached: Vec::new(),
             places: (0..layout.blocks)
-                .map(|block| Place::new(layout, block))
+                .map(|block| BlockPlace::new(layout, block))
                 .collect(),
             saved_displacement: layout.filled(0.0),
             saved_increment: layout.filled(0.0),
@@ -227,7 +227,7 @@ impl GridStep {
         [own, beside]: [Correction; 2],
         displacement: &mut [Row],
     ) {
-        let Place {
+        let BlockPlace {
             slot,
             before,
             after,
@@ -253,7 +253,7 @@ impl GridStep {
     #[inline(always)]
     pub(super) fn rate_of_force(
         &self,
-        place: &Place,
+        place: &BlockPlace,
         rise: f64,
         beside: f64,
         drive: &StepDrive,
@@ -269,7 +269,7 @@ impl GridStep {
 
     /// φ of a block at the displacements of it, of both blocks beside together, and of the drive, in m.
     #[inline(always)]
-    pub(super) fn force_on(&self, place: &Place, here: f64, beside: f64, driven: f64) -> f64 {
+    pub(super) fn force_on(&self, place: &BlockPlace, here: f64, beside: f64, driven: f64) -> f64 {
         let (row, lane) = place.slot;
         let own = self.diagonal[row][lane].mul_add(here, self.pull[row][lane]);
         let pulls = if place.slot == (0, 0) {
@@ -614,7 +614,7 @@ pub fn velocity<S: Simd, const R: usize>(
 mod tests {
     use super::*;
     use crate::model::Drive;
-    use crate::solver::event_driven::moving_frame::{Frame, SPAN};
+    use crate::solver::event_driven::moving_frame::{MovingFrame, SPAN};
     use crate::solver::event_driven::slider::Slider;
     use pulp::Scalar512b as Baseline;
 
@@ -647,7 +647,7 @@ mod tests {
         (
             slider,
             step,
-            Frame::new(Drive::new(parameters), SPAN).step_drive(length),
+            MovingFrame::new(Drive::new(parameters), SPAN).step_drive(length),
         )
     }
 

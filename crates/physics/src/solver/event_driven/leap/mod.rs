@@ -34,7 +34,7 @@ const ASTRAY: f64 = 2.0 * LOOSE + PASSED_SHARE;
 
 /// A leap that may be taken.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plan {
+pub(super) struct PlannedLeap {
     /// The shear force on the way, in N, and how long that is, in s.
     pub force: Harmonic,
     pub duration: f64,
@@ -45,7 +45,7 @@ pub(super) struct Plan {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
+pub(super) struct LeapBounds {
     /// When it starts, in s in the frame.
     pub start: f64,
     /// Time to the next reattachment that is not passed or to the end, in s.
@@ -70,12 +70,12 @@ fn passing_horizon(
     split: &Split,
     (chain, interface): (&Chain, &mut Interface),
     drive: &Harmonic,
-    Bounds {
+    LeapBounds {
         start,
         until_cycle_end,
         error,
         ..
-    }: Bounds,
+    }: LeapBounds,
     least: f64,
     largest: f64,
 ) -> Result<f64, f64> {
@@ -125,9 +125,9 @@ fn plan<S: Simd>(
     interface: &mut Interface,
     drive: &Harmonic,
     largest: f64,
-    bounds: Bounds,
-) -> Result<Plan, f64> {
-    let Bounds { horizon, error, .. } = bounds;
+    bounds: LeapBounds,
+) -> Result<PlannedLeap, f64> {
+    let LeapBounds { horizon, error, .. } = bounds;
     // Worth another try after some e-foldings of the free motion, or after the next event.
     let wait = (0.7 / split.decay_rate).min(horizon);
     let decay = if largest <= error {
@@ -168,7 +168,7 @@ fn plan<S: Simd>(
     {
         return Err(wait);
     }
-    Ok(Plan {
+    Ok(PlannedLeap {
         force,
         duration: elapsed,
         reached,
@@ -186,13 +186,13 @@ fn hides_no_peak<S: Simd>(
     drive: &Harmonic,
     segment: &Segment<'static>,
     [moving, left]: [f64; 2],
-    Bounds {
+    LeapBounds {
         start,
         horizon,
         until_cycle_end,
         largest_force,
         ..
-    }: Bounds,
+    }: LeapBounds,
 ) -> bool {
     let swing = chain.drive_stiffness * split.rows[0].bound[0];
     let driven = |seconds: f64| Segment {
@@ -247,9 +247,9 @@ pub(super) fn leap<S: Simd>(
         interface,
     }: &mut Slider,
     drive: &Harmonic,
-    mut bounds: Bounds,
+    mut bounds: LeapBounds,
     audit: Option<&Audit>,
-) -> Result<Plan, f64> {
+) -> Result<PlannedLeap, f64> {
     let largest = split
         .update(simd, chain, drive, state)
         .ok_or((2.0 / chain.damping_rate).min(bounds.horizon))?;

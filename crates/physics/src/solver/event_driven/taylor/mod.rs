@@ -11,11 +11,11 @@
 
 mod series;
 
-pub(super) use self::series::{Series, StepInput, evaluate, expand, reachable};
+pub(super) use self::series::{StepInput, TaylorSeries, evaluate, expand, reachable};
 
 use super::Integration;
 use super::event::{own_terms, term_beside};
-use super::slider::{Chain, Layout, Slider};
+use super::slider::{BlockLayout, Chain, Slider};
 use crate::model::Change;
 use crate::solver::ledger::Audit;
 use crate::solver::polynomial;
@@ -71,7 +71,7 @@ pub(super) struct Step {
     /// Its first instant in the frame and its length, in s.
     start: f64,
     pub length: f64,
-    pub series: Series,
+    pub series: TaylorSeries,
     /// Coefficients of F_S over the step, in N.
     force: Vec<f64>,
     /// Bound on the second derivative of F_S by s, in N.
@@ -87,9 +87,9 @@ pub(super) struct Step {
 }
 
 impl Step {
-    pub fn new(layout: Layout) -> Self {
+    pub fn new(layout: BlockLayout) -> Self {
         Self {
-            series: Series::new(layout),
+            series: TaylorSeries::new(layout),
             ..Self::default()
         }
     }

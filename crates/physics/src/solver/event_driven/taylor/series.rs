@@ -9,7 +9,7 @@
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::event_driven::moving_frame::StepDrive;
-use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, Layout, State};
+use crate::solver::event_driven::slider::{BlockLayout, Chain, FIRST_BLOCK, State};
 use crate::solver::polynomial::{INVERSE, MAX_COEFFICIENTS};
 use pulp::Scalar512b;
 
@@ -32,7 +32,7 @@ const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
 
 /// The series of one step.
 #[derive(Clone, Debug, Default)]
-pub struct Series {
+pub struct TaylorSeries {
     pub rows: usize,
     /// Rows of Y_0, then of Y_1, and so on, in m.
     pub terms: Vec<Row>,
@@ -44,8 +44,8 @@ pub struct Series {
     pub order: usize,
 }
 
-impl Series {
-    pub fn new(layout: Layout) -> Self {
+impl TaylorSeries {
+    pub fn new(layout: BlockLayout) -> Self {
         Self {
             rows: layout.rows,
             terms: vec![Row::filled(0.0); layout.rows * MAX_COEFFICIENTS],
@@ -129,7 +129,7 @@ impl Series {
 #[inline(always)]
 pub fn evaluate<S: Simd, const R: usize>(
     simd: S,
-    series: &Series,
+    series: &TaylorSeries,
     s: f64,
     length: f64,
     state: &mut State,
@@ -174,7 +174,7 @@ pub fn evaluate<S: Simd, const R: usize>(
 pub fn reachable<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
-    series: &mut Series,
+    series: &mut TaylorSeries,
     blocks: &mut Vec<(usize, usize)>,
 ) {
     let rows = series.rows_in::<R>();
@@ -226,10 +226,10 @@ pub fn expand<S: Simd, const R: usize>(
     chain: &Chain,
     state: &State,
     input: &StepInput,
-    series: &mut Series,
+    series: &mut TaylorSeries,
 ) -> bool {
     let rows = series.rows_in::<R>();
-    let Series {
+    let TaylorSeries {
         terms,
         coupling,
         diagonal,
