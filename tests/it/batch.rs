@@ -420,12 +420,12 @@ fn a_worker_whose_time_is_over_ends_well() {
     let folder = Folder::new();
     folder.write(
         "many.toml",
-        &MANY.replace("count = 28000", "count = 1000000"),
+        &MANY.replace("count = 28000", "count = 3000000"),
     );
     folder.ends(3, "run many.toml --no-reduce --out r --walltime 3s");
     let ended = folder.ends(
         0,
-        "run many.toml --no-reduce --out r --worker --walltime 3s",
+        "run many.toml --no-reduce --out r --worker --walltime 6s",
     );
     assert!(ended.stderr.contains("stopped with"), "{}", ended.stderr);
     let nothing = folder.ends(
