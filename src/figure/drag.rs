@@ -109,7 +109,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     }));
     let lines = multiples().map(|n| Layer::Curve(line(n).into(), GRID));
     let lines = Layer::Inside(lines.chain(dots).collect());
-    let tau = Axis::linear(&format!("RampedSlip interval τ ({unit})"), taus.0, taus.1);
+    let tau = Axis::linear(&format!("Slip interval τ ({unit})"), taus.0, taus.1);
     let upper = Panel::new(320.0, x.clone(), tau, vec![lines, numbers]);
     let ratio = Axis::linear("Median and quartiles of τ / T", least - 0.3, most + 0.3);
     let levels = multiples().map(|n| Layer::Level(n, GRID));
