@@ -21,9 +21,9 @@ use tempfile::TempDir;
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
 const RESULTS: &str = "results";
-pub const RUN_FOLDERS: [&str; 7] = [
-    "staging", "lock", "log", "workers", "claims", "spill", "batch",
-];
+pub const RUN_FOLDERS: [&str; 6] = ["staging", "log", "workers", "claims", "spill", "batch"];
+/// Staging folder of all commands but workers.
+const COMMANDS: &str = "reduce";
 const EXTENSION: &str = "extension-";
 
 #[derive(Clone)]
@@ -32,6 +32,8 @@ pub struct Layout<'a> {
     root: PathBuf,
     /// Where reduced data lie, if not in the directory.
     pub(super) elsewhere: Option<Arc<TempDir>>,
+    /// The worker that works on it, if one does.
+    pub(super) worker: Option<Arc<str>>,
 }
 
 impl fmt::Debug for Layout<'_> {
@@ -48,6 +50,7 @@ impl<'a> Layout<'a> {
             storage,
             root: root.to_owned(),
             elsewhere: None,
+            worker: None,
         }
     }
 
@@ -113,10 +116,6 @@ impl<'a> Layout<'a> {
         self.reduced_root().join("reduced")
     }
 
-    pub fn locks(&self) -> PathBuf {
-        self.reduced_root().join("run/lock")
-    }
-
     pub fn reduced_file(&self, table: &str) -> PathBuf {
         self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
     }
@@ -163,6 +162,23 @@ impl<'a> Layout<'a> {
             return Err(StorageError::at("remove anything in it", link)(problem));
         }
         Ok(())
+    }
+
+    /// The same for a worker, which stages in a folder of its own.
+    pub(super) fn of_worker(&self, name: &str) -> Self {
+        Self {
+            worker: Some(name.into()),
+            ..self.clone()
+        }
+    }
+
+    pub(super) const fn is_of_worker(&self) -> bool {
+        self.worker.is_some()
+    }
+
+    /// The name of the staging folder of what is made from tables.
+    pub fn writer(&self) -> &str {
+        self.worker.as_deref().unwrap_or(COMMANDS)
     }
 
     /// Where one writer, known by a name of its own, prepares files.
