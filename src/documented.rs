@@ -7,7 +7,7 @@ use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, RoundOfSet, SetRo
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::solver::{Solver, SolverKey};
 use crate::table::Table;
-use crate::table::columns::{Column, Kind, Row};
+use crate::table::columns::{Class, Column, Kind, Row};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -87,6 +87,7 @@ pub(crate) fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> Str
         let without_symbol = |column: &Column| Column {
             symbol: "",
             words: "",
+            class: Class::Plain,
             ..column.clone()
         };
         let is_same = |known: &Column| without_symbol(known) == without_symbol(column);
@@ -96,16 +97,9 @@ pub(crate) fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> Str
     };
     let share_a_line = |one: &Column, next: &Column| {
         let is_known = |column| earlier_table(column).is_some();
-        let is_interval = next.meaning.starts_with(INTERVAL)
-            && next.name.strip_suffix("_low") == Some(&*one.name);
-        let is_pair = one
-            .name
-            .strip_suffix("_low")
-            .is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
         (is_known(one) && is_known(next) && earlier_table(one) == earlier_table(next))
             || (is_parameter(one) && is_parameter(next))
-            || is_interval
-            || (is_pair && one.meaning.starts_with(INTERVAL))
+            || next.is_end()
     };
     let line = |columns: &[Column]| {
         let names: Vec<String> = columns

@@ -263,7 +263,11 @@ fn chosen_columns(
     for name in chosen {
         columns.push(match Values::of(all, name) {
             Ok(mut values) => {
-                if values.sources.iter().all(|source| source != values.name()) {
+                if values
+                    .sources
+                    .iter()
+                    .all(|source| source.name != values.name())
+                {
                     add_intervals(results, rows, &mut values)?;
                 }
                 values
@@ -343,7 +347,7 @@ fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
 
 /// Adds a column of the first sets.
 fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: usize) {
-    let label = values.label();
+    let label = &values.label;
     let is_interval = values.column.name == "tau_mean";
     let bound = |set: usize| rows.get(set).filter(|_| is_interval)?.tau_bound;
     let bounds = (0..values.numbers.len()).filter_map(bound);
@@ -361,7 +365,7 @@ fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: u
         },
     };
     let cells = (0..values.numbers.len().min(most)).map(cell);
-    columns.add(values.is_worded(), label.short(unit), cells);
+    columns.add(values.is_worded(), label.short(&unit), cells);
 }
 
 /// The parameters but one in which some rows differ.
@@ -463,7 +467,7 @@ fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
     }
     let number = |value: f64| digits.number(factor * value);
     columns.words("edge of", edges, EdgeRow::crossed);
-    columns.words(label.short(unit), edges, |edge| {
+    columns.words(label.short(&unit), edges, |edge| {
         edge.edge
             .map_or_else(|| side(edge, sets).to_owned(), number)
     });
@@ -502,7 +506,7 @@ fn table_of_pairs(pairs: &[EdgePair]) -> String {
     let (factor, unit) = label.scale(largest);
     columns.words("edge of", pairs, |pair| pair.edges[1].crossed());
     columns.words("less that of", pairs, |pair| pair.edges[0].crossed());
-    columns.words(label.short(unit), pairs, |pair| {
+    columns.words(label.short(&unit), pairs, |pair| {
         let [low, high] = pair.interval.map_or([f64::NAN; 2], |(low, high)| {
             [low, high].map(|end| factor * end)
         });

@@ -12,10 +12,13 @@ use super::values::Values;
 use crate::model::{Parameters, Symbol};
 use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
-use crate::sets::{SetRow, column_of};
+use crate::sets::{Label, SetRow, column_of, label};
 use crate::table::columns::Kind;
 use std::collections::{BTreeMap, HashMap};
 
+/// What the labels of both sides end with.
+const OF_A: &str = ", A";
+const OF_B: &str = ", B";
 /// What is compared: columns of the sets.
 const STATISTICS: [&str; 3] = ["tau_mean", "mean_friction", "resultant_length"];
 
@@ -104,6 +107,43 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
 }
 
+/// A statistic in A, in B, and by how much more in B, with its interval; all in one unit.
+fn compared(
+    name: &str,
+    sets: &[(&FinishedSet, &FinishedSet)],
+    have_common_seeds: bool,
+) -> [Values; 3] {
+    let of = |set: &FinishedSet| set.estimates.get(name).cloned();
+    let difference = |(a, b): &(&FinishedSet, &FinishedSet)| {
+        let in_a = of(a).map(|a| if have_common_seeds { a } else { a.apart() });
+        let difference = of(b).zip(in_a);
+        let difference = difference.map(|(b, a)| Estimate::function([&b, &a], |[b, a]| b - a));
+        Estimate::both(difference.as_ref())
+    };
+    let number = |set: &FinishedSet| (of(set).map(|found| found.value), None);
+    let column = |which, words, found: Vec<_>| {
+        let label = label(name).with(words);
+        Values::computed(&format!("{name}_{which}"), label, Kind::Real, found)
+    };
+    let mut columns = [
+        column("a", OF_A, sets.iter().map(|(a, _)| number(a)).collect()),
+        column("b", OF_B, sets.iter().map(|(_, b)| number(b)).collect()),
+        column(
+            "difference",
+            ", B − A",
+            sets.iter().map(difference).collect(),
+        ),
+    ];
+    let largest = columns
+        .iter()
+        .map(|column| column.largest)
+        .fold(0.0, f64::max);
+    for column in &mut columns {
+        column.largest = largest;
+    }
+    columns
+}
+
 pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsError> {
     let sets_of_a = sets_in(a)?;
     let sets_of_b = sets_in(b)?;
@@ -133,41 +173,16 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsEr
     let of_pair = |pair: &Pair<'_>| (&found_in_a[&pair.a.set_id], &found_in_b[&pair.b.set_id]);
     let sets: Vec<(&FinishedSet, &FinishedSet)> = pairs.iter().map(of_pair).collect();
 
-    let seeds = |name: &str, count: fn(&Pair<'_>) -> usize| {
+    let seeds = |name: &str, words: &str, count: fn(&Pair<'_>) -> usize| {
         let counts = pairs.iter().map(|pair| (Some(count(pair) as f64), None));
-        Values::computed(name, Kind::Count, counts)
+        Values::computed(name, Label::new("seeds").with(words), Kind::Count, counts)
     };
     let mut found = vec![
-        seeds("seeds_a", |pair| pair.seeds_of_a.len()),
-        seeds("seeds_b", |pair| pair.seeds_of_b.len()),
+        seeds("seeds_a", OF_A, |pair| pair.seeds_of_a.len()),
+        seeds("seeds_b", OF_B, |pair| pair.seeds_of_b.len()),
     ];
-    for name in STATISTICS {
-        let of = |set: &FinishedSet| set.estimates.get(name).cloned();
-        let difference = |(a, b): &(&FinishedSet, &FinishedSet)| {
-            let in_a = of(a).map(|a| if have_common_seeds { a } else { a.apart() });
-            let difference = of(b).zip(in_a);
-            let difference = difference.map(|(b, a)| Estimate::function([&b, &a], |[b, a]| b - a));
-            Estimate::both(difference.as_ref())
-        };
-        let number = |set: &FinishedSet| (of(set).map(|found| found.value), None);
-        let in_a = sets.iter().map(|(a, _)| number(a));
-        let in_b = sets.iter().map(|(_, b)| number(b));
-        let differences = sets.iter().map(difference);
-        let name = |which| format!("{name}_{which}");
-        let mut of_statistic = [
-            Values::computed(&name("a"), Kind::Real, in_a),
-            Values::computed(&name("b"), Kind::Real, in_b),
-            Values::computed(&name("difference"), Kind::Real, differences),
-        ];
-        let largest = of_statistic
-            .iter()
-            .map(|values| values.largest)
-            .fold(0.0, f64::max);
-        for values in &mut of_statistic {
-            values.largest = largest;
-        }
-        found.extend(of_statistic);
-    }
+    let compared = STATISTICS.map(|name| compared(name, &sets, have_common_seeds));
+    found.extend(compared.into_iter().flatten());
     found.retain(|values| values.numbers.iter().any(Option::is_some));
     let of_a: Vec<SetRow> = sets.iter().map(|(a, _)| a.row.clone()).collect();
     let of_b: Vec<SetRow> = sets.iter().map(|(_, b)| b.row.clone()).collect();

@@ -98,7 +98,7 @@ pub fn add_intervals(
     let is_measured = values
         .sources
         .iter()
-        .any(|name| Statistic::from_key(name).is_some());
+        .any(|source| Statistic::from_key(&source.name).is_some());
     let Some(formula) = formula(values.name(), &columns)
         .ok()
         .filter(|_| is_measured && has_jobs)
@@ -116,9 +116,7 @@ pub fn add_intervals(
                 return Ok(());
             };
             let set = set.finish_with(explained).0;
-            let of = names
-                .iter()
-                .map(|column| set.estimate(&columns[*column].name));
+            let of = names.iter().map(|column| set.estimate(&columns[*column]));
             let found = of.collect::<Option<Vec<_>>>().map(|of| {
                 let value = |values: &[f64]| {
                     let known: HashMap<usize, f64> =

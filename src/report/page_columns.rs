@@ -5,7 +5,7 @@ use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, read_sets, 
 use crate::results::layout::Layout;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
-use crate::sets::{Label, label};
+use crate::sets::Label;
 use crate::sweep::Sweep;
 use crate::table::Table;
 use crate::table::columns::{Column, Row, Value};
@@ -38,7 +38,8 @@ impl Columns {
             let Column { name, unit, .. } = column;
             let meaning = column.meaning;
             let kind = column.kind.word();
-            json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind })
+            let is_end = column.is_end();
+            json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind, "is_end": is_end, "by_drive": column.class.explained() })
         };
         let shown = all.iter().filter(|column| column.0);
         let described: Vec<Json> = shown.map(described).collect();
@@ -51,14 +52,15 @@ impl Columns {
 
     /// Gives each column its label in the unit in which its values are read best, and the factor to that; no unit to one
     /// without values.
-    fn label(&mut self, label: impl Fn(&Column) -> Label) {
-        let shown = self.all.iter().filter(|column| column.0);
-        let labels = shown.map(|column| label(&column.1));
+    fn label(&mut self) {
+        let columns: Vec<Column> = self.all.iter().map(|(_, column)| column.clone()).collect();
+        let shown = (0..columns.len()).filter(|&place| self.all[place].0);
+        let labels = shown.map(|place| Label::of(&columns, place));
         for ((column, values), label) in self.described.iter_mut().zip(&self.values).zip(labels) {
             let sizes = values.iter().filter_map(Json::as_f64).map(f64::abs);
             let largest = sizes.reduce(f64::max);
-            let (factor, unit) = largest.map_or((1.0, ""), |largest| label.scale(largest));
-            column["label"] = label.axis(unit).into();
+            let (factor, unit) = largest.map_or((1.0, "".into()), |largest| label.scale(largest));
+            column["label"] = label.axis(&unit).into();
             column["symbol"] = label.symbol.into();
             column["unit"] = unit.into();
             column["factor"] = factor.into();
@@ -167,7 +169,7 @@ impl Sets {
                 shown.push(row);
             }
         }
-        sets.columns.label(|column| label(&column.name));
+        sets.columns.label();
         for swept in &swept(&shown) {
             let name = swept.name().to_owned();
             sets.swept.push((name, swept.is_logarithmic()));
@@ -241,11 +243,7 @@ impl Slips {
             slips.job.push(slips.jobs.len() - 1);
             slips.columns.push(&slip, rounded);
         }
-        slips.columns.label(|column| Label {
-            symbol: column.symbol.to_owned(),
-            what: column.words.to_owned(),
-            unit: column.unit,
-        });
+        slips.columns.label();
         Ok(slips)
     }
 }
