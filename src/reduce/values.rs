@@ -104,7 +104,7 @@ impl Values {
         columns: &[Column],
         found: impl Iterator<Item = (Option<f64>, Option<(f64, f64)>)>,
     ) -> Self {
-        let label = Label::of_formula(text, columns, unit_of_formula(formula, columns).to_owned());
+        let label = Label::of_formula(text, columns, unit_of_formula(formula, columns));
         let names = formula.names().into_iter();
         Self {
             sources: names.map(|&place| columns[place].clone()).collect(),
