@@ -44,7 +44,7 @@ impl<'a> Results<'a> {
             }
             // In this order: a living worker that was taken for dead can commit nothing any more. Its files of
             // unfinished parts must go, since their jobs now belong to the new sweep.
-            member.tidy()?;
+            member.tidy(false)?;
             let done = found.done_parts()?;
             found.remove_unfinished(&done)?;
             if let Some(begun) = found.extended(sweep, &done).write_last(member)? {

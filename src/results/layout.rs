@@ -21,8 +21,8 @@ use tempfile::TempDir;
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
 const RESULTS: &str = "results";
-pub const RUN_FOLDERS: [&str; 8] = [
-    "staging", "lock", "log", "workers", "claims", "spill", "batch", "deaths",
+pub const RUN_FOLDERS: [&str; 7] = [
+    "staging", "lock", "log", "workers", "claims", "spill", "batch",
 ];
 const EXTENSION: &str = "extension-";
 
@@ -218,8 +218,6 @@ places! {
     report = "report.html";
     run = RUN;
     claims = "run/claims";
-    /// The parts that dead workers were at.
-    deaths = "run/deaths";
     /// Second copies of the files of extensions.
     copies = "run/copies";
     logs = "run/log";

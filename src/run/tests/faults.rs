@@ -127,7 +127,6 @@ pub fn results(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<&Path, &[u8]> {
             "run/staging",
             "run/workers",
             "run/claims",
-            "run/deaths",
         ]
         .iter()
         .any(|folder| path.starts_with(folder))
