@@ -1,4 +1,4 @@
-//! Claims: which worker runs a part, or reduces, so that nothing is done twice.
+//! Claims: which worker runs a part, reduces, or decides a round, so that nothing is done twice.
 //!
 //! `run/claims/<what>.<generation>` is a link to a file with the worker's name: of several workers that make it, one
 //! wins. A worker that finds the winner dead makes the next generation. A claim stays while any worker runs, as a
@@ -85,6 +85,18 @@ impl<'a> Claims<'a> {
         }
         let living = living.get_key_value(&owner).map(|(name, _)| name.as_str());
         Ok(living.map_or(ClaimState::Free(generation + 1), ClaimState::Taken))
+    }
+
+    /// Claims what no living worker has; whether this worker has it.
+    pub fn take_free(member: &'a Member<'a>, what: &str) -> Result<bool, ResultsError> {
+        // In this order: a worker that has ended did before what it had claimed.
+        let others = member.others()?;
+        let mut claims = Self::list(member)?;
+        match claims.standing(what, &others)? {
+            ClaimState::Own => Ok(true),
+            ClaimState::Taken(_) => Ok(false),
+            ClaimState::Free(generation) => claims.take(what, generation),
+        }
     }
 
     /// Makes a claim; false if another worker was first.

@@ -254,7 +254,7 @@ impl<'a> Member<'a> {
         let name = format!("{PREFIX}{host}-{}-{number:016x}", worker.process);
         own().insert(name.clone(), std::thread::current().id());
         let member = Self {
-            layout: layout.clone(),
+            layout: layout.of_worker(&name),
             name,
             worker,
             begin: Instant::now(),
@@ -270,7 +270,7 @@ impl<'a> Member<'a> {
         }
     }
 
-    pub(super) const fn layout(&self) -> &Layout<'a> {
+    pub const fn layout(&self) -> &Layout<'a> {
         &self.layout
     }
 

@@ -180,6 +180,11 @@ impl Joined<'_> {
         Ok(report)
     }
 
+    /// The directory, in which this worker stages what it writes.
+    pub fn layout(&self) -> &Layout<'_> {
+        self.member.layout()
+    }
+
     /// Whether a signal came, or the time is over.
     fn must_end(&self) -> bool {
         self.options.stop.load(Ordering::Relaxed) || self.walltime.is_over()
