@@ -89,10 +89,7 @@ pub fn read(
     let layout = Layout::new(&Disk, &directory);
     let results = py.detach(|| Results::read(&layout)).map_err(Error::from)?;
     let columns = columns.as_deref();
-    let found = if let Some(table) = RecordedTable::ALL
-        .into_iter()
-        .find(|known| known.name() == table)
-    {
+    let found = if let Some(table) = RecordedTable::from_word(table) {
         let columns = columns_of_table(&results, table, columns, join)?;
         watched::<_, ()>(
             py,
@@ -144,7 +141,7 @@ fn columns_of_table(
     let is_own = |field: &FieldRef| recorded.field_with_name(field.name()).is_ok();
     let mut all = JoinedTable::columns(results, table);
     if let Some(names) = names {
-        let mut chosen = named(table.name(), &all, names)?;
+        let mut chosen = named(table.word(), &all, names)?;
         all.retain(|field| join && !is_own(field) && !chosen.contains(field));
         chosen.append(&mut all);
         return Ok(chosen);
@@ -175,7 +172,7 @@ fn read_table(
         })?;
     }
     Ok(Table::new(
-        table.name(),
+        table.word(),
         SchemaRef::clone(joined.schema()),
         batches,
     ))

@@ -305,7 +305,7 @@ impl<'a> Results<'a> {
     /// The file of a part of a table, below the tables or the spill.
     pub(super) fn file_in(&self, place: &Path, table: RecordedTable, part: PartName) -> DataFile {
         DataFile {
-            path: place.join(table.name()).join(part.file()),
+            path: place.join(table.word()).join(part.file()),
             rows: 0..=u64::MAX,
             footer: Arc::clone(&self.footers[part.extension]),
         }
@@ -328,7 +328,7 @@ impl<'a> Results<'a> {
         let layout = &self.layout;
         let spill = layout.spill();
         for above in [layout.tables(), spill.clone()] {
-            for folder in RecordedTable::ALL.map(|table| above.join(table.name())) {
+            for folder in RecordedTable::ALL.map(|table| above.join(table.word())) {
                 let mut parts = layout.parts_in(&folder)?;
                 // A worker that begins the same sweep now may run parts of the next extension.
                 parts.retain(|part| part.extension < self.extensions.len());

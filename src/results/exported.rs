@@ -73,7 +73,7 @@ impl Results<'_> {
         let joined = |table| JoinedTable::new(self, table, &self.exported_columns(table));
         let joined = self
             .tables()
-            .map(|table| (table.name(), Some(joined(table))));
+            .map(|table| (table.word(), Some(joined(table))));
         let optional = self.optional_tables().into_iter();
         let optional = optional.filter_map(|(table, is_there)| is_there.then_some(table));
         let reduced = iter::once("sets")
@@ -111,7 +111,7 @@ impl Results<'_> {
                 }
             }
             writer.finish()?;
-            if table == RecordedTable::Jobs.name() {
+            if table == RecordedTable::Jobs.word() {
                 exported.jobs = rows;
             }
             let bytes = storage.length(&path)?;

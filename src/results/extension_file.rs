@@ -63,7 +63,7 @@ fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
     let columns = |table: RecordedTable| {
         let schema = table.schema(sweep);
         let names = schema.fields().iter().map(|field| field.name().clone());
-        (table.name().to_owned(), names.collect())
+        (table.word().to_owned(), names.collect())
     };
     RecordedTable::of(sweep.recording()).map(columns).collect()
 }

@@ -84,7 +84,7 @@ impl<'a> Layout<'a> {
     }
 
     pub fn table(&self, table: RecordedTable) -> PathBuf {
-        self.tables().join(table.name())
+        self.tables().join(table.word())
     }
 
     /// The names in a folder; none where another program's file stands in its place.

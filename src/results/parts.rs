@@ -195,7 +195,7 @@ impl RowsOfJob {
         let rows = match table {
             RecordedTable::Slips => self.slips,
             RecordedTable::Precursors => self.precursors,
-            RecordedTable::Jobs => Some(1),
+            RecordedTable::Jobs => return 1..=1,
         };
         let least = rows.unwrap_or(0);
         match self.outcome {

@@ -345,7 +345,7 @@ impl Results<'_> {
     ) -> Result<BTreeSet<PartName>, ResultsError> {
         Ok(self
             .layout()
-            .parts_in(&self.layout().spill().join(table.name()))?)
+            .parts_in(&self.layout().spill().join(table.word()))?)
     }
 
     /// The ids in a file of the spill; `None` if this host does not see it yet.

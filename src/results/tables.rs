@@ -8,8 +8,8 @@ use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
 use crate::sweep::Sweep;
 use crate::table::arrow::{Gaps, RowBuffer};
 use crate::table::columns::{Row as _, columns};
+use crate::table::tables;
 use crate::table::value::words;
-use crate::table::{Table, tables};
 use arrow_schema::SchemaRef;
 use std::borrow::Cow;
 
@@ -81,26 +81,17 @@ impl Selection for All {
 /// What every row says about its job: names, parameters, η.
 pub type JobLabel<S> = (Names, Selected<S>, Loading);
 
-/// A table that jobs write, that of the jobs last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum RecordedTable {
-    Slips,
-    Precursors,
-    Jobs,
+words! {
+    /// A table that jobs write, that of the jobs last. Its word is also the name of its folder.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum RecordedTable {
+        Slips = "slips",
+        Precursors = "precursors",
+        Jobs = "jobs",
+    }
 }
 
 impl RecordedTable {
-    pub const ALL: [Self; 3] = [Self::Slips, Self::Precursors, Self::Jobs];
-
-    /// Its name, and that of its folder.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Slips => <SlipRow<'_> as Table>::NAME,
-            Self::Precursors => <PrecursorRow<'_> as Table>::NAME,
-            Self::Jobs => JobRow::NAME,
-        }
-    }
-
     const fn is_recorded(self, recording: &Recording) -> bool {
         match self {
             Self::Precursors => recording.precursors,
@@ -184,9 +175,9 @@ pub type PrecursorRow<'a> = (Cow<'a, JobLabel<DriveAndSeed>>, Cow<'a, Precursor>
 pub type JobRow = (JobLabel<All>, JobRecord);
 
 tables! {
-    SlipRow<'_> = "slips", "One row per slip past start-up";
-    PrecursorRow<'_> = "precursors", "One row per precursor of a recorded slip; only if the sweep records precursors";
-    JobRow = "jobs", "One row per job";
+    SlipRow<'_> = RecordedTable::Slips.word(), "One row per slip past start-up";
+    PrecursorRow<'_> = RecordedTable::Precursors.word(), "One row per precursor of a recorded slip; only if the sweep records precursors";
+    JobRow = RecordedTable::Jobs.word(), "One row per job";
 }
 
 columns! {

@@ -165,7 +165,7 @@ fn table_files(
 fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), ResultsError> {
     let layout = results.layout();
     for name in layout.storage.list(&layout.tables())? {
-        if !results.tables().any(|table| name == table.name()) {
+        if !results.tables().any(|table| name == table.word()) {
             let path = layout.tables().join(name);
             found.passed_over.push(shown(&path).to_string());
         }

@@ -70,7 +70,7 @@ pub(crate) fn of_other_versions(text: &str, column: &str) -> String {
     (record.model_version, record.plan_version) = (0, 0);
     record
         .tables
-        .get_mut(RecordedTable::Jobs.name())
+        .get_mut(RecordedTable::Jobs.word())
         .unwrap()
         .retain(|other| other != column);
     record.text()
