@@ -32,7 +32,7 @@
 //! | part | consecutive jobs of an extension, committed together |
 //! | outline | a part without its jobs: where they lie, and their sums |
 //! | worker | a process that works on a results directory, beside others |
-//! | claim | which worker runs a part |
+//! | claim | which worker runs a part, reduces or decides a round |
 //! | shard | a share of the parts, run into a separate directory |
 
 pub mod accuracy;

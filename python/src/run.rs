@@ -146,7 +146,7 @@ pub fn run(
                     let report =
                         joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
                     if reduce && report.jobs_left == 0 && !report.stopped {
-                        joined.reduce(|| reduce_and_draw(&layout, sweep.name()))?;
+                        joined.reduce(|| reduce_and_draw(joined.layout(), sweep.name()))?;
                     }
                     Ok(report)
                 },

@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new(threads, sweep.rounds().is_some());
     let report = crate::run::join(&layout, &sweep, options, |joined| {
-        work(joined, &sweep, &layout, arguments, &mut progress)
+        work(joined, &sweep, arguments, &mut progress)
     });
     let report = report.map_err(|error| match Exit::of(&error) {
         Exit::Stopped if progress.has_results() => {
@@ -140,10 +140,10 @@ impl Arguments {
 fn work(
     joined: &Joined<'_>,
     sweep: &Sweep,
-    layout: &Layout<'_>,
     arguments: &Arguments,
     progress: &mut Progress,
 ) -> Result<RunReport> {
+    let layout = joined.layout();
     let mut reporter = arguments.report.then(|| Reporter::new(layout));
     let recording = *sweep.recording();
     let solver = sweep.solver();
@@ -158,7 +158,7 @@ fn work(
     report.stopped |= is_cancelled();
     let is_complete = report.jobs_left == 0 && !report.stopped;
     let reduced = if is_complete && !arguments.no_reduce {
-        reduce_once(joined, layout, arguments)
+        reduce_once(joined, arguments)
     } else {
         Ok(None)
     };
@@ -188,11 +188,8 @@ fn work(
 }
 
 /// Reduces and draws, unless another worker does.
-fn reduce_once(
-    joined: &Joined<'_>,
-    layout: &Layout<'_>,
-    arguments: &Arguments,
-) -> Result<Option<Reduced>> {
+fn reduce_once(joined: &Joined<'_>, arguments: &Arguments) -> Result<Option<Reduced>> {
+    let layout = joined.layout();
     if arguments.shard.is_some() {
         return reduce_and_draw(layout);
     }

@@ -45,10 +45,10 @@ use self::chart::Rows;
 use self::quantity::{Quantity, distinct};
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
-    EdgeRow, SetRow, SlipOfSet, TriggerRow, WRITER, advise, means_of_slips, read_optional,
-    read_reduced, read_sets, sample_of_slips, swept,
+    EdgeRow, SetRow, SlipOfSet, TriggerRow, advise, means_of_slips, read_optional, read_reduced,
+    read_sets, sample_of_slips, swept,
 };
-use crate::results::commit::{Commit, exclusive_lock};
+use crate::results::commit::Commit;
 use crate::results::layout::Layout;
 use crate::results::tables::gaps;
 use crate::results::{Results, ResultsError};
@@ -142,7 +142,6 @@ pub fn draw_all(
     look: &Look,
     formats: &[PictureFormat],
 ) -> Result<Drawn> {
-    let _alone = exclusive_lock(layout, WRITER)?;
     let points = read(layout)?;
     let mut sets = sets_with_results(layout).map_err(advise(ADVICE))?;
     // Slips after a pulse have a figure of their own.
@@ -300,7 +299,6 @@ pub fn write_custom(
     look: &Look,
     formats: &[PictureFormat],
 ) -> Result<Vec<PathBuf>> {
-    let _alone = exclusive_lock(layout, WRITER)?;
     write(layout, &[picture], look, formats)
 }
 
@@ -352,7 +350,7 @@ fn write(
         .try_for_each(|picture| check_size(picture, look))?;
     let folder = layout.figures();
     layout.ensure_folder(&folder)?;
-    let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
+    let mut commit = Commit::begin(layout)?;
     let mut files = Vec::new();
     for picture in pictures {
         for &format in formats {

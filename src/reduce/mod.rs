@@ -36,7 +36,6 @@ pub use gather::{Point, RampStage, reduce_chosen};
 pub(crate) use pool::{Pool, PooledJob};
 #[cfg(test)]
 pub(crate) use reduction::RoundOfSet;
-pub(crate) use reduction::WRITER;
 pub use reduction::{
     HistogramBin, NoJobs, ReductionSummary, SetInRounds, advise, error_over_target, read_optional,
     read_reduced, read_sets, read_sets_in_rounds, reduce, renew,

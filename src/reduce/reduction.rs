@@ -9,7 +9,7 @@ use super::backbone::{Backbone, BackboneBin};
 use super::crossings::edge_rows;
 use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
 use super::triggers::{note_noise, trigger_rows};
-use crate::results::commit::{Commit, exclusive_lock};
+use crate::results::commit::Commit;
 use crate::results::layout::Layout;
 use crate::results::tables::{RecordedTable, gaps};
 use crate::results::{ErrorKind, Results, ResultsError};
@@ -29,9 +29,6 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io;
 use std::path::PathBuf;
-
-/// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
-pub const WRITER: &str = "reduce";
 
 #[derive(Debug, thiserror::Error)]
 #[error(
@@ -65,15 +62,13 @@ pub fn reduce(results: &Results<'_>) -> Result<ReductionSummary> {
 
 fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> {
     let layout = results.layout();
-    let _alone = exclusive_lock(layout, WRITER)?;
     let (commit, summary) = stage(results, max_slips)?;
     results.publish(commit)?;
     for (table, is_there) in results.optional_tables() {
         let file = layout.reduced_file(table);
         if !is_there && layout.storage.exists(&file)? {
             // Left by an earlier sweep.
-            layout.refuse_link(&file)?;
-            layout.storage.remove(&file)?;
+            layout.remove(&file)?;
         }
     }
     Ok(summary)
@@ -102,7 +97,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     layout.ensure_folder(&layout.reduced())?;
     let mut staged = Staged {
         layout,
-        commit: Commit::begin(layout, &layout.staging(WRITER))?,
+        commit: Commit::begin(layout)?,
         footer,
     };
     let rounds = RoundsOfSets::of(results);
@@ -587,7 +582,7 @@ mod tests {
         let passes = reduce_by(&results, 1).unwrap();
         assert_eq!(passes, whole);
         assert!(reduced_bytes(layout) == bytes);
-        assert!(Disk.list(&layout.staging(WRITER)).unwrap().is_empty());
+        assert!(Disk.list(&layout.drafts()).unwrap().is_empty());
     }
 
     #[test]

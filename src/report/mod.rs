@@ -15,9 +15,9 @@ use self::page_columns::{Census, Sets, Slips, backbone};
 use crate::figure::{INKS, SCALE, STANDING};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::model::{MODEL_VERSION, RNG_SCHEME, Selection as _, Symbol};
-use crate::reduce::{WRITER, advise, renew};
+use crate::reduce::{advise, renew};
 use crate::results::Results;
-use crate::results::commit::{Commit, exclusive_lock};
+use crate::results::commit::Commit;
 use crate::results::layout::Layout;
 use crate::results::log::now;
 use crate::run::{RunEvent, status};
@@ -52,8 +52,7 @@ pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> 
 pub fn write(results: &Results<'_>, refresh: Option<Duration>) -> Result<PathBuf> {
     let layout = results.layout();
     let page = page(results, refresh)?;
-    let _alone = exclusive_lock(layout, WRITER)?;
-    let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
+    let mut commit = Commit::begin(layout)?;
     commit.stage_bytes(&layout.report(), page.as_bytes())?;
     results.publish(commit)?;
     Ok(layout.report())

@@ -1,35 +1,38 @@
-//! Claims: which worker runs a part, or reduces, so that nothing is done twice.
+//! Claims: which worker runs a part, reduces, or decides a round, so that nothing is done twice.
 //!
 //! `run/claims/<what>.<generation>` is a link to a file with the worker's name: of several workers that make it, one
 //! wins. A worker that finds the winner dead makes the next generation. A claim stays while any worker runs, as a
 //! worker that looked earlier may not know yet what became of it. A worker that has lost some claims lists them all
 //! again.
 //!
-//! Deaths: a worker keeps a note of each part that it has taken, in its staging folder, until the part is done. The
-//! worker that removes the folder of a dead worker moves its notes to `run/deaths/<part>.<worker>`. So a job that ends
-//! its process can be named, and does not stop the others. No job fails for a mark: kills, power cuts and queues leave
-//! marks, too. A run that ends in order removes the marks of parts that are done.
+//! Deaths: a worker that ends in order says in the claims of parts that it has not finished that it gives them back. So
+//! the other claims of dead workers at a missing part are the deaths at it, and they stay until it is done. A job that
+//! ends its process can thus be named, and does not stop the others. No job fails for a death: kills, power cuts and
+//! queues count, too. A part that is done and has jobs to run again has claims of another name, which stay until a run
+//! ends in order.
 
 use crate::results::layout::{Layout, claim};
-use crate::results::tables::RecordedTable;
-use crate::results::workers::{Living, Member, PREFIX};
+use crate::results::workers::{Living, Member};
 use crate::sweep::PartName;
 use crate::table::error::ResultsError;
 use crate::table::shown::shown_bytes;
-use crate::table::storage::{StorageError, gone_is_fine};
+use crate::table::storage::StorageError;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, HashMap, HashSet};
-use std::ffi::OsString;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::io;
 use std::time::SystemTime;
+
+/// What the name of a claim begins with if jobs of a finished part run again.
+const AGAIN: &str = "again-";
+/// What stands behind the name of a worker in a claim that it has given back.
+const GIVEN_BACK: &str = " gave it back";
 
 #[derive(Debug)]
 pub struct Claims<'a> {
     member: &'a Member<'a>,
     /// The last generation of each.
     generations: HashMap<String, u64>,
-    own: HashSet<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +50,6 @@ impl<'a> Claims<'a> {
         let mut claims = Self {
             member,
             generations: HashMap::new(),
-            own: HashSet::new(),
         };
         claims.refresh()?;
         Ok(claims)
@@ -74,9 +76,6 @@ impl<'a> Claims<'a> {
         what: &str,
         living: &'l BTreeMap<String, Living>,
     ) -> Result<ClaimState<'l>, StorageError> {
-        if self.own.contains(what) {
-            return Ok(ClaimState::Own);
-        }
         let Some(generation) = self.last(what) else {
             return Ok(ClaimState::Free(0));
         };
@@ -88,6 +87,18 @@ impl<'a> Claims<'a> {
         Ok(living.map_or(ClaimState::Free(generation + 1), ClaimState::Taken))
     }
 
+    /// Claims what no living worker has; whether this worker has it.
+    pub fn take_free(member: &'a Member<'a>, what: &str) -> Result<bool, ResultsError> {
+        // In this order: a worker that has ended did before what it had claimed.
+        let others = member.others()?;
+        let mut claims = Self::list(member)?;
+        match claims.standing(what, &others)? {
+            ClaimState::Own => Ok(true),
+            ClaimState::Taken(_) => Ok(false),
+            ClaimState::Free(generation) => claims.take(what, generation),
+        }
+    }
+
     /// Makes a claim; false if another worker was first.
     pub fn take(&mut self, what: &str, generation: u64) -> Result<bool, ResultsError> {
         let layout = self.member.layout();
@@ -96,25 +107,15 @@ impl<'a> Claims<'a> {
         // A network file system may have made the link, and have been asked again.
         let is_own = is_made || self.owner(what, generation)? == self.member.name();
         self.generations.insert(what.to_owned(), generation);
-        if is_own {
-            self.own.insert(what.to_owned());
-        }
         Ok(is_own)
     }
 
     /// The worker that has made a claim; empty if it is gone.
     fn owner(&self, what: &str, generation: u64) -> Result<String, StorageError> {
-        let layout = self.member.layout();
-        let path = layout.claims().join(format!("{what}.{generation}"));
-        match layout.storage.read(&path) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
-            name => Ok(String::from_utf8_lossy(&name?).into_owned()),
-        }
+        let text = self.member.layout().claim_text(what, generation)?;
+        Ok(text.strip_suffix(GIVEN_BACK).unwrap_or(&text).to_owned())
     }
 }
-
-/// The deaths at each part, each with a name.
-pub(super) type Deaths = HashMap<PartName, Vec<OsString>>;
 
 /// A missing part at which workers died.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -142,76 +143,72 @@ impl fmt::Display for Marked {
     }
 }
 
+/// What is claimed to run a part, or jobs of one that is done again.
+pub(super) fn claim_of(part: PartName, is_done: bool) -> String {
+    let again = if is_done { AGAIN } else { "" };
+    format!("{again}{part}")
+}
+
+/// Whether claims of this name stay when nobody else works, as they count deaths.
+pub(super) fn stays(what: &str, is_end: bool, done: &BTreeSet<PartName>) -> bool {
+    let is_again = what.starts_with(AGAIN) && !is_end;
+    is_again || PartName::parse(what).is_some_and(|part| !done.contains(&part))
+}
+
 impl Member<'_> {
-    pub fn begin_part(&self, part: PartName) -> Result<(), StorageError> {
-        self.layout().storage.create(&self.note(part)).map(drop)
+    /// Says in a claim of this worker that it runs the part no more.
+    pub(super) fn give_back(&self, what: &str, generation: u64) -> Result<(), StorageError> {
+        let layout = self.layout();
+        let name = format!("{what}.{generation}");
+        let text = self.staging().join(&name);
+        let given_back = format!("{}{GIVEN_BACK}", self.name());
+        layout.storage.create(&text)?.write(given_back.as_bytes())?;
+        layout.storage.rename(&text, &layout.claims().join(name))
     }
 
-    pub fn end_part(&self, part: PartName) -> Result<(), StorageError> {
-        gone_is_fine(self.layout().storage.remove(&self.note(part)))
+    /// Notes that it runs a part by this claim.
+    pub fn begin_part(&self, what: &str, generation: u64) {
+        self.unfinished().insert(what.to_owned(), generation);
     }
 
-    fn note(&self, part: PartName) -> PathBuf {
-        self.staging().join(part.to_string())
+    /// Notes that the part is finished.
+    pub fn end_part(&self, what: &str) -> Result<(), StorageError> {
+        let generation = self.unfinished().remove(what);
+        match generation {
+            Some(generation) if what.starts_with(AGAIN) => self.give_back(what, generation),
+            _ => Ok(()),
+        }
     }
 }
 
 impl Layout<'_> {
-    /// Makes marks of the notes in the staging folder of a dead worker.
-    pub(super) fn mark_deaths(&self, worker: &str) -> Result<(), StorageError> {
-        for note in self.notes(worker)? {
-            self.ensure_folder(&self.deaths())?;
-            let mark = self.deaths().join(format!("{note}.{worker}"));
-            let note = self.staging(worker).join(note.to_string());
-            gone_is_fine(self.storage.rename(&note, &mark))?;
+    /// What a claim says; empty if it is gone.
+    fn claim_text(&self, what: &str, generation: u64) -> Result<String, StorageError> {
+        let path = self.claims().join(format!("{what}.{generation}"));
+        match self.storage.read(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(String::new()),
+            text => Ok(String::from_utf8_lossy(&text?).into_owned()),
         }
-        Ok(())
     }
 
-    /// The parts that a worker has taken.
-    fn notes(&self, worker: &str) -> Result<Vec<PartName>, StorageError> {
-        let names = self.storage.list(&self.staging(worker))?;
-        let names = names.iter().filter_map(|name| name.to_str());
-        Ok(names.filter_map(PartName::parse).collect())
-    }
-
-    pub(super) fn marks(&self) -> Result<Deaths, StorageError> {
-        let mut marks = Deaths::new();
-        for name in self.storage.list(&self.deaths())? {
-            let part = Path::new(&name).file_stem().and_then(|part| part.to_str());
-            if let Some(part) = part.and_then(PartName::parse) {
-                marks.entry(part).or_default().push(name);
-            }
-        }
-        Ok(marks)
-    }
-
-    /// The same, with the notes of dead workers that are no marks yet.
-    pub(super) fn marks_and_notes(&self) -> Result<Deaths, StorageError> {
-        // In this order: a worker that begins in between is not in the list.
-        let workers = self.storage.list(&self.staging(""))?;
+    /// How many workers died at each part, by what they claimed.
+    pub(super) fn deaths(
+        &self,
+        done: &BTreeSet<PartName>,
+    ) -> Result<HashMap<String, usize>, StorageError> {
+        // In this order: the claims of a worker that begins in between are not listed.
+        let names = self.storage.list(&self.claims())?;
         let living = self.living(SystemTime::now())?;
-        let mut marks = self.marks()?;
-        let workers = workers.iter().filter_map(|worker| worker.to_str());
-        let is_dead = |worker: &&str| worker.starts_with(PREFIX) && !living.contains_key(*worker);
-        for worker in workers.filter(is_dead) {
-            for part in self.notes(worker)? {
-                marks.entry(part).or_default().push(worker.into());
+        let mut deaths = HashMap::new();
+        for (what, generation) in names.iter().filter_map(|name| claim(name)) {
+            if stays(what, false, done) {
+                let text = self.claim_text(what, generation)?;
+                let is_given_back = text.is_empty() || text.ends_with(GIVEN_BACK);
+                if !is_given_back && !living.contains_key(&text) {
+                    *deaths.entry(what.to_owned()).or_default() += 1;
+                }
             }
         }
-        Ok(marks)
-    }
-
-    pub fn tidy_deaths(&self) -> Result<(), StorageError> {
-        let marks = self.marks()?;
-        if marks.is_empty() {
-            return Ok(());
-        }
-        let done = self.parts_in(&self.table(RecordedTable::Jobs))?;
-        let of_done = marks.into_iter().filter(|(part, _)| done.contains(part));
-        for mark in of_done.flat_map(|(_, marks)| marks) {
-            self.remove(&self.deaths().join(mark))?;
-        }
-        Ok(())
+        Ok(deaths)
     }
 }

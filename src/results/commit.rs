@@ -4,17 +4,14 @@
 //! new file; a file is there only if all files staged before it are. Each commit has staged names of its own, so that
 //! two commits of the same files at once never write into the same file.
 
-use crate::results::layout::{Layout, shorter_in_tests};
-use crate::table::storage::{Lock, Storage, StorageError, StoredFile};
+use crate::results::layout::Layout;
+use crate::table::storage::{Storage, StorageError, StoredFile};
 use std::ffi::{OsStr, OsString};
-use std::io;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, SystemTime};
 
-/// How long to wait for another process that does the same, such as a reduction.
-const MAX_WAIT: Duration = shorter_in_tests(Duration::from_mins(10), Duration::from_secs(5));
-/// How often to look whether it has ended.
-const POLL: Duration = shorter_in_tests(Duration::from_millis(20), Duration::from_millis(1));
+/// A draft that nothing was written to for so long is that of a killed process.
+const OLD: Duration = Duration::from_hours(24);
 
 /// Files that are being prepared for their places. Dropped before [`Commit::publish`], it removes what it can.
 pub struct Commit<'a> {
@@ -26,10 +23,14 @@ pub struct Commit<'a> {
 }
 
 impl<'a> Commit<'a> {
-    /// Begins in a staging folder of a directory.
-    pub fn begin(layout: &Layout<'a>, staging: &Path) -> Result<Self, StorageError> {
-        layout.ensure_folder(staging)?;
-        Ok(Self::within(layout.storage, staging))
+    /// Begins in the staging folder of this worker, which must be there, or in the one above, as other commands do.
+    pub fn begin(layout: &Layout<'a>) -> Result<Self, StorageError> {
+        let staging = layout.drafts();
+        if !layout.is_of_worker() {
+            layout.ensure_folder(&staging)?;
+            remove_old_drafts(layout, &staging)?;
+        }
+        Ok(Self::within(layout.storage, &staging))
     }
 
     /// Begins in a staging folder that must be there.
@@ -109,31 +110,20 @@ fn is_staged(name: &OsStr) -> bool {
     token.is_some_and(|token| token.len() == 16 && token.iter().all(u8::is_ascii_hexdigit))
 }
 
-/// Waits until no other process does what this writer does, and removes what a killed process left in its staging
-/// folder. A file system without locks lets in all, and nothing is removed: then some files may come from each process.
-pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
-    layout.ensure_folder(&layout.locks())?;
-    let file = layout.locks().join(writer);
-    let begin = Instant::now();
-    let lock = loop {
-        match layout.storage.lock(&file)? {
-            Lock::Taken if begin.elapsed() < MAX_WAIT => std::thread::sleep(POLL),
-            Lock::Taken => {
-                let problem = "another process holds it; try again when it has ended";
-                let held = io::Error::new(io::ErrorKind::WouldBlock, problem);
-                return Err(StorageError::at("lock", &file)(held));
-            }
-            lock => break lock,
-        }
-    };
-    if matches!(lock, Lock::Ours(_)) {
-        let staging = layout.staging(writer);
-        let names = layout.storage.list(&staging)?;
-        for name in names.iter().filter(|name| is_staged(name)) {
-            layout.remove(&staging.join(name))?;
+/// Removes what killed processes that were no workers left in the staging folder.
+fn remove_old_drafts(layout: &Layout<'_>, staging: &Path) -> Result<(), StorageError> {
+    let storage = layout.storage;
+    let names = storage.list(staging)?;
+    for draft in names.iter().filter(|name| is_staged(name)) {
+        let draft = staging.join(draft);
+        // One that is gone has taken its place.
+        let written = storage.modified(&draft).ok();
+        let age = written.and_then(|written| SystemTime::now().duration_since(written).ok());
+        if age.is_some_and(|age| age > OLD) {
+            layout.remove(&draft)?;
         }
     }
-    Ok(lock)
+    Ok(())
 }
 
 #[cfg(test)]
@@ -163,12 +153,9 @@ pub(crate) mod tests {
     #[test]
     fn published_files_are_whole_and_staging_is_empty() {
         let root = tempfile::tempdir().unwrap();
-        let (staging, target) = (
-            root.path().join("run/staging/x"),
-            root.path().join("target"),
-        );
+        let (staging, target) = (root.path().join("run/staging"), root.path().join("target"));
         fs::write(&target, "old").unwrap();
-        let mut commit = Commit::begin(&Layout::new(&Disk, root.path()), &staging).unwrap();
+        let mut commit = Commit::begin(&Layout::new(&Disk, root.path())).unwrap();
         commit.stage_bytes(&target, b"new").unwrap();
         assert_eq!(fs::read(&target).unwrap(), b"old");
         commit.publish().unwrap();
@@ -179,8 +166,8 @@ pub(crate) mod tests {
     #[test]
     fn an_abandoned_commit_leaves_nothing() {
         let root = tempfile::tempdir().unwrap();
-        let (staging, target) = (root.path().join("staging"), root.path().join("target"));
-        let mut commit = Commit::begin(&Layout::new(&Disk, root.path()), &staging).unwrap();
+        let (staging, target) = (root.path().join("run/staging"), root.path().join("target"));
+        let mut commit = Commit::begin(&Layout::new(&Disk, root.path())).unwrap();
         commit.stage_bytes(&target, b"new").unwrap();
         drop(commit);
         assert!(!target.exists());
@@ -194,15 +181,31 @@ pub(crate) mod tests {
             root.path().join("no folder/first"),
             root.path().join("last"),
         );
-        let mut commit = Commit::begin(
-            &Layout::new(&Disk, root.path()),
-            &root.path().join("staging"),
-        )
-        .unwrap();
+        let mut commit = Commit::begin(&Layout::new(&Disk, root.path())).unwrap();
         commit.stage_bytes(&missing, b"1").unwrap();
         commit.stage_bytes(&last, b"2").unwrap();
         let error = commit.publish().unwrap_err();
         assert!(error.to_string().contains("no folder/first"), "{error}");
         assert!(!last.exists());
+    }
+
+    #[test]
+    fn what_a_killed_process_left_goes_after_a_day_and_what_is_being_written_or_is_of_others_stays()
+    {
+        let root = tempfile::tempdir().unwrap();
+        let layout = Layout::new(&Disk, root.path());
+        let staging = layout.drafts();
+        drop(Commit::begin(&layout).unwrap());
+        let draft = |number: u64| format!("{number:016x}-0-sets.parquet");
+        let old = SystemTime::now() - OLD - Duration::from_secs(9);
+        for (name, is_old) in [(draft(1), true), (draft(2), false), ("mine".into(), true)] {
+            let file = fs::File::create(staging.join(name)).unwrap();
+            if is_old {
+                file.set_modified(old).unwrap();
+            }
+        }
+        drop(Commit::begin(&layout).unwrap());
+        let left = Disk.list(&staging).unwrap();
+        assert_eq!(left, [&*draft(2), "mine"]);
     }
 }

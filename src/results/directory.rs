@@ -34,8 +34,7 @@ pub(super) const STRANGER: &str =
 
 impl<'a> Results<'a> {
     /// Begins, resumes or extends the directory of a sweep. Nothing is written if it is refused.
-    fn open(member: &Member<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
-        let layout = member.layout();
+    fn open(layout: &Layout<'a>, member: &Member<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         loop {
             let found = Self::look(layout, sweep)?;
             if found.is_of(sweep) {
@@ -44,7 +43,7 @@ impl<'a> Results<'a> {
             }
             // In this order: a living worker that was taken for dead can commit nothing any more. Its files of
             // unfinished parts must go, since their jobs now belong to the new sweep.
-            member.tidy()?;
+            member.tidy(false)?;
             let done = found.done_parts()?;
             found.remove_unfinished(&done)?;
             if let Some(begun) = found.extended(sweep, &done).write_last(member)? {
@@ -64,7 +63,7 @@ impl<'a> Results<'a> {
         let folder = layout.storage.ensure_folder(layout.root());
         folder.map_err(ResultsError::from)?;
         workers::join(layout, sweep, threads, |member| {
-            let opened = Self::open(member, sweep);
+            let opened = Self::open(layout, member, sweep);
             let ended = match &opened {
                 Ok(results) => body(member, results),
                 Err(error) => Err(error.clone().into()),
@@ -376,6 +375,8 @@ impl<'a> Results<'a> {
     pub fn reduced_to(&self, elsewhere: TempDir) -> Self {
         let mut same = self.clone();
         same.layout.elsewhere = Some(Arc::new(elsewhere));
+        // Elsewhere there are no workers.
+        same.layout.worker = None;
         same
     }
 

@@ -22,9 +22,7 @@ use tempfile::TempDir;
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
 const RESULTS: &str = "results";
-pub const RUN_FOLDERS: [&str; 8] = [
-    "staging", "lock", "log", "workers", "claims", "spill", "batch", "deaths",
-];
+pub const RUN_FOLDERS: [&str; 6] = ["staging", "log", "workers", "claims", "spill", "batch"];
 const EXTENSION: &str = "extension-";
 
 #[derive(Clone)]
@@ -33,6 +31,8 @@ pub struct Layout<'a> {
     root: PathBuf,
     /// Where reduced data lie, if not in the directory.
     pub(super) elsewhere: Option<Arc<TempDir>>,
+    /// The worker that works on it, if one does.
+    pub(super) worker: Option<Arc<str>>,
 }
 
 impl fmt::Debug for Layout<'_> {
@@ -49,6 +49,7 @@ impl<'a> Layout<'a> {
             storage,
             root: root.to_owned(),
             elsewhere: None,
+            worker: None,
         }
     }
 
@@ -114,10 +115,6 @@ impl<'a> Layout<'a> {
         self.reduced_root().join("reduced")
     }
 
-    pub fn locks(&self) -> PathBuf {
-        self.reduced_root().join("run/lock")
-    }
-
     pub fn reduced_file(&self, table: &str) -> PathBuf {
         self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
     }
@@ -166,9 +163,26 @@ impl<'a> Layout<'a> {
         Ok(())
     }
 
-    /// Where one writer, known by a name of its own, prepares files.
-    pub fn staging(&self, writer: &str) -> PathBuf {
-        self.reduced_root().join("run/staging").join(writer)
+    /// The same for a worker, which stages in a folder of its own.
+    pub(super) fn of_worker(&self, name: &str) -> Self {
+        Self {
+            worker: Some(name.into()),
+            ..self.clone()
+        }
+    }
+
+    pub(super) const fn is_of_worker(&self) -> bool {
+        self.worker.is_some()
+    }
+
+    /// Where a worker prepares files.
+    pub(super) fn staging(&self, worker: &str) -> PathBuf {
+        self.reduced_root().join("run/staging").join(worker)
+    }
+
+    /// Where what is made from tables is prepared: by a worker in its folder, else in the one above.
+    pub fn drafts(&self) -> PathBuf {
+        self.staging(self.worker.as_deref().unwrap_or_default())
     }
 }
 
@@ -219,8 +233,6 @@ places! {
     report = "report.html";
     run = RUN;
     claims = "run/claims";
-    /// The parts that dead workers were at.
-    deaths = "run/deaths";
     /// Second copies of the files of extensions.
     copies = "run/copies";
     logs = "run/log";

@@ -1,14 +1,17 @@
 //! Rounds of a directory: each is an extension with the same sweep file, begun when all parts of the one before are
-//! done. One worker, which holds a lock, decides what the next round runs, and writes it.
+//! done. The worker that claims it decides what the next round runs, and writes it; the others wait.
 
-use crate::results::commit::exclusive_lock;
+use crate::results::claims::Claims;
 use crate::results::directory::Results;
+use crate::results::layout::shorter_in_tests;
 use crate::results::workers::Member;
 use crate::sweep::{Extension, Round, Standing, merged};
 use crate::table::error::ResultsError;
 use serde::{Deserialize, Serialize};
+use std::time::Duration;
 
-const LOCK: &str = "round";
+/// Time between two looks whether another worker has begun the next round.
+const PAUSE: Duration = shorter_in_tests(Duration::from_millis(500), Duration::ZERO);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RoundsSoFar {
@@ -58,7 +61,8 @@ impl Results<'_> {
     }
 
     /// The directory with its next round, once all its parts are done: a round that another worker has begun meanwhile,
-    /// or the one that `decide` chooses. `None` if the rounds are over, or if there are none.
+    /// or the one that `decide` chooses. The directory as it is while another decides. `None` if the rounds are over, or
+    /// if there are none.
     pub fn next_round(
         &self,
         member: &Member<'_>,
@@ -68,8 +72,9 @@ impl Results<'_> {
             return Ok(None);
         }
         let layout = self.layout();
-        let _lock = exclusive_lock(layout, LOCK)?;
         self.check_place()?;
+        let claim = format!("round-{:03}", self.extensions().len());
+        let is_own = Claims::take_free(member, &claim)?;
         let current = Self::read(layout)?;
         if !current.is_of(self.sweep()) {
             let problem =
@@ -85,11 +90,15 @@ impl Results<'_> {
         if current.extensions().len() > self.extensions().len() || !is_done {
             return Ok(Some(current));
         }
+        if !is_own {
+            std::thread::sleep(PAUSE);
+            return Ok(Some(current));
+        }
         let round = decide(&current)?;
         let next = current
             .followed_by(current.sweep(), Some(round), None)
             .write_last(member)?;
-        // Without locks, another may have been first.
+        // One that took this worker for dead may have been first.
         next.map_or_else(|| Self::read(layout), Ok).map(Some)
     }
 }

@@ -10,7 +10,7 @@
 //!
 //! Which worker runs it is decided in `claims.rs` and `run/take.rs`.
 
-use crate::results::claims::{Deaths, Marked};
+use crate::results::claims::{Marked, claim_of};
 use crate::results::directory::Results;
 use crate::results::layout::settled;
 use crate::results::tables::{JobOutcome, RecordedTable, RowOfJob};
@@ -22,7 +22,7 @@ use crate::table::shown::shown_bytes;
 use serde::Serialize;
 use std::cell::RefCell;
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::io;
 
 /// Times within this share of each other are the same bound.
@@ -80,8 +80,8 @@ pub struct Pending<'a> {
     pub parts: &'a [Outline],
     pub retry: Retry,
     pub done: BTreeSet<PartName>,
-    /// Looked up again, as workers die.
-    deaths: RefCell<Deaths>,
+    /// The deaths of workers at each part, by what they claimed; none until they are looked up.
+    deaths: RefCell<HashMap<String, usize>>,
     /// Looked up again, as stopped workers spill.
     spilled: RefCell<BTreeSet<PartName>>,
 }
@@ -112,7 +112,6 @@ impl<'a> Pending<'a> {
             spilled: RefCell::default(),
         };
         pending.look_at_spill()?;
-        pending.look_at_deaths()?;
         Ok(pending)
     }
 
@@ -122,19 +121,18 @@ impl<'a> Pending<'a> {
     }
 
     pub fn look_at_deaths(&self) -> Result<(), ResultsError> {
-        *self.deaths.borrow_mut() = self.results.layout().marks()?;
+        *self.deaths.borrow_mut() = self.results.layout().deaths(&self.done)?;
         Ok(())
     }
 
-    /// The same with dead workers that have no marks yet, for a command that makes none.
-    pub fn look_at_all_deaths(&self) -> Result<(), ResultsError> {
-        *self.deaths.borrow_mut() = self.results.layout().marks_and_notes()?;
-        Ok(())
+    /// What a worker claims to run a part, or jobs of one that is done again.
+    pub fn claim(&self, part: PartName) -> String {
+        claim_of(part, self.done.contains(&part))
     }
 
     pub fn deaths(&self, part: &Outline) -> usize {
         let deaths = self.deaths.borrow();
-        deaths.get(&part.name).map_or(0, Vec::len)
+        deaths.get(&self.claim(part.name)).copied().unwrap_or(0)
     }
 
     pub fn part(&self, outline: &Outline) -> Part {
@@ -264,7 +262,7 @@ impl<'a> Pending<'a> {
     /// The missing parts with this number of deaths or more.
     pub fn with_deaths(&self, min: usize) -> impl Iterator<Item = &'a Outline> {
         let parts = self.parts.iter();
-        parts.filter(move |part| self.deaths(part) >= min && self.may_run(part))
+        parts.filter(move |part| self.deaths(part) >= min)
     }
 
     /// The missing parts with the most deaths.

@@ -19,8 +19,6 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-const WRITER: &str = "repair";
-
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Verification {
     /// Whether nothing is damaged; parts may be missing.
@@ -83,7 +81,7 @@ impl<'a> Results<'a> {
                 })?,
             }
         }
-        results.write_copies(|| Commit::begin(layout, &layout.staging(WRITER)))?;
+        results.write_copies(|| Commit::begin(layout))?;
         Ok(verification)
     }
 }

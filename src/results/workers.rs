@@ -9,8 +9,10 @@
 //! why. All living workers run the same sweep: of two that join for different sweeps at once, one at least sees the
 //! other, and leaves.
 
+use crate::results::claims::stays;
 use crate::results::commit::{Commit, own_number};
 use crate::results::layout::{Layout, claim, shorter_in_tests};
+use crate::results::tables::RecordedTable;
 use crate::sweep::Sweep;
 use crate::table::checksum;
 use crate::table::error::{ErrorKind, ResultsError};
@@ -167,6 +169,8 @@ pub struct Member<'a> {
     worker: Worker,
     begin: Instant,
     jobs: AtomicU64,
+    /// Its claims of parts that it has not finished, each with its generation.
+    unfinished: Mutex<BTreeMap<String, u64>>,
 }
 
 /// Joins the workers on a directory, which must be there, and is one of them while `body` runs.
@@ -250,11 +254,12 @@ impl<'a> Member<'a> {
         let name = format!("{PREFIX}{host}-{}-{number:016x}", worker.process);
         own().insert(name.clone(), std::thread::current().id());
         let member = Self {
-            layout: layout.clone(),
+            layout: layout.of_worker(&name),
             name,
             worker,
             begin: Instant::now(),
             jobs: AtomicU64::new(0),
+            unfinished: Mutex::default(),
         };
         layout.ensure_folder(&layout.workers())?;
         // First, so that no other worker takes the staging folder for that of a dead worker.
@@ -265,7 +270,7 @@ impl<'a> Member<'a> {
         }
     }
 
-    pub(super) const fn layout(&self) -> &Layout<'a> {
+    pub const fn layout(&self) -> &Layout<'a> {
         &self.layout
     }
 
@@ -279,6 +284,13 @@ impl<'a> Member<'a> {
 
     pub(super) fn claim(&self) -> PathBuf {
         self.staging().join(CLAIM)
+    }
+
+    pub(super) fn unfinished(&self) -> MutexGuard<'_, BTreeMap<String, u64>> {
+        // Nothing panics while it is held.
+        self.unfinished
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     pub fn count_job(&self) {
@@ -365,9 +377,10 @@ impl<'a> Member<'a> {
         Commit::within(self.layout.storage, &self.staging())
     }
 
-    /// Removes what dead workers left, and marks the parts that they were running. Their claims go only once this
-    /// worker is alone: another may have looked up what is done before they ended.
-    pub fn tidy(&self) -> Result<(), StorageError> {
+    /// Removes what dead workers left. Claims go only once this worker is alone, as another may have looked up what is
+    /// done before they ended; those of missing parts stay, and, unless a run ends in order, those of jobs that run
+    /// again.
+    pub fn tidy(&self, is_end: bool) -> Result<(), StorageError> {
         let layout = &self.layout;
         let storage = layout.storage;
         // Listed before the living, so that a worker that joins in between is not in these lists.
@@ -383,7 +396,6 @@ impl<'a> Member<'a> {
                 continue;
             }
             layout.refuse_link(&layout.staging(&name))?;
-            layout.mark_deaths(&name)?;
             storage.remove_folder(&layout.staging(&name))?;
             let file = layout.workers().join(&*name);
             if storage.exists(&file)? {
@@ -392,8 +404,10 @@ impl<'a> Member<'a> {
         }
         if others.is_empty() {
             layout.refuse_link(&layout.claims().join("any"))?;
-            for claim in claims.iter().filter(|name| claim(name).is_some()) {
-                gone_is_fine(storage.remove(&layout.claims().join(claim)))?;
+            let done = layout.parts_in(&layout.table(RecordedTable::Jobs))?;
+            let goes = |(what, _): (&str, u64)| !stays(what, is_end, &done);
+            for name in claims.iter().filter(|name| claim(name).is_some_and(goes)) {
+                gone_is_fine(storage.remove(&layout.claims().join(name)))?;
             }
         }
         Ok(())
@@ -402,6 +416,10 @@ impl<'a> Member<'a> {
 
 impl Drop for Member<'_> {
     fn drop(&mut self) {
+        for (what, generation) in std::mem::take(&mut *self.unfinished()) {
+            // At worst it counts as a death.
+            let _ = self.give_back(&what, generation);
+        }
         // What stays is removed when the next worker begins.
         let _ = self.layout.storage.remove_folder(&self.staging());
         let _ = self.layout.storage.remove(&self.file());
@@ -513,7 +531,7 @@ pub(crate) mod tests {
                 ["worker-fresh", "worker-slow"]
             );
             assert!(others.values().all(|living| !living.is_certain));
-            member.tidy().unwrap();
+            member.tidy(false).unwrap();
         });
         let mut left: Vec<_> = fs::read_dir(layout.workers())
             .unwrap()
@@ -535,7 +553,7 @@ pub(crate) mod tests {
             let path = results.layout().workers().join("worker-loop");
             std::os::unix::fs::symlink(&path, &path).unwrap();
             assert!(member.others().unwrap_err().path == path);
-            assert!(member.tidy().is_err() && path.is_symlink());
+            assert!(member.tidy(false).is_err() && path.is_symlink());
             fs::remove_file(path).unwrap();
         });
     }
@@ -562,7 +580,7 @@ pub(crate) mod tests {
             let mut commit = first.commit();
             commit.stage_bytes(&target, b"late").unwrap();
             lose(std::thread::current().id());
-            join(&results, |second| second.tidy().unwrap());
+            join(&results, |second| second.tidy(false).unwrap());
             let late = commit.publish();
             assert!(late.is_err() && first.commit().stage(&target).is_err());
             Ok(late?)
@@ -654,7 +672,7 @@ pub(crate) mod tests {
                 assert_eq!(standing(&others, second), Err(first.name().to_owned()));
                 assert!(!others.take("part", 0).unwrap());
                 assert!(others.take("other", 0).unwrap());
-                second.tidy().unwrap();
+                second.tidy(false).unwrap();
             });
             claims.refresh().unwrap();
             assert!(
@@ -667,7 +685,7 @@ pub(crate) mod tests {
                 assert_eq!(standing(&others, third), Ok(Some(2)));
                 assert!(others.take("part", 2).unwrap());
             });
-            first.tidy().unwrap();
+            first.tidy(false).unwrap();
             assert!(
                 fs::read_dir(results.layout().claims())
                     .unwrap()

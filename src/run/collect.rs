@@ -419,8 +419,7 @@ impl Collector<'_, '_> {
         if !spilled.is_empty() {
             results.remove_spilled(part)?;
         }
-        let name = part.name;
-        self.joined.member.end_part(name)?;
+        self.joined.member.end_part(&whole.of.claim)?;
         let took = whole.of.begin.elapsed();
         self.joined.walltime.committed(took, begin.elapsed());
         if !whole.of.again {
@@ -437,7 +436,7 @@ impl Collector<'_, '_> {
         report.predicted_cost += whole.predicted_cost;
         report.measured_cost += whole.measured.cpu;
         Ok(self.events.send(&RunEvent::PartCommitted {
-            part: name.to_string(),
+            part: part.name.to_string(),
             jobs,
             failed,
             predicted_cost: whole.predicted_cost,

@@ -121,10 +121,7 @@ pub fn join<T, E: From<ResultsError>>(
             allowed_memory: limits::allowed_memory(),
             options,
         })?;
-        member
-            .tidy()
-            .and_then(|()| layout.tidy_deaths())
-            .map_err(ResultsError::from)?;
+        member.tidy(true).map_err(ResultsError::from)?;
         Ok(ended)
     })
 }
@@ -140,7 +137,7 @@ impl Joined<'_> {
         display: &mut dyn FnMut(&RunEvent),
     ) -> Result<RunReport, ResultsError> {
         self.results.sync_names()?;
-        self.member.tidy()?;
+        self.member.tidy(false)?;
         let mut events = Events { log: None, display };
         let mut report = RunReport::default();
         let mut retry_failed = self.options.retry_failed;
@@ -172,13 +169,20 @@ impl Joined<'_> {
         let (results, parts) = &round;
         report.rounds = results.rounds_so_far();
         if report.jobs_left > 0 {
-            report.marked = Pending::look_up(results, parts, Retry::default())?.marked();
+            let pending = Pending::look_up(results, parts, Retry::default())?;
+            pending.look_at_deaths()?;
+            report.marked = pending.marked();
         } else if self.member.others()?.is_empty() {
             let pending = Pending::look_up(results, parts, Retry::default())?;
             report.jobs_failed = pending.overview(true, |_, _, _| ())?.jobs_failed;
         }
         events.send(&RunEvent::Finished(report.clone()))?;
         Ok(report)
+    }
+
+    /// The directory, in which this worker stages what it writes.
+    pub fn layout(&self) -> &Layout<'_> {
+        self.member.layout()
     }
 
     /// Whether a signal came, or the time is over.

@@ -103,7 +103,7 @@ pub fn status(results: &Results<'_>, max_failures: u64) -> Result<Status, Result
     let mut failure_reasons = Reasons::default();
     let parts: Vec<Outline> = results.plan().outlines().collect();
     let pending = Pending::look_up(results, &parts, Retry::default())?;
-    pending.look_at_all_deaths()?;
+    pending.look_at_deaths()?;
     let mut overview = pending.overview(true, |part, position, why| {
         if let Again::Failed(reason) = why
             && failure_reasons.add(reason) <= max_failures

@@ -1,7 +1,7 @@
 //! Which of the missing parts this worker takes.
 //!
-//! Workers take parts by claims, in two passes. The first goes through the plan, from a place of its own if others run,
-//! and takes unclaimed parts. The second takes the parts of dead workers, until living workers have all that are left.
+//! Workers take parts by claims: those that no living worker has, from a place of their own if others run. Then they look
+//! for parts of workers that have died since, until living workers have all that are left.
 //! Parts that may not fit in memory come later, and parts at which workers died last; after some deaths they run alone,
 //! as a job that ends its process must not end others.
 //!
@@ -42,6 +42,8 @@ const DEATHS: usize = 3;
 #[derive(Debug)]
 pub(super) struct Taken {
     pub part: Part,
+    /// What was claimed to run it.
+    pub claim: String,
     /// Positions of its jobs that an earlier run has spilled.
     pub spilled: BTreeSet<usize>,
     /// Whether it was done before, and some of its jobs run again.
@@ -118,10 +120,11 @@ pub(super) struct Work<'a> {
     joined: &'a Joined<'a>,
     claims: Claims<'a>,
     others: BTreeMap<String, Living>,
-    pass: IntoIter<&'a Outline>,
+    /// Parts to take that no living worker had, each with the generation of its claim.
+    free: IntoIter<(&'a Outline, u64)>,
     losses: u32,
     jobs: VecDeque<PartJob>,
-    /// When it last looked for parts of dead workers, or began to, and the beats that it saw first.
+    /// When it last looked for parts, or had taken those of the first look, and the beats that it saw first.
     last_look: Option<Instant>,
     beats: HashMap<String, SystemTime>,
     /// Whether there will be no more jobs for this worker.
@@ -130,38 +133,73 @@ pub(super) struct Work<'a> {
 
 impl<'a> Work<'a> {
     pub fn new(pending: &'a Pending<'a>, joined: &'a Joined<'a>) -> Result<Self, ResultsError> {
-        let others = joined.member.others()?;
-        let claims = Claims::list(joined.member)?;
-        let parts = pending.parts.iter();
-        let mut pass: Vec<&Outline> = parts.filter(|part| pending.may_run(part)).collect();
-        if !others.is_empty() && !pass.is_empty() {
-            let place = own_number() % pass.len() as u64;
-            pass.rotate_left(usize::try_from(place).unwrap_or_default());
-        }
-        pass.sort_by_key(|part| {
-            let needed = beside_threads(part.memory, joined.threads);
-            let may_not_fit = needed > pending.retry.memory;
-            let is_done = pending.done.contains(&part.name);
-            (pending.deaths(part), may_not_fit, is_done)
-        });
-        Ok(Self {
+        let mut work = Self {
             pending,
             joined,
-            claims,
-            others,
-            pass: pass.into_iter(),
+            claims: Claims::list(joined.member)?,
+            others: BTreeMap::new(),
+            free: Vec::new().into_iter(),
             losses: 0,
             jobs: VecDeque::new(),
             last_look: None,
             beats: HashMap::new(),
             has_ended: false,
-        })
+        };
+        work.look(true)?;
+        Ok(work)
+    }
+
+    /// Lists the parts that no living worker has, at first with those that are done and may run again. Returns whether
+    /// there is none, and the owners of all other parts certainly live.
+    fn look(&mut self, is_first: bool) -> Result<bool, ResultsError> {
+        let pending = self.pending;
+        // In this order: a worker that has ended committed or spilled before.
+        self.others = self.joined.member.others()?;
+        self.claims.refresh()?;
+        pending.look_at_spill()?;
+        let done = pending.results.done_parts()?;
+        let runs_again =
+            |part: &Outline| pending.done.contains(&part.name) && pending.may_run(part);
+        let is_left =
+            |part: &&Outline| !done.contains(&part.name) || (is_first && runs_again(part));
+        let mut is_certain = true;
+        let mut free: Vec<(&Outline, u64)> = Vec::new();
+        for part in pending.parts.iter().filter(is_left) {
+            let claim = pending.claim(part.name);
+            match self.claims.standing(&claim, &self.others)? {
+                ClaimState::Own => (),
+                ClaimState::Taken(owner) => {
+                    let living = &self.others[owner];
+                    let first = self.beats.entry(owner.to_owned()).or_insert(living.beat);
+                    is_certain &= living.is_certain || *first != living.beat;
+                }
+                ClaimState::Free(generation) => free.push((part, generation)),
+            }
+        }
+        if free.iter().any(|(_, generation)| *generation > 0) {
+            // Their owners may be suspended, and must not commit them later.
+            self.joined.member.tidy(false)?;
+        }
+        pending.look_at_deaths()?;
+        if !self.others.is_empty() && !free.is_empty() {
+            let place = own_number() % free.len() as u64;
+            free.rotate_left(usize::try_from(place).unwrap_or_default());
+        }
+        free.sort_by_key(|(part, _)| {
+            let needed = beside_threads(part.memory, self.joined.threads);
+            let may_not_fit = needed > pending.retry.memory;
+            let is_done = pending.done.contains(&part.name);
+            (pending.deaths(part), may_not_fit, is_done)
+        });
+        let is_none = free.is_empty();
+        self.free = free.into_iter();
+        Ok(is_none && is_certain)
     }
 
     /// Whether all that is left runs alone.
     pub fn is_all_alone(&self) -> bool {
-        let mut left = self.pass.as_slice().iter();
-        left.all(|part| self.pending.deaths(part) >= DEATHS)
+        let mut left = self.free.as_slice().iter();
+        left.all(|(part, _)| self.pending.deaths(part) >= DEATHS)
     }
 
     /// Gives back a job for which there is no room yet.
@@ -180,8 +218,8 @@ impl<'a> Work<'a> {
 
     /// Whether the next part must wait: with a part at which workers died, no job may wait for a thread.
     fn must_wait(&self, is_busy: bool, is_ahead: bool) -> bool {
-        let next = self.pass.as_slice().first();
-        match next.map_or(1, |part| self.pending.deaths(part)) {
+        let next = self.free.as_slice().first();
+        match next.map_or(1, |(part, _)| self.pending.deaths(part)) {
             0 => false,
             1..DEATHS => is_ahead,
             _ => is_busy,
@@ -193,10 +231,12 @@ impl<'a> Work<'a> {
             if self.must_wait(is_busy, is_ahead) {
                 return Ok(());
             }
-            let Some(part) = self.pass.next() else {
+            let Some((part, generation)) = self.free.next() else {
                 break;
             };
-            if self.take_unclaimed(part)? {
+            let last = self.claims.last(&self.pending.claim(part.name));
+            let is_free = last.map_or(0, |last| last + 1) == generation;
+            if is_free && self.take_part(part, generation)? {
                 return Ok(());
             }
         }
@@ -205,7 +245,7 @@ impl<'a> Work<'a> {
             self.has_ended = true;
         } else if last_look.elapsed() >= self.pause(is_busy) {
             self.last_look = Some(Instant::now());
-            self.has_ended = self.take_abandoned()?;
+            self.has_ended = self.look(false)?;
         }
         Ok(())
     }
@@ -218,57 +258,6 @@ impl<'a> Work<'a> {
             (false, true) => Duration::ZERO,
             (false, false) => LOOK,
         }
-    }
-
-    /// Takes a part in the first pass: unclaimed, or finished with jobs that may run again and no worker that runs
-    /// them.
-    fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
-        let name = outline.name.to_string();
-        if !self.pending.done.contains(&outline.name) {
-            return Ok(self.claims.last(&name).is_none() && self.take_part(outline, 0)?);
-        }
-        match self.claims.standing(&name, &self.others)? {
-            ClaimState::Free(generation) => self.take_part(outline, generation),
-            _ => Ok(false),
-        }
-    }
-
-    /// Takes a part of a dead worker. Returns whether there is none, and the owners of all other parts certainly live.
-    fn take_abandoned(&mut self) -> Result<bool, ResultsError> {
-        // In this order: a worker that has ended committed or spilled before.
-        let others = self.joined.member.others()?;
-        self.claims.refresh()?;
-        self.pending.look_at_spill()?;
-        let done = self.pending.results.done_parts()?;
-        let mut is_certain = true;
-        let mut free = Vec::new();
-        let parts = self.pending.parts.iter();
-        for part in parts.filter(|part| !done.contains(&part.name)) {
-            let name = part.name.to_string();
-            match self.claims.standing(&name, &others)? {
-                ClaimState::Own => (),
-                ClaimState::Taken(owner) => {
-                    let living = &others[owner];
-                    let first = self.beats.entry(owner.to_owned()).or_insert(living.beat);
-                    is_certain &= living.is_certain || *first != living.beat;
-                }
-                ClaimState::Free(generation) => free.push((part, generation)),
-            }
-        }
-        if free.is_empty() {
-            return Ok(is_certain);
-        }
-        // Their owners may be suspended, and must not commit them later.
-        self.joined.member.tidy()?;
-        self.pending.look_at_deaths()?;
-        free.sort_by_key(|(part, _)| self.pending.deaths(part));
-        for (part, generation) in free {
-            if self.take_part(part, generation)? || self.joined.walltime.has_refused() {
-                break;
-            }
-        }
-        // If other workers get them, the next look decides.
-        Ok(false)
     }
 
     fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
@@ -300,8 +289,8 @@ impl<'a> Work<'a> {
         if !self.joined.walltime.admits_part() {
             return Ok(false);
         }
-        let name = part.name;
-        if !self.claims.take(&name.to_string(), generation)? {
+        let claim = self.pending.claim(part.name);
+        if !self.claims.take(&claim, generation)? {
             self.losses += 1;
             if self.losses == LOSSES {
                 self.losses = 0;
@@ -309,11 +298,12 @@ impl<'a> Work<'a> {
             }
             return Ok(false);
         }
-        self.joined.member.begin_part(name)?;
+        self.joined.member.begin_part(&claim, generation);
         let is_alone = self.pending.deaths(&part) >= DEATHS;
         let again = self.pending.done.contains(&part.name);
         let taken = Arc::new(Taken {
             part,
+            claim,
             spilled,
             again,
             together: jobs.len(),

@@ -6,7 +6,7 @@ pub(crate) mod over_disk;
 use crate::table::shown::shown;
 use std::error::Error;
 use std::ffi::OsString;
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File};
 use std::io::{self, Read as _, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
@@ -91,8 +91,6 @@ pub trait Storage: Sync {
     fn remove(&self, file: &Path) -> Result<(), StorageError>;
     /// Removes a folder with all that is in it; nothing happens if there is none.
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError>;
-    /// Tries to lock a file, created if needed.
-    fn lock(&self, file: &Path) -> Result<Lock, StorageError>;
 
     /// All bytes of a file, up to [`MAX_WHOLE`].
     fn read(&self, file: &Path) -> Result<Vec<u8>, StorageError> {
@@ -154,13 +152,6 @@ pub fn gone_is_fine(ended: Result<(), StorageError>) -> Result<(), StorageError>
     }
 }
 
-pub enum Lock {
-    /// The caller has the lock until this value is dropped or the process ends.
-    Ours(Box<dyn Send + Sync>),
-    Taken,
-    Unknown,
-}
-
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot {action}: {source}", shown(path))]
 pub struct StorageError {
@@ -214,10 +205,10 @@ impl From<NoFile> for io::Error {
 }
 
 /// Opens a regular file. A FIFO would make the program wait, and opening a device may have effects.
-fn open_regular(options: &OpenOptions, path: &Path) -> io::Result<File> {
+fn open_regular(path: &Path) -> io::Result<File> {
     match fs::metadata(path) {
         Ok(metadata) if !metadata.is_file() => Err(NoFile::Irregular.into()),
-        _ => options.open(path),
+        _ => File::open(path),
     }
 }
 
@@ -301,7 +292,7 @@ impl Storage for Disk {
     }
 
     fn open(&self, file: &Path) -> Result<File, StorageError> {
-        open_regular(File::options().read(true), file).map_err(StorageError::at("read", file))
+        open_regular(file).map_err(StorageError::at("read", file))
     }
 
     fn exists(&self, file: &Path) -> Result<bool, StorageError> {
@@ -320,41 +311,11 @@ impl Storage for Disk {
         let removed = fs::remove_dir_all(folder);
         gone_is_fine(removed.map_err(StorageError::at("remove", folder)))
     }
-
-    fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        let mut options = File::options();
-        options.create(true).truncate(false).write(true);
-        let handle = open_regular(&options, file);
-        let handle = handle.map_err(StorageError::at("lock", file))?;
-        match handle.try_lock() {
-            Ok(()) => Ok(Lock::Ours(Box::new(handle))),
-            Err(TryLockError::WouldBlock) => Ok(Lock::Taken),
-            // Network file systems that are mounted without locks.
-            Err(TryLockError::Error(error))
-                if error.kind() == io::ErrorKind::Unsupported
-                    || error.raw_os_error() == Some(libc::ENOLCK) =>
-            {
-                Ok(Lock::Unknown)
-            }
-            Err(TryLockError::Error(error)) => Err(StorageError::at("lock", file)(error)),
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_lock_is_refused_while_held_and_free_afterwards() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("lock");
-        let held = Disk.lock(&file).unwrap();
-        assert!(matches!(held, Lock::Ours(_)));
-        assert!(matches!(Disk.lock(&file).unwrap(), Lock::Taken));
-        drop(held);
-        assert!(matches!(Disk.lock(&file).unwrap(), Lock::Ours(_)));
-    }
 
     #[test]
     fn a_file_is_never_created_over_another_or_where_a_link_leads() {
@@ -392,7 +353,6 @@ mod tests {
             let looked_at = [
                 Disk.read(&path(name)).map(drop),
                 Disk.length(&path(name)).map(drop),
-                Disk.lock(&path(name)).map(drop),
             ];
             for error in looked_at.map(Result::unwrap_err) {
                 assert!(

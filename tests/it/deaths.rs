@@ -96,8 +96,8 @@ fn assert_named(folder: &Folder, directory: &str) {
         "{status}"
     );
     folder.ends(0, &format!("run {directory} --no-reduce"));
-    let marks = folder.contents(&format!("{directory}/run/deaths"));
-    assert!(marks.is_empty(), "{:?}", marks.keys());
+    let claims = folder.contents(&format!("{directory}/run/claims"));
+    assert!(claims.is_empty(), "{:?}", claims.keys());
 }
 
 fn whole(folder: &Folder) {
@@ -142,13 +142,10 @@ fn jobs_that_end_their_process_for_lack_of_memory_stop_no_others_and_are_named()
         assert_eq!(ended.code, None, "start {start}: {}", ended.stderr);
         assert_eq!(counts(&folder, "r"), [92, 0, 4], "start {start}");
     }
-    let marks = folder.contents("r/run/deaths");
-    let dead: BTreeSet<_> = marks.keys().filter_map(|mark| mark.extension()).collect();
-    assert_eq!(
-        dead.len(),
-        5,
-        "the last is marked by the next run: {dead:?}"
-    );
+    let claims = folder.contents("r/run/claims").into_iter();
+    let of_parts = claims.filter(|(claim, _)| claim.to_string_lossy().starts_with("part-000-"));
+    let missing: BTreeSet<_> = of_parts.map(|(_, worker)| worker).collect();
+    assert_eq!(missing.len(), 6, "{missing:?}");
     // Six deaths at four parts, of which a second one is named. A worker that starts late may find nothing to do.
     let mut deaths = 0;
     for _ in 0..6 {
@@ -283,12 +280,13 @@ fn a_part_whose_process_is_killed_each_time_stops_no_others_and_is_done_once_non
     let folder = Folder::new();
     folder.write("long.toml", LONG_FIRST);
     folder.ends(0, "run long.toml --no-reduce --out whole");
-    // The note of this process: those that were killed have left theirs.
+    // The claim of this process: those that were killed have left theirs.
     let is_at_the_first = |process: u32| {
-        let workers = fs::read_dir(folder.path("r/run/staging"));
-        workers.into_iter().flatten().flatten().any(|worker| {
-            let name = worker.file_name().into_string().unwrap();
-            name.contains(&format!("-{process}-")) && worker.path().join("part-000-000000").exists()
+        let claims = fs::read_dir(folder.path("r/run/claims"));
+        claims.into_iter().flatten().flatten().any(|claim| {
+            let name = claim.file_name().into_string().unwrap();
+            let worker = fs::read_to_string(claim.path()).unwrap_or_default();
+            name.starts_with("part-000-000000.") && worker.contains(&format!("-{process}-"))
         })
     };
     let begin = Instant::now();
@@ -314,7 +312,7 @@ fn a_part_whose_process_is_killed_each_time_stops_no_others_and_is_done_once_non
     assert!(status.contains(deaths), "{status}");
     folder.ends(0, "run long.toml --no-reduce --out r");
     assert!(folder.tables("r") == folder.tables("whole"));
-    assert!(folder.contents("r/run/deaths").is_empty());
+    assert!(folder.contents("r/run/claims").is_empty());
 }
 
 #[test]

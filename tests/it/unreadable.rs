@@ -197,7 +197,6 @@ fn a_fifo_makes_no_command_wait() {
         // Reduced again by `plot`.
         ("r/reduced/sets.parquet", 0),
         ("r/run/log/0.jsonl", 0),
-        ("r/run/lock/reduce", 0),
     ] {
         let (path, aside) = (folder.path(file), folder.path("aside"));
         let was_there = fs::rename(&path, &aside).is_ok();

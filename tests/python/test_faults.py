@@ -51,7 +51,6 @@ FAULTS = {
     "getdents64": ["error=EIO"],
     "statx": ["error=EIO", "error=EACCES"],
     "fstat": ["error=EIO"],
-    "flock": ["error=EIO", "error=ENOLCK"],
 }
 CALLS = ",".join(FAULTS)
 

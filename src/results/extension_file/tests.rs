@@ -299,9 +299,7 @@ fn a_directory_that_another_has_replaced_is_not_ours_any_more_and_one_with_a_fur
         ..Round::default()
     };
     let second = first.followed_by(first.sweep(), Some(round), None);
-    second
-        .write_copies(|| Commit::begin(&layout, &layout.staging("test")))
-        .unwrap();
+    second.write_copies(|| Commit::begin(&layout)).unwrap();
     assert_eq!(Results::read(&layout).unwrap().rounds().len(), 2);
     assert!(first.check_place().is_ok() && second.check_place().is_ok());
     open(&Layout::new(&Disk, other.path()), &sweep(TWO_SEEDS)).unwrap();

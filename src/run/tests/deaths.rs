@@ -1,18 +1,24 @@
 //! Parts at which workers died, and jobs that memory forbids.
 
 use super::*;
-use crate::results::claims::Marked;
+use crate::results::claims::{Claims, Marked};
 use crate::results::pending::{Pending, Retry};
 use crate::results::tables::RecordedTable;
 use crate::results::workers::tests::lose;
 use crate::sweep::Part;
 
-fn marks(root: &Path) -> Vec<String> {
-    let marks = Disk.list(&root.join("run/deaths")).unwrap();
-    marks
+/// Names of the claims that are there.
+fn claims(root: &Path) -> Vec<String> {
+    let claims = Disk.list(&root.join("run/claims")).unwrap();
+    claims
         .into_iter()
         .map(|name| name.into_string().unwrap())
         .collect()
+}
+
+fn deaths(root: &Path) -> usize {
+    let results = Results::read(&Layout::new(&Disk, root)).unwrap();
+    status(&results, MAX_FAILURES).unwrap().parts_with_deaths
 }
 
 fn marked(root: &Path) -> Vec<Marked> {
@@ -24,16 +30,20 @@ fn marked(root: &Path) -> Vec<Marked> {
     .marked
 }
 
-/// Leaves the marks of this number of deaths at the parts of these numbers.
-fn leave_marks(root: &Path, deaths: &[(u64, usize)]) {
-    fs::create_dir_all(root.join("run/deaths")).unwrap();
+/// Leaves the claims of this number of dead workers at the parts of these numbers.
+fn leave_claims(root: &Path, deaths: &[(u64, usize)]) {
+    fs::create_dir_all(root.join("run/claims")).unwrap();
     for &(index, deaths) in deaths {
         let part = PartName {
             extension: 0,
             index,
         };
         for number in 0..deaths {
-            fs::write(root.join(format!("run/deaths/{part}.worker-{number}")), "").unwrap();
+            fs::write(
+                root.join(format!("run/claims/{part}.{number}")),
+                format!("worker-{number}"),
+            )
+            .unwrap();
         }
     }
 }
@@ -45,7 +55,7 @@ fn parts_at_which_workers_died_come_last_and_after_three_deaths_alone_on_one_thr
         let layout = Layout::new(&Disk, root.path());
         let results = open(&layout, &sweep(SEEDS, "")).unwrap();
         let parts: Vec<_> = results.plan().parts().collect();
-        leave_marks(root.path(), &[(0, 4), (1, 3), (2, 2), (3, 1)]);
+        leave_claims(root.path(), &[(0, 4), (1, 3), (2, 2), (3, 1)]);
         let status = status(&Results::read(&layout).unwrap(), MAX_FAILURES).unwrap();
         assert_eq!(status.parts_with_deaths, 4);
         let found = status.marked;
@@ -89,13 +99,13 @@ fn parts_at_which_workers_died_come_last_and_after_three_deaths_alone_on_one_thr
         let plan_order: Vec<usize> = (4..parts.len()).chain([3, 2, 1, 0]).collect();
         assert!(threads > 1 || order == plan_order, "{order:?}");
         assert!(tables_of(root.path()) == expected_tables());
-        assert_eq!(marks(root.path()), Vec::<String>::new(), "all are done");
+        assert_eq!(claims(root.path()), Vec::<String>::new(), "all are done");
         assert_eq!(marked(root.path()), []);
     }
 }
 
 #[test]
-fn a_killed_worker_leaves_a_mark_at_each_part_that_it_was_at_and_one_that_ends_in_order_none() {
+fn the_death_of_a_killed_worker_counts_at_each_part_that_it_was_at_and_an_end_in_order_at_none() {
     let root = tempfile::tempdir().unwrap();
     let layout = Layout::new(&Disk, root.path());
     let sweep = sweep(SEEDS, "");
@@ -111,41 +121,42 @@ fn a_killed_worker_leaves_a_mark_at_each_part_that_it_was_at_and_one_that_ends_i
     assert!(stopped.stopped && stopped.marked.is_empty());
     stop.store(false, Ordering::Relaxed);
     let failed = join(&layout, &sweep, options(&stop, 1), |joined| {
-        joined.member.begin_part(PartName {
-            extension: 0,
-            index: 1,
-        })?;
+        begin_part(joined, 1)?;
         Err::<(), _>(ResultsError::refused(root.path(), "no"))
     });
     assert!(failed.is_err());
     run_some_parts(&layout, &sweep);
-    assert_eq!(marks(root.path()), Vec::<String>::new());
+    assert_eq!(deaths(root.path()), 0);
 
-    for deaths in 1..4 {
+    for times in 1..4 {
         let killed = join(&layout, &sweep, options(&stop, 1), |joined| {
-            let part = PartName {
-                extension: 0,
-                index: 2,
-            };
-            joined.member.begin_part(part)?;
-            joined.member.begin_part(PartName { index: 3, ..part })?;
-            joined.member.end_part(PartName { index: 3, ..part })?;
+            begin_part(joined, 2)?;
             // As if it were killed here.
             lose(std::thread::current().id());
             join(&layout, &sweep, options(&stop, 1), |heir| {
-                heir.member.tidy()?;
+                heir.member.tidy(false)?;
                 Ok::<_, ResultsError>(())
             })
         });
         assert!(killed.is_ok(), "{killed:?}");
-        assert_eq!(marks(root.path()).len(), deaths);
+        assert_eq!(deaths(root.path()), 1);
+        let found = marked(root.path());
+        let found = found.first().map(|found| (&*found.part, found.deaths));
+        assert_eq!(found, (times > 1).then_some(("part-000-000002", times)));
     }
-    assert!(
-        marks(root.path())
-            .iter()
-            .all(|mark| mark.starts_with("part-000-000002.worker-"))
-    );
-    assert_eq!(marked(root.path())[0].deaths, 3);
+}
+
+/// Claims a part, as a worker does that runs it.
+fn begin_part(joined: &Joined<'_>, index: u64) -> Result<(), ResultsError> {
+    let part = PartName {
+        extension: 0,
+        index,
+    };
+    let mut claims = Claims::list(joined.member)?;
+    let generation = claims.last(&part.to_string()).map_or(0, |last| last + 1);
+    assert!(claims.take(&part.to_string(), generation)?);
+    joined.member.begin_part(&part.to_string(), generation);
+    Ok(())
 }
 
 /// Runs the first part alone.

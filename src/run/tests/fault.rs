@@ -10,14 +10,13 @@ pub enum Operation {
     Rename,
     SyncFolder,
     Remove,
-    Lock,
     List,
     Read,
     LookUp,
 }
 
 impl Operation {
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 10] = [
         Self::CreateFolder,
         Self::Create,
         Self::Write,
@@ -25,7 +24,6 @@ impl Operation {
         Self::Rename,
         Self::SyncFolder,
         Self::Remove,
-        Self::Lock,
         Self::List,
         Self::Read,
         Self::LookUp,
@@ -40,7 +38,6 @@ impl Operation {
             Self::Rename => "rename",
             Self::SyncFolder => "sync a folder",
             Self::Remove => "remove",
-            Self::Lock => "lock",
             Self::List => "list",
             Self::Read => "read",
             Self::LookUp => "look up",
@@ -49,10 +46,7 @@ impl Operation {
 
     /// Whether a full disk can refuse it.
     pub const fn needs_space(self) -> bool {
-        !matches!(
-            self,
-            Self::Remove | Self::Lock | Self::List | Self::Read | Self::LookUp
-        )
+        !matches!(self, Self::Remove | Self::List | Self::Read | Self::LookUp)
     }
 }
 

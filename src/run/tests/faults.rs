@@ -118,19 +118,12 @@ fn attempt(layout: &Layout<'_>, scenario: &Scenario, faults: bool) -> Result<Run
     Ok(report)
 }
 
-/// Tables, reduced data and extensions, without logs, locks and leftovers.
+/// Tables, reduced data and extensions, without logs and leftovers.
 pub fn results(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<&Path, &[u8]> {
     let is_result = |path: &Path| {
-        ![
-            "run/log",
-            "run/lock",
-            "run/staging",
-            "run/workers",
-            "run/claims",
-            "run/deaths",
-        ]
-        .iter()
-        .any(|folder| path.starts_with(folder))
+        !["run/log", "run/staging", "run/workers", "run/claims"]
+            .iter()
+            .any(|folder| path.starts_with(folder))
     };
     files
         .iter()

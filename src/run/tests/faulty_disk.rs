@@ -5,8 +5,8 @@
 
 use super::fault::{Fault, Operation};
 use crate::results::workers::BEAT_THREAD;
-use crate::table::storage::{Lock, Sink, Storage, StorageError, StoredFile};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::table::storage::{Sink, Storage, StorageError, StoredFile};
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, Seek, Write};
@@ -35,7 +35,6 @@ enum Mode {
 struct State {
     seen: BTreeMap<PathBuf, Node>,
     on_disk: BTreeMap<PathBuf, Node>,
-    locks: BTreeSet<PathBuf>,
     mode: Mode,
     armed: Option<(Operation, usize, Fault)>,
     /// How often the armed operation may still be done before it fails.
@@ -64,7 +63,6 @@ impl FaultyDisk {
         Self(Arc::new(Mutex::new(State {
             seen: names.clone(),
             on_disk: names,
-            locks: BTreeSet::new(),
             mode: Mode::Fine,
             armed: None,
             left: 0,
@@ -118,7 +116,6 @@ impl FaultyDisk {
         let mut state = self.state();
         state.mode = Mode::Fine;
         state.armed = None;
-        state.locks.clear();
         fired.is_some()
     }
 
@@ -207,8 +204,6 @@ impl FaultyDisk {
             Verdict::Refused(error) => Err(io::Error::from_raw_os_error(error)),
             Verdict::DoneButRefused(error) => {
                 let done = act(&mut state);
-                // A lock that was given is given back, for which the state must be free.
-                drop(state);
                 done.and(Err(io::Error::from_raw_os_error(error)))
             }
             Verdict::HalfDone => unreachable!("only writes are half done"),
@@ -316,18 +311,6 @@ impl Sink for FaultyFile {
     }
 }
 
-/// Gives a lock back when it is dropped.
-struct Held {
-    disk: FaultyDisk,
-    file: PathBuf,
-}
-
-impl Drop for Held {
-    fn drop(&mut self) {
-        self.disk.state().locks.remove(&self.file);
-    }
-}
-
 impl Storage for FaultyDisk {
     fn create_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.on(Operation::CreateFolder, folder, |state| {
@@ -432,19 +415,6 @@ impl Storage for FaultyDisk {
         self.on(Operation::Remove, folder, |state| {
             state.seen.retain(|path, _| !path.starts_with(folder));
             Ok(())
-        })
-    }
-
-    fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        self.on(Operation::Lock, file, |state| {
-            state.touch(file)?;
-            if !state.locks.insert(file.to_owned()) {
-                return Ok(Lock::Taken);
-            }
-            Ok(Lock::Ours(Box::new(Held {
-                disk: self.clone(),
-                file: file.to_owned(),
-            })))
         })
     }
 }

@@ -8,7 +8,7 @@
 
 use super::schedule::Schedule;
 use crate::results::workers::BEAT_THREAD;
-use crate::table::storage::{Disk, Lock, Storage, StorageError, StoredFile};
+use crate::table::storage::{Disk, Storage, StorageError, StoredFile};
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::fs::File;
@@ -179,15 +179,5 @@ impl Storage for Host<'_> {
 
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.change("remove", [folder, folder], || Disk.remove_folder(folder))
-    }
-
-    /// Network file systems are often mounted without locks.
-    fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        self.turn("lock", file)?;
-        if self.beliefs.is_some() {
-            Ok(Lock::Unknown)
-        } else {
-            Disk.lock(file)
-        }
     }
 }

@@ -328,11 +328,7 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
                 && !is_killed
             {
                 let is_frozen = is_freezing && number == 0;
-                // One that is suspended keeps its locks.
-                let is_locked =
-                    is_freezing && format!("{error:#}").contains("another process holds it");
-                let is_allowed =
-                    is_locked || is_allowed(&error, *process, &processes, there, is_frozen);
+                let is_allowed = is_allowed(&error, *process, &processes, there, is_frozen);
                 assert!(is_allowed, "{case}: {process:?} ends with: {error:#}");
             }
         }

@@ -1,6 +1,6 @@
 //! For tests: the disk of the operating system, with operations that a test can watch, change or let fail.
 
-use super::{Disk, Lock, Sink, Storage, StorageError, StoredFile};
+use super::{Disk, Sink, Storage, StorageError, StoredFile};
 use std::ffi::OsString;
 use std::fs::File;
 use std::io;
@@ -27,10 +27,6 @@ pub trait OverDisk: Sync {
     /// Puts something between a file and what is written to it.
     fn wrap(&self, file: File) -> Box<dyn Sink> {
         Box::new(file)
-    }
-
-    fn try_lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        Disk.lock(file)
     }
 }
 
@@ -89,10 +85,5 @@ impl<T: OverDisk> Storage for T {
         self.before(Access::Change)
             .map_err(StorageError::at("remove", folder))?;
         Disk.remove_folder(folder)
-    }
-    fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        self.before(Access::Look)
-            .map_err(StorageError::at("lock", file))?;
-        self.try_lock(file)
     }
 }
