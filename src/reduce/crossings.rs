@@ -44,6 +44,7 @@ words! {
         Open = "open",
         UnclearEnd = "unclear end",
         Unclear = "unclear",
+        NoValue = "no value",
         #[default]
         NoCrossing = "no crossing",
     }
@@ -64,7 +65,7 @@ columns! {
         bracket_low: f64 = "", "the nearest value that is clearly on one side, or the end of the row";
         bracket_high: f64 = "", "the nearest above it that is clearly on the other side, or on the same if `ended` is `unclear`, or the end of the row";
         ended: Ended = "",
-            "`width`: the interval is as narrow as is wanted; `seeds`: its sets have the most; `jobs`: no more may run; `open`: the rounds go on; `unclear end`: with all seeds or jobs, the interval of the set at an end of the row still has the threshold within it, so it may be crossed there or beyond; `unclear`: the same of a set between two on the same side; `no crossing`: all sets of the row are clearly on one side";
+            "`width`: the interval is as narrow as is wanted; `seeds`: its sets have the most; `jobs`: no more may run; `open`: the rounds go on; `unclear end`: with all seeds or jobs, the interval of the set at an end of the row still has the threshold within it, so it may be crossed there or beyond; `unclear`: the same of a set between two on the same side; `no value`: no set of the row has one, as where too few of its slips say a phase; `no crossing`: all that have one are clearly on one side";
     }
 }
 
@@ -85,6 +86,7 @@ impl EdgeRow {
         match self.ended {
             Ended::UnclearEnd => Some("unclear: raise seeds.to, or widen the axis"),
             Ended::Unclear => Some("unclear: raise seeds.to"),
+            Ended::NoValue => Some("no set has a value: record more slips a job"),
             Ended::Width | Ended::Seeds | Ended::Jobs | Ended::Open | Ended::NoCrossing => None,
         }
     }
@@ -172,6 +174,7 @@ pub struct Line<'a> {
     pub rows: Vec<u64>,
     statistic: Statistic,
     sets: Vec<(u64, &'a SetOfEdges)>,
+    has_values: bool,
     pub edges: Vec<Edge<'a>>,
     pub unclear: Vec<Stretch<'a>>,
 }
@@ -382,6 +385,7 @@ pub fn lines<'a>(
                 rows: rows.clone(),
                 statistic,
                 sets: sets.clone(),
+                has_values: !known.is_empty(),
                 edges: Vec::new(),
                 unclear: Vec::new(),
             };
@@ -470,6 +474,11 @@ pub(super) fn edge_rows(
         {
             rows.push(EdgeRow {
                 jobs: line.sets.iter().map(|(_, set)| set.seeds).sum(),
+                ended: if line.has_values {
+                    Ended::NoCrossing
+                } else {
+                    Ended::NoValue
+                },
                 ..row_between(sweep, refinement, key, *first, last.0)
             });
         }

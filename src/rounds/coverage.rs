@@ -3,7 +3,10 @@
 
 use super::{need, seeds_for};
 use crate::model::Parameters;
-use crate::reduce::{Pool, PooledJob, SetRow, Units, error_over_target, mean, quantile};
+use crate::reduce::{
+    Interval, Pool, PooledJob, Pulses, SetRow, TriggerRow, Units, error_over_target, mean,
+    quantile, read_optional,
+};
 use crate::results::layout::Layout;
 use crate::sets::{STATISTICS, Statistic};
 use crate::sweep::{MIN_SEEDS, Precision, Target};
@@ -11,7 +14,7 @@ use crate::table::storage::Disk;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -213,7 +216,7 @@ fn read_pool(folder: &Path, name: &str) -> Pool {
 }
 
 /// Distinct jobs of a set, by the number of the repetition: the first some of a keyed permutation.
-fn of_repetition(jobs: &[PooledJob], repetition: u64, most: usize) -> Vec<&PooledJob> {
+fn of_repetition<J>(jobs: &[J], repetition: u64, most: usize) -> Vec<&J> {
     let mut generator = ChaCha8Rng::seed_from_u64(repetition);
     let mut moved: HashMap<usize, usize> = HashMap::new();
     let next = |place: usize| {
@@ -375,6 +378,55 @@ fn of_backbone(pool: &Pool) -> [f64; 2] {
         ]));
     }
     held.map(|held| 100.0 * f64::from(held) / repetitions as f64)
+}
+
+/// Seeds of a repetition of pulses.
+const SEEDS_OF_PULSES: [usize; 3] = [8, 16, 32];
+/// Parts of the cycle in which pulses begin, by name.
+const THIRDS: [(&str, f64); 3] = [("early", 0.0), ("middle", 1.0 / 3.0), ("late", 2.0 / 3.0)];
+
+/// A line for each pulse, third of the cycle and number of seeds: the share of slips that are triggered, and the
+/// coverage of its intervals and of those of its excess over the drive alone.
+fn of_pulses(rows: &[TriggerRow]) -> String {
+    let mut lines = vec![
+        "| Δ (µm) | f (Hz) | cycle | seeds | share | coverage | excess | coverage |".to_owned(),
+        "|---|---|---|---|---|---|---|---|".to_owned(),
+    ];
+    let seeds: BTreeSet<u64> = rows.iter().map(|row| row.parameters.seed).collect();
+    let seeds: Vec<u64> = seeds.into_iter().collect();
+    for pulses in Pulses::of(rows) {
+        for (name, low) in THIRDS {
+            let all = pulses.between(low, low + 1.0 / 3.0);
+            let [(share, _), _, (excess, _)] = all.triggered().expect("pulses in each third");
+            for count in SEEDS_OF_PULSES {
+                let of = |repetition: u64| {
+                    let some = of_repetition(&seeds, repetition, count);
+                    let some: BTreeSet<u64> = some.into_iter().copied().collect();
+                    let mut pulses = all.clone();
+                    pulses
+                        .rows
+                        .retain(|row| some.contains(&row.parameters.seed));
+                    let [(_, of_share), _, (_, of_excess)] = pulses.triggered()?;
+                    let holds = |of: Interval, truth: f64| of.low <= truth && truth <= of.high;
+                    Some([holds(of_share?, share), holds(of_excess?, excess)])
+                };
+                let repetitions = (0..REPETITIONS).into_par_iter().filter_map(of);
+                let found: Vec<[bool; 2]> = repetitions.collect();
+                let held = |which: usize| {
+                    let held = found.iter().filter(|held| held[which]).count();
+                    100.0 * held as f64 / found.len() as f64
+                };
+                lines.push(format!(
+                    "| {:.2} | {:.0} | {name} | {count} | {share:.3} | {:.1} | {excess:.3} | {:.1} |",
+                    1e6 * pulses.parameters.modulation_amplitude,
+                    pulses.parameters.frequency().unwrap_or_default(),
+                    held(0),
+                    held(1),
+                ));
+            }
+        }
+    }
+    lines.join("\n")
 }
 
 /// A cell with where it stands.
@@ -590,6 +642,8 @@ fn coverage_is_measured() {
     let is_narrow = |cell: &&CellOfSet| cell.is_of_many() && cell.cell.width <= 3.0;
     let narrow = 100.0 * all.iter().filter(is_narrow).count() as f64 / many.count as f64;
     let [slips, means] = of_backbone(&read_pool(folder, "dense"));
+    let pulses = folder.join("coverage-pulses");
+    let triggers: Vec<TriggerRow> = read_optional(&Layout::new(&Disk, &pulses)).unwrap();
     let text = format!(
         "{}\n\n\
          From {MANY} jobs on there are {} cells: {low} lie below {MIN_COVERAGE} %, the least at {:.1} %, the median at\n\
@@ -603,7 +657,10 @@ fn coverage_is_measured() {
          ## The back-bone\n\n\
          Twelve sets with η from 2 to 2.2 and Δ = 0.6 µm in one bin, with two seeds in common of 15 slips; 100\n\
          repetitions. The interval of the mean phase of all slips holds the true value in {slips:.1} %, that of the mean\n\
-         of the sets that have a phase in {means:.1} %.\n",
+         of the sets that have a phase in {means:.1} %.\n\n\
+         ## Triggered slips\n\n\
+         Shares of slips that pulses trigger, for repetitions of some of 640 seeds, by the third of the cycle in which\n\
+         pulses begin:\n\n{}\n",
         include_str!("coverage.md").trim_end(),
         many.count,
         many.coverage[0],
@@ -616,6 +673,7 @@ fn coverage_is_measured() {
         worst(&all, &sets),
         by_statistic(&all, &statistics),
         by_set(&all, &sets),
+        of_pulses(&triggers),
     );
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     std::fs::write(docs.join("coverage.md"), text).unwrap();

@@ -280,13 +280,18 @@ fn edges_have_intervals_and_say_how_they_ended_and_rows_without_one_say_so() {
         "{told:?}"
     );
     assert!(folder.table("r", "jobs").counts("seed").into_iter().min() == Some(5));
-    folder.ends(0, "run few.toml --out few");
-    let none = folder.file("few/reduced/edges.parquet");
-    assert!(
-        none.texts("ended")
-            .iter()
-            .all(|ended| *ended == "no crossing")
-    );
+    let end = |name: &str, ended: &str| {
+        folder.ends(0, &format!("run {name}.toml --out {name}"));
+        let edges = folder.file(&format!("{name}/reduced/edges.parquet"));
+        let texts = edges.texts("ended");
+        assert!(texts.iter().all(|text| *text == ended), "{name}: {texts:?}");
+    };
+    end("few", "no crossing");
+    // Too short for two cycles of the load, and so for a phase.
+    folder.write("short.toml", &MAP.replace("slips = 10", "slips = 2"));
+    end("short", "no value");
+    let shown = folder.ends(0, "show short").stdout;
+    assert!(shown.contains("record more slips a job"), "{shown}");
 }
 
 #[test]
