@@ -3,7 +3,9 @@
 
 use crate::model::{Description, Parameters, Symbol, Value};
 use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, TraceRow};
-use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, RoundOfSet, SetRow, TriggerRow};
+use crate::reduce::{
+    BackboneBin, EdgeRow, HistogramBin, Point, PulseRow, RoundOfSet, SetRow, TriggerRow,
+};
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::solver::{Solver, SolverKey};
 use crate::table::Table;
@@ -199,8 +201,8 @@ fn documented_tables_are_those_written() {
         )*};
     }
     document! {
-        SlipRow<'_> PrecursorRow<'_> JobRow SetRow RoundOfSet EdgeRow TriggerRow HistogramBin BackboneBin Point TraceRow MapRow
-        ProfileRow ContactRow
+        SlipRow<'_> PrecursorRow<'_> JobRow SetRow RoundOfSet EdgeRow TriggerRow PulseRow HistogramBin BackboneBin Point TraceRow
+        MapRow ProfileRow ContactRow
     }
     assert_documented("tables.md", &format!("{TABLES}{}", sections.join("\n")));
 }

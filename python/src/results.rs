@@ -11,11 +11,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::figure::Beside;
 use stickslip::reduce::{
-    BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, TriggerRow, read_sets, renew,
+    BackboneBin, EdgeRow, HistogramBin, Point, PulseRow, SetInRounds, SetRow, TriggerRow,
+    read_sets, renew,
 };
 use stickslip::results::exported::{JoinedTable, with_columns};
 use stickslip::results::layout::Layout;
-use stickslip::results::tables::{RecordedTable, gaps};
+use stickslip::results::tables::{OptionalTable, RecordedTable, gaps};
 use stickslip::results::{Results, ResultsError};
 use stickslip::table::Table as TableRow;
 use stickslip::table::arrow::{Gaps, RowBuffer, schema};
@@ -195,6 +196,7 @@ fn reduced_columns(results: &Results<'_>, table: &str) -> PyResult<(&'static str
         of::<SetRow>(&gaps),
         of::<EdgeRow>(&gaps),
         of::<TriggerRow>(&gaps),
+        of::<PulseRow>(&gaps),
         of::<HistogramBin>(&gaps),
         of::<BackboneBin>(&gaps),
         of::<Point>(&gaps),
@@ -208,11 +210,9 @@ fn read_reduced(
     table: &'static str,
     columns: Vec<FieldRef>,
 ) -> Result<Table, Error> {
-    if results.optional_tables().contains(&(table, false)) {
-        let needed = match table {
-            EdgeRow::NAME => "[refine]",
-            _ => "pulse_start",
-        };
+    let optional = OptionalTable::from_word(table);
+    if let Some(optional) = optional.filter(|optional| !results.has(*optional)) {
+        let needed = optional.needs();
         let problem = format!("has no {table}: its sweep file has no {needed}");
         return Err(ResultsError::refused(results.layout().root(), problem).into());
     }

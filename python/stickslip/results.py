@@ -78,6 +78,10 @@ class Results(Guessed):
         """One row per job with a pulse: how much earlier (s) its next slip came than without it, and by the drive alone."""
         return self._table("triggers", columns)
 
+    def pulses(self, columns: Sequence[str] | None = None) -> Table:
+        """One row per pulse and per tenth of the cycle in which it begins: mean advance and share of triggered slips."""
+        return self._table("pulses", columns)
+
     def histograms(self, columns: Sequence[str] | None = None) -> Table:
         """One row per bin of the intervals of a set."""
         return self._table("histograms", columns)

@@ -4,9 +4,9 @@ use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
 use crate::model::{Parameters, Selected, Selection, Symbol, Value as Parameter};
 use crate::reduce::{
-    Comparison, Condition, Difference, EdgePair, EdgeRow, FREQUENCY, Interval, Pulses, SetInRounds,
-    SetRow, TriggerRow, Values, add_intervals, ascending, compare, differing, means_of_slips,
-    pairs_of_edges, read_optional, read_sets, read_sets_in_rounds, renew,
+    Comparison, Condition, Difference, EdgePair, EdgeRow, FREQUENCY, Interval, PulseRow,
+    SetInRounds, SetRow, TriggerRow, Values, add_intervals, ascending, compare, differing,
+    means_of_slips, pairs_of_edges, read_optional, read_sets, read_sets_in_rounds, renew,
 };
 use crate::results::Results;
 use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, symbol_of, with_decimals};
@@ -82,19 +82,19 @@ impl Arguments {
         !self.json && !self.csv
     }
 
-    /// Prints the chosen columns of the chosen sets, as JSON with a further field. `rows` are the sets of a single
+    /// Prints the chosen columns of the chosen sets, as JSON with the fields of `found`. `rows` are the sets of a single
     /// directory.
     fn print(
         &self,
         columns: &[Values],
         count: usize,
         rows: &[SetRow],
-        (field, value): (&str, Json),
+        mut found: Json,
     ) -> Result<()> {
         if self.json {
             let sets = (0..count).map(|set| record(columns, set).into_iter().collect());
             let sets: Vec<Map<String, Json>> = sets.collect();
-            let found = serde_json::json!({ "sets": sets, field: value });
+            found["sets"] = serde_json::json!(sets);
             output::json(JSON_FORMAT, &found)
         } else if self.csv {
             print_csv(columns, count)
@@ -158,7 +158,7 @@ fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) 
         &columns,
         count,
         &[],
-        ("differences", serde_json::json!(constants)),
+        serde_json::json!({ "differences": constants }),
     )
 }
 
@@ -194,10 +194,12 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
         }
         output::print(&table_of_edges(&edges, &rows))?;
         output::print(&table_of_pairs(&pairs_of_edges(results)?))?;
-        output::print(&table_of_pulses(&read_optional(results.layout())?))?;
+        output::print(&table_of_pulses(results)?)?;
     }
     let edges: Vec<Json> = edges.iter().map(json).collect();
-    arguments.print(&columns, rows.len(), &rows, ("edges", edges.into()))?;
+    let pulses: Vec<Json> = pulses(results)?.iter().map(json).collect();
+    let found = serde_json::json!({ "edges": edges, "pulses": pulses });
+    arguments.print(&columns, rows.len(), &rows, found)?;
     if arguments.is_text() {
         output::lines(notes(results, &rows))?;
     }
@@ -212,7 +214,7 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     // A line that says how many more there are is as long as one of these.
     let first = FIRST + usize::from(count == FIRST as u64 + 1);
     let mut text = table_of_edges(&read_optional(results.layout())?, &rows);
-    text += &table_of_pulses(&read_optional(results.layout())?);
+    text += &table_of_pulses(results)?;
     text += &aligned(&columns, &rows, first);
     if let Some(more @ 1..) = count.checked_sub(first as u64) {
         let root = output::quoted_path(results.layout().root());
@@ -382,39 +384,54 @@ fn parameters_but(symbol: Symbol, rows: impl Iterator<Item = Parameters>) -> Tex
 }
 
 /// What pulses did, for people, and a blank line; empty if none says something.
-fn table_of_pulses(triggers: &[TriggerRow]) -> String {
-    let pulses = Pulses::of(triggers);
+fn table_of_pulses(results: &Results<'_>) -> Result<String> {
+    let pulses = pulses(results)?;
     if pulses.is_empty() {
-        return String::new();
+        return Ok(String::new());
     }
-    let parameters = pulses.iter().map(|pulses| pulses.parameters.clone());
+    let parameters = pulses.iter().map(|row| row.pulse().clone());
     let mut columns = parameters_but(Symbol::PulseStart, parameters);
-    columns.numbers("pulses", &pulses, |pulses| pulses.rows.len().to_string());
-    let found = |pulses: &Pulses<'_>| [pulses.advances(), pulses.triggered()];
-    for (place, name) in ["advance/⟨τ⟩", "triggered"].into_iter().enumerate() {
-        for (head, which) in [(name, 0), ("by the drive", 1), ("excess", 2)] {
-            columns.numbers(head, &pulses, |pulses| {
-                match found(pulses)[place].map(|means| means[which]) {
-                    // Exact for the control's slips, whose error the excess has.
-                    Some((value, Some(Interval { low, high }))) if which != 1 => {
-                        with_interval(value, low, high)
-                    }
-                    Some((value, _)) => Digits::THREE.number(value),
-                    None => "–".to_owned(),
-                }
-            });
-        }
-    }
+    columns.numbers("pulses", &pulses, |row| row.jobs.to_string());
+    let mut add = |name: &str, of: fn(&PulseRow) -> (Option<f64>, Option<Interval>)| {
+        columns.numbers(name, &pulses, |row| match of(row) {
+            (Some(value), Some(Interval { low, high })) => with_interval(value, low, high),
+            (Some(value), None) => Digits::THREE.number(value),
+            (None, _) => "–".to_owned(),
+        });
+    };
+    // By the drive alone they are exact for the control's slips, whose error the excess has.
+    add("advance/⟨τ⟩", |row| {
+        (row.advance_mean, row.advance_interval)
+    });
+    add("by the drive", |row| (row.advance_drive, None));
+    add("excess", |row| {
+        (row.advance_excess, row.advance_excess_interval)
+    });
+    add("triggered", |row| {
+        (Some(row.triggered_share), row.triggered_interval)
+    });
+    add("by the drive", |row| (Some(row.triggered_drive), None));
+    add("excess", |row| {
+        (Some(row.triggered_excess), row.triggered_excess_interval)
+    });
+    let triggers: Vec<TriggerRow> = read_optional(results.layout())?;
     let silent = triggers.iter().filter(|row| row.advance.is_none()).count();
     let noise = triggers.iter().filter_map(|row| row.noise);
     let noise = noise.reduce(f64::max).map(|noise| {
         format!("; pulses of 1e-12 m at most advance slips by up to {noise:.1e} s, by the error of the solver")
     });
     let noise = noise.unwrap_or_default();
-    format!(
+    Ok(format!(
         "{columns}without a slip to compare: {silent} of {} pulses{noise}\n\n",
         triggers.len()
-    )
+    ))
+}
+
+/// What pulses did, wherever in the cycle they begin.
+fn pulses(results: &Results<'_>) -> Result<Vec<PulseRow>> {
+    let mut pulses: Vec<PulseRow> = read_optional(results.layout())?;
+    pulses.retain(PulseRow::is_of_whole_cycle);
+    Ok(pulses)
 }
 
 /// Whether a set differs from those of an edge in nothing but the refined axis.

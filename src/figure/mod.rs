@@ -45,7 +45,7 @@ use self::chart::Rows;
 use self::quantity::{Quantity, distinct};
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
-    EdgeRow, SetRow, SlipOfSet, TriggerRow, advise, means_of_slips, read_optional, read_reduced,
+    EdgeRow, PulseRow, SetRow, SlipOfSet, advise, means_of_slips, read_optional, read_reduced,
     read_sets, sample_of_slips, swept,
 };
 use crate::results::commit::Commit;
@@ -173,8 +173,8 @@ pub fn draw_all(
     }
     let edges: Vec<EdgeRow> = read_optional(layout).map_err(advise(ADVICE))?;
     pictures.extend(edge_values::edges(&edges, look));
-    let triggers: Vec<TriggerRow> = read_optional(layout).map_err(advise(ADVICE))?;
-    pictures.extend(triggering::triggering(&triggers, look));
+    let pulses: Vec<PulseRow> = read_optional(layout).map_err(advise(ADVICE))?;
+    pictures.extend(triggering::triggering(&pulses, look));
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
     }

@@ -11,7 +11,7 @@ use super::style::{
     BAR_WIDTH, BLACK, Dot, INKS, Ink, Look, RADIUS, REFERENCE, Stroke, drive_alone,
 };
 use crate::model::Symbol;
-use crate::reduce::{Mean, Pulses, TriggerRow, ascending};
+use crate::reduce::{Interval, PulseRow, ascending};
 use crate::sets::{Digits, label};
 
 pub(super) const NAME: &str = "triggering";
@@ -22,78 +22,86 @@ const COLUMNS: usize = 2;
 const GAP: f64 = 20.0;
 /// Panels of amplitudes, at most.
 const MAX_AMPLITUDES: usize = 5;
-/// Bins of the place in the cycle.
-const BINS: u32 = 10;
+/// A mean at some place: as seen, and by the drive alone.
+struct Mean {
+    x: f64,
+    seen: f64,
+    interval: Option<Interval>,
+    by_drive: f64,
+}
 
-/// Means at some places: as seen, with their intervals, and by the drive alone.
+impl Mean {
+    fn bar(&self) -> Option<(f64, Ends)> {
+        self.interval.map(|ends| (self.x, (ends.low, ends.high)))
+    }
+}
+
 struct Series {
     ink: Ink,
-    means: Vec<(f64, [Mean; 3])>,
+    means: Vec<Mean>,
 }
 
 impl Series {
-    fn bars(&self) -> impl Iterator<Item = (f64, Ends)> + '_ {
-        let means = self.means.iter();
-        means
-            .filter_map(|&(x, [(_, interval), ..])| interval.map(|ends| (x, (ends.low, ends.high))))
-    }
-
     fn values(&self) -> impl Iterator<Item = f64> + '_ {
-        let bars = self.bars().flat_map(|(_, (low, high))| [low, high]);
+        let bars = self.means.iter().filter_map(Mean::bar);
+        let bars = bars.flat_map(|(_, (low, high))| [low, high]);
         let means = self.means.iter();
-        let means = means.flat_map(|(_, [seen, by_drive, _])| [seen.0, by_drive.0]);
+        let means = means.flat_map(|mean| [mean.seen, mean.by_drive]);
         means.chain(bars)
     }
 
     fn layers<'a>(self) -> [Layer<'a>; 3] {
-        let places = |which: usize| {
-            let means = self.means.iter();
-            means.map(|(x, means)| (*x, means[which].0)).collect()
+        let means = || self.means.iter();
+        let bars = means().filter_map(Mean::bar).collect();
+        // A curve through one point is none.
+        let by_drive = if let [mean] = &self.means[..] {
+            Layer::Level(mean.by_drive, drive_alone(self.ink))
+        } else {
+            let places = means().map(|mean| (mean.x, mean.by_drive));
+            Layer::Curve(places.collect(), drive_alone(self.ink))
         };
-        let bars = self.bars().collect();
-        let by_drive = match self.means[..] {
-            // A curve through one point is none.
-            [(_, [_, (value, _), _])] => Layer::Level(value, drive_alone(self.ink)),
-            _ => Layer::Curve(places(1), drive_alone(self.ink)),
-        };
+        let dots = means().map(|mean| (mean.x, mean.seen)).collect();
         [
             by_drive,
             Layer::Bars(bars, Stroke::solid(self.ink, BAR_WIDTH)),
-            Layer::Dots(places(0), Dot::solid(self.ink, RADIUS)),
+            Layer::Dots(dots, Dot::solid(self.ink, RADIUS)),
         ]
     }
 }
 
-/// `None` if no job says what its pulse did, or they differ in more than where it begins, amplitude and period.
-pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
-    let all = Pulses::of(rows);
-    let value = |pulses: &Pulses<'_>, symbol| pulses.parameters.get(symbol).number();
-    let values = |symbol| ascending(all.iter().filter_map(|pulses| value(pulses, symbol)));
+/// `None` without pulses, or if they differ in more than where they begin, amplitude and period.
+pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
+    let whole = || rows.iter().filter(|row| row.is_of_whole_cycle());
+    let value = |row: &PulseRow, symbol| row.pulse().get(symbol).number();
+    let values = |symbol| ascending(whole().filter_map(|row| value(row, symbol)));
     let amplitudes = values(Symbol::Delta);
     // High frequencies first.
     let periods = values(Symbol::T);
-    let control = |pulses: &Pulses<'_>| pulses.parameters.without_modulation();
-    let mut pairs = all.iter().zip(all.iter().skip(1));
+    let control = |row: &PulseRow| row.pulse().without_modulation();
+    let mut pairs = whole().zip(whole().skip(1));
     let is_one = values(Symbol::PulseCycles).len() == 1
         && pairs.all(|(one, next)| control(one) == control(next));
     if !is_one || periods.len() > INKS.len() || amplitudes.len() > MAX_AMPLITUDES {
         return None;
     }
-    let of = |amplitude: f64, period: f64| {
-        all.iter().find(|pulses| {
-            let own = [Symbol::Delta, Symbol::T].map(|symbol| value(pulses, symbol));
-            own == [Some(amplitude), Some(period)]
-        })
+    let is_of = |row: &&PulseRow, amplitude: f64, period: f64| {
+        let own = [Symbol::Delta, Symbol::T].map(|symbol| value(row, symbol));
+        own == [Some(amplitude), Some(period)]
     };
     let inks = || periods.iter().copied().zip(INKS);
     let responses = |amplitude: f64| {
         let series = inks().map(|(period, ink)| {
-            let bins = (0..BINS).filter_map(|bin| {
-                let [low, high] = [bin, bin + 1].map(|edge| f64::from(edge) / f64::from(BINS));
-                let pulses = of(amplitude, period)?.between(low, high);
-                Some((0.5 * (low + high), pulses.advances()?))
+            let own = rows.iter().filter(|row| is_of(row, amplitude, period));
+            let parts = own.filter(|row| !row.is_of_whole_cycle());
+            let means = parts.filter_map(|row| {
+                Some(Mean {
+                    x: 0.5 * (row.place_low + row.place_high),
+                    seen: row.advance_mean?,
+                    interval: row.advance_interval,
+                    by_drive: row.advance_drive?,
+                })
             });
-            let means = bins.collect();
+            let means = means.collect();
             Series { ink, means }
         });
         series.collect::<Vec<_>>()
@@ -115,8 +123,13 @@ pub(super) fn triggering(rows: &[TriggerRow], look: &Look) -> Option<Picture> {
     let shares = inks().map(|(period, ink)| {
         let places = amplitudes.iter();
         let shares = places.filter_map(|&amplitude| {
-            let means = of(amplitude, period)?.triggered()?;
-            Some((factor * amplitude, means))
+            let row = whole().find(|row| is_of(row, amplitude, period))?;
+            Some(Mean {
+                x: factor * amplitude,
+                seen: row.triggered_share,
+                interval: row.triggered_interval,
+                by_drive: row.triggered_drive,
+            })
         });
         let means = shares.collect();
         Series { ink, means }
@@ -151,13 +164,15 @@ mod tests {
     #[test]
     fn the_drive_alone_is_drawn_for_one_amplitude_too() {
         for amplitudes in 1..4 {
-            let mean = |value: f64| (value, None);
-            let means = [mean(0.4), mean(0.1), mean(0.3)];
+            let mean = |place| Mean {
+                x: f64::from(place),
+                seen: 0.4,
+                interval: None,
+                by_drive: 0.1,
+            };
             let series = Series {
                 ink: INKS[0],
-                means: (0..amplitudes)
-                    .map(|number| (f64::from(number), means))
-                    .collect(),
+                means: (0..amplitudes).map(mean).collect(),
             };
             match &series.layers()[0] {
                 Layer::Level(value, _) => assert_eq!((*value, amplitudes), (0.1, 1)),

@@ -41,7 +41,9 @@ pub use reduction::{
     read_reduced, read_sets, read_sets_in_rounds, reduce, renew,
 };
 pub use slips::{SlipOfSet, add_intervals, means_of_slips, sample_of_slips};
-pub use triggers::{Mean, Pulses, TriggerRow};
+#[cfg(test)]
+pub(crate) use triggers::Pulses;
+pub use triggers::{PulseRow, TriggerRow};
 pub use values::{Condition, Values, ascending, differing, has_even_steps, is_spread, swept};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

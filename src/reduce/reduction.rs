@@ -8,10 +8,10 @@
 use super::backbone::{Backbone, BackboneBin};
 use super::crossings::edge_rows;
 use super::gather::{Gathering, MAX_SLIPS, Point, spacing};
-use super::triggers::{note_noise, trigger_rows};
+use super::triggers::{note_noise, pulse_rows, trigger_rows};
 use crate::results::commit::Commit;
 use crate::results::layout::Layout;
-use crate::results::tables::{RecordedTable, gaps};
+use crate::results::tables::{OptionalTable, RecordedTable, gaps};
 use crate::results::{ErrorKind, Results, ResultsError};
 use crate::sets::SetRow;
 use crate::sweep::{Goal, Precision, Sweep, Target};
@@ -64,9 +64,9 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
     let layout = results.layout();
     let (commit, summary) = stage(results, max_slips)?;
     results.publish(commit)?;
-    for (table, is_there) in results.optional_tables() {
-        let file = layout.reduced_file(table);
-        if !is_there && layout.storage.exists(&file)? {
+    for table in OptionalTable::ALL {
+        let file = layout.reduced_file(table.word());
+        if !results.has(table) && layout.storage.exists(&file)? {
             // Left by an earlier sweep.
             layout.remove(&file)?;
         }
@@ -140,8 +140,9 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     kept.sort_by_key(|(place, _)| *place);
     summary.points = kept.len() as u64;
     staged.write(kept.into_iter().map(|(_, point)| point))?;
-    if results.plan().sweeps().any(Sweep::has_pulses) {
+    if results.has(OptionalTable::Triggers) {
         note_noise(&mut triggers);
+        staged.write(pulse_rows(&triggers))?;
         staged.write(triggers)?;
     }
     if let Some(refinement) = results.sweep().refinement() {
@@ -327,12 +328,12 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Results<'a>> {
         let file = DataFile::with_footer(layout.reduced_file(table), source.clone());
         file.check(layout.storage).is_ok()
     };
-    let mut optional = results.optional_tables().into_iter();
+    let mut optional = results.optional_tables();
     if is_current(SetRow::NAME)
         && is_current(HistogramBin::NAME)
         && is_current(BackboneBin::NAME)
         && is_current(Point::NAME)
-        && optional.all(|(table, is_there)| !is_there || is_current(table))
+        && optional.all(|table| is_current(table.word()))
     {
         return Ok(results.clone());
     }

@@ -10,19 +10,20 @@ use super::estimate::{Estimate, MAX_UNSEEN, Sums, Units, plus};
 use super::gather::Gathered;
 use crate::model::{Drive, Parameters, Selected};
 use crate::results::tables::All;
+use crate::sets::AllButSeed;
 use crate::table::columns::{Interval, columns};
 use crate::table::tables;
 use crate::table::value::words;
 use std::collections::{BTreeMap, BTreeSet};
+use std::iter::once;
 
 /// Amplitude in m up to which a pulse moves nothing: what advances by it shows the error of the solver.
 const NO_PULSE: f64 = 1e-12;
 
-/// A mean and its interval.
-pub type Mean = (f64, Option<Interval>);
-
 /// Seeds that a mean needs for an interval.
 const MIN_SEEDS: usize = 8;
+/// Parts of the cycle that have means of their own.
+const PARTS_OF_CYCLE: u32 = 10;
 
 words! {
     /// Why a job does not say what its pulse did.
@@ -56,6 +57,42 @@ columns! {
 }
 
 tables! { TriggerRow = "triggers", "One row per job with a pulse, if there are any"; }
+
+columns! {
+    /// Pulses that differ in their start and seed alone, and begin in the same part of the cycle.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct PulseRow {
+        parameters: Selected<AllButSeed>;
+        place_low: f64 = "", "share of the cycle at which the first of them may begin";
+        place_high: f64 = "", "share of it before which they begin; 0 and 1 are the whole cycle";
+        jobs: u64 = "", "jobs with such a pulse and a slip to compare";
+        advance_mean: Option<f64> = "", "mean advance over the mean interval of the control";
+        advance_interval as "advance_mean": Option<Interval> = "", "lower end of its 95 % confidence interval; null with fewer than 8 seeds";
+        advance_drive: Option<f64> = "", "the same by the drive alone";
+        advance_excess: Option<f64> = "", "the mean advance less that by the drive alone";
+        advance_excess_interval as "advance_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
+        triggered_share: f64 = "", "share of slips that the pulse triggers";
+        triggered_interval as "triggered_share": Option<Interval> = "", "lower end of its 95 % confidence interval; null with fewer than 8 seeds";
+        triggered_drive: f64 = "", "the same by the drive alone";
+        triggered_excess: f64 = "", "the share less that by the drive alone";
+        triggered_excess_interval as "triggered_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
+    }
+}
+
+tables! {
+    PulseRow = "pulses", "One row per pulse, with all places in the cycle at which it begins, and one per tenth of the cycle, if there are any pulses but those up to 1e-12 m";
+}
+
+impl PulseRow {
+    pub fn is_of_whole_cycle(&self) -> bool {
+        self.place_high - self.place_low > 0.5
+    }
+
+    /// The parameters of the pulse, where it begins left out.
+    pub fn pulse(&self) -> &Parameters {
+        &self.parameters.parameters
+    }
+}
 
 /// The cycle of a control in which a pulse begins, with what the drive alone makes of its next slip. Times in s.
 #[derive(Clone, Copy, Debug)]
@@ -180,9 +217,24 @@ impl TriggerRow {
     }
 }
 
+/// The rows of pulses, in the order of `rows`.
+pub(super) fn pulse_rows(rows: &[TriggerRow]) -> Vec<PulseRow> {
+    let tenth = |part: u32| f64::from(part) / f64::from(PARTS_OF_CYCLE);
+    let parts = (0..PARTS_OF_CYCLE).map(|part| [tenth(part), tenth(part + 1)]);
+    let parts: Vec<[f64; 2]> = once([0.0, 1.0]).chain(parts).collect();
+    let pulses = Pulses::of(rows);
+    let of_pulse = |pulses: &Pulses<'_>| {
+        let rows = parts
+            .iter()
+            .filter_map(|&part| pulses.between(part).row(part));
+        rows.collect::<Vec<_>>()
+    };
+    pulses.iter().flat_map(of_pulse).collect()
+}
+
 /// The pulses that differ in their start and seed alone, and say something.
 #[derive(Clone, Debug)]
-pub struct Pulses<'a> {
+pub(crate) struct Pulses<'a> {
     pub parameters: Parameters,
     pub rows: Vec<&'a TriggerRow>,
 }
@@ -216,34 +268,44 @@ impl<'a> Pulses<'a> {
         all
     }
 
-    /// The mean advance over the mean interval: as seen, by the drive alone, and of the difference.
-    pub fn advances(&self) -> Option<[Mean; 3]> {
-        let means = self.means(TriggerRow::advances)?;
-        Some(means.map(|mean| self.with(&mean, Estimate::interval)))
+    /// Those that begin between two shares of the cycle.
+    pub fn between(&self, [low, high]: [f64; 2]) -> Self {
+        let mut some = self.clone();
+        some.rows
+            .retain(|row| row.place.is_some_and(|place| (low..high).contains(&place)));
+        some
     }
 
-    /// The share of slips that are triggered, likewise.
-    pub fn triggered(&self) -> Option<[Mean; 3]> {
-        let [seen, by_drive, excess] = self.means(TriggerRow::triggers)?;
+    /// Their means; `None` if there are none. Pulses of a seed meet the same slip, so intervals need `MIN_SEEDS` of them.
+    pub fn row(&self, [place_low, place_high]: [f64; 2]) -> Option<PulseRow> {
         let count = self.rows.len() as f64;
-        let share = |share: &Estimate| share.share_interval(count);
-        // A slip that was not seen may be triggered, or not.
-        let excess = excess.allowing_for(MAX_UNSEEN / count);
-        Some([
-            self.with(&seen, share),
-            self.with(&by_drive, share),
-            self.with(&excess, Estimate::interval),
-        ])
-    }
-
-    /// Pulses of a seed meet the same slip, so intervals need `MIN_SEEDS` of them.
-    fn with(&self, of: &Estimate, interval: impl Fn(&Estimate) -> Option<Interval>) -> Mean {
         let seeds: BTreeSet<u64> = self.rows.iter().map(|row| row.parameters.seed).collect();
-        (of.value, interval(of).filter(|_| seeds.len() >= MIN_SEEDS))
+        let if_many = |interval: Option<Interval>| interval.filter(|_| seeds.len() >= MIN_SEEDS);
+        let advance = self.means(TriggerRow::advances);
+        let triggered = self.means(TriggerRow::triggers)?;
+        // A slip that was not seen may be triggered, or not.
+        let excess = triggered.excess.allowing_for(MAX_UNSEEN / count);
+        let interval = |of: fn(&Means) -> &Estimate| if_many(of(advance.as_ref()?).interval());
+        Some(PulseRow {
+            parameters: Selected::new(self.parameters.clone()),
+            place_low,
+            place_high,
+            jobs: self.rows.len() as u64,
+            advance_mean: advance.as_ref().map(|means| means.seen.value),
+            advance_interval: interval(|means| &means.seen),
+            advance_drive: advance.as_ref().map(|means| means.by_drive.value),
+            advance_excess: advance.as_ref().map(|means| means.excess.value),
+            advance_excess_interval: interval(|means| &means.excess),
+            triggered_share: triggered.seen.value,
+            triggered_interval: if_many(triggered.seen.share_interval(count)),
+            triggered_drive: triggered.by_drive.value,
+            triggered_excess: excess.value,
+            triggered_excess_interval: if_many(excess.interval()),
+        })
     }
 
-    /// Of what is seen, by the drive alone, and of the difference; `None` without values.
-    fn means(&self, quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>) -> Option<[Estimate; 3]> {
+    /// `None` without values.
+    fn means(&self, quantity: impl Fn(&TriggerRow) -> Option<[f64; 2]>) -> Option<Means> {
         let mut seeds: BTreeMap<u64, Vec<Sums>> = BTreeMap::new();
         for row in &self.rows {
             if let Some([seen, drive]) = quantity(row) {
@@ -259,19 +321,19 @@ impl<'a> Pulses<'a> {
                 (weight > 0.0).then(|| of([seen, drive]) / weight)
             })
         };
-        let seen = mean(|[seen, _]| seen)?;
-        let by_drive = mean(|[_, drive]| drive)?;
-        let excess = mean(|[seen, drive]| seen - drive)?;
-        Some([seen, by_drive, excess])
+        Some(Means {
+            seen: mean(|[seen, _]| seen)?,
+            by_drive: mean(|[_, drive]| drive)?,
+            excess: mean(|[seen, drive]| seen - drive)?,
+        })
     }
+}
 
-    /// Those that begin between two shares of the interval of the control.
-    pub fn between(&self, low: f64, high: f64) -> Self {
-        let mut some = self.clone();
-        some.rows
-            .retain(|row| row.place.is_some_and(|place| (low..high).contains(&place)));
-        some
-    }
+/// Of a quantity of pulses.
+struct Means {
+    seen: Estimate,
+    by_drive: Estimate,
+    excess: Estimate,
 }
 
 #[cfg(test)]
@@ -387,13 +449,13 @@ mod tests {
         };
         for triggered in [0, 1, 3, 80] {
             let rows = rows(triggered);
-            let [seen, by_drive, excess] = Pulses::of(&rows)[0].triggered().unwrap();
+            let row = &pulse_rows(&rows)[0];
             let share = triggered as f64 / 80.0;
-            let Interval { low, high } = seen.1.unwrap();
+            let Interval { low, high } = row.triggered_interval.unwrap();
             assert!(0.0 <= low && low <= share && share <= high && high <= 1.0);
             assert!(high - low > 0.03, "{low} {high}");
-            let Interval { low, high } = excess.1.unwrap();
-            assert!(low < share && share < high && by_drive.0 == 0.0);
+            let Interval { low, high } = row.triggered_excess_interval.unwrap();
+            assert!(low < share && share < high && row.triggered_drive == 0.0);
         }
     }
 
@@ -408,19 +470,20 @@ mod tests {
         };
         let mut rows = vec![of_seed(0, 1e-15, 0.0), of_seed(0, 2e-7, 0.02)];
         rows.extend((0..20).map(|seed| of_seed(seed, 1e-7, 0.01 + 1e-4 * seed as f64)));
-        let pulses = Pulses::of(&rows);
-        let counts: Vec<usize> = pulses.iter().map(|pulses| pulses.rows.len()).collect();
-        assert_eq!(counts, [1, 20]);
-        let [seen, by_drive, excess] = pulses[1].advances().unwrap();
-        assert!(
-            (seen.0 - 0.1095).abs() < 1e-9 && by_drive.0 == 0.0,
-            "{seen:?}"
+        let pulses = pulse_rows(&rows);
+        let places = pulses.iter().map(|row| (row.place_low, row.jobs));
+        // All begin in the middle of the cycle.
+        assert_eq!(
+            places.collect::<Vec<_>>(),
+            [(0.0, 1), (0.4, 1), (0.0, 20), (0.4, 20)]
         );
-        let interval = excess.1.unwrap();
-        assert!(interval.low < seen.0 && seen.0 < interval.high);
+        let mean = pulses[2].advance_mean.unwrap();
+        assert!((mean - 0.1095).abs() < 1e-9, "{mean}");
+        assert_eq!(pulses[2].advance_drive, Some(0.0));
+        let interval = pulses[2].advance_excess_interval.unwrap();
+        assert!(interval.low < mean && mean < interval.high);
         assert!(interval.high - interval.low < 0.01);
-        let [(mean, interval), ..] = pulses[0].advances().unwrap();
-        assert!((mean - 0.2).abs() < 1e-9 && interval.is_none());
-        assert_eq!(pulses[1].between(0.0, 0.3).rows.len(), 0);
+        assert!((pulses[0].advance_mean.unwrap() - 0.2).abs() < 1e-9);
+        assert_eq!(pulses[0].advance_interval, None);
     }
 }

@@ -5,7 +5,7 @@ use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden, is_table_file};
-use crate::results::tables::RecordedTable;
+use crate::results::tables::{OptionalTable, RecordedTable};
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
 use crate::table::error::{ErrorKind, ResultsError};
@@ -408,11 +408,19 @@ impl<'a> Results<'a> {
         RecordedTable::of(self.sweep().recording())
     }
 
-    /// Reduced tables that not all directories have, and whether this one has them.
-    pub fn optional_tables(&self) -> [(&'static str, bool); 2] {
-        let has_edges = self.sweep().refinement().is_some();
-        let has_pulses = self.plan().sweeps().any(Sweep::has_pulses);
-        [("edges", has_edges), ("triggers", has_pulses)]
+    pub fn has(&self, table: OptionalTable) -> bool {
+        match table {
+            OptionalTable::Edges => self.sweep().refinement().is_some(),
+            OptionalTable::Triggers | OptionalTable::Pulses => {
+                self.plan().sweeps().any(Sweep::has_pulses)
+            }
+        }
+    }
+
+    /// Those that this directory has.
+    pub fn optional_tables(&self) -> impl Iterator<Item = OptionalTable> + '_ {
+        let all = OptionalTable::ALL.into_iter();
+        all.filter(|table| self.has(*table))
     }
 
     pub fn job_id(&self, part: &Part, position: usize) -> String {

@@ -11,7 +11,7 @@ use crate::model::Selected;
 use crate::results::destination::{NewFolder, refuse_stopped};
 use crate::results::directory::Results;
 use crate::results::parts::row_count;
-use crate::results::tables::{All, JobRow, RecordedTable};
+use crate::results::tables::{All, JobRow, OptionalTable, RecordedTable};
 use crate::sweep::PartName;
 use crate::table::arrow::{DESCRIPTION, UNIT, schema, schema_of};
 use crate::table::columns::columns;
@@ -74,8 +74,7 @@ impl Results<'_> {
         let joined = self
             .tables()
             .map(|table| (table.word(), Some(joined(table))));
-        let optional = self.optional_tables().into_iter();
-        let optional = optional.filter_map(|(table, is_there)| is_there.then_some(table));
+        let optional = self.optional_tables().map(OptionalTable::word);
         let reduced = iter::once("sets")
             .chain(optional)
             .map(|table| (table, None));

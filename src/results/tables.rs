@@ -91,6 +91,26 @@ words! {
     }
 }
 
+words! {
+    /// A reduced table that not all directories have.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum OptionalTable {
+        Edges = "edges",
+        Triggers = "triggers",
+        Pulses = "pulses",
+    }
+}
+
+impl OptionalTable {
+    /// What a sweep file has if there is one.
+    pub const fn needs(self) -> &'static str {
+        match self {
+            Self::Edges => "[refine]",
+            Self::Triggers | Self::Pulses => "pulse_start",
+        }
+    }
+}
+
 impl RecordedTable {
     const fn is_recorded(self, recording: &Recording) -> bool {
         match self {

@@ -396,8 +396,10 @@ fn of_pulses(rows: &[TriggerRow]) -> String {
     let seeds: Vec<u64> = seeds.into_iter().collect();
     for pulses in Pulses::of(rows) {
         for (name, low) in THIRDS {
-            let all = pulses.between(low, low + 1.0 / 3.0);
-            let [(share, _), _, (excess, _)] = all.triggered().expect("pulses in each third");
+            let third = [low, low + 1.0 / 3.0];
+            let all = pulses.between(third);
+            let truth = all.row(third).expect("pulses in each third");
+            let [share, excess] = [truth.triggered_share, truth.triggered_excess];
             for count in SEEDS_OF_PULSES {
                 let of = |repetition: u64| {
                     let some = of_repetition(&seeds, repetition, count);
@@ -406,9 +408,10 @@ fn of_pulses(rows: &[TriggerRow]) -> String {
                     pulses
                         .rows
                         .retain(|row| some.contains(&row.parameters.seed));
-                    let [(_, of_share), _, (_, of_excess)] = pulses.triggered()?;
+                    let row = pulses.row(third)?;
                     let holds = |of: Interval, truth: f64| of.low <= truth && truth <= of.high;
-                    Some([holds(of_share?, share), holds(of_excess?, excess)])
+                    let of_share = holds(row.triggered_interval?, share);
+                    Some([of_share, holds(row.triggered_excess_interval?, excess)])
                 };
                 let repetitions = (0..REPETITIONS).into_par_iter().filter_map(of);
                 let found: Vec<[bool; 2]> = repetitions.collect();

@@ -1,6 +1,6 @@
 //! Pulses in the built program: what they advance, beside their controls and the drive alone.
 
-use crate::program::{Cell, Folder};
+use crate::program::{Cell, Folder, json};
 use std::fs;
 
 const SWEEP: &str = "name = \"pulses\"\n[model]\nN = 10\nNs = 5\nfrequency = 29\n[axes]\n\
@@ -51,6 +51,25 @@ fn pulses_advance_slips_beside_their_controls_and_the_drive_alone() {
         "{noise}"
     );
 
+    let pulses = folder.file("out/reduced/pulses.parquet");
+    let whole = pulses
+        .reals("place_high")
+        .iter()
+        .position(|high| *high == 1.0);
+    let told = json(&folder.ends(0, "show out --json").stdout)["pulses"].clone();
+    assert_eq!(told.as_array().map(Vec::len), Some(1));
+    for name in [
+        "advance_mean",
+        "advance_mean_low",
+        "triggered_share",
+        "triggered_excess_high",
+    ] {
+        assert_eq!(
+            told[0][name].as_f64(),
+            Some(pulses.reals(name)[whole.unwrap()]),
+            "{name}"
+        );
+    }
     // They have no phase, and no figure but their own.
     let slips = folder.table("out", "slips");
     assert!(slips.reals("phase").is_empty() && slips.reals("T_onset").is_empty());

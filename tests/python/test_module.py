@@ -515,6 +515,8 @@ def test_pulses_have_a_table_of_what_they_did(tmp_path):
     sweep = {"name": "pulses", "model": {"N": 10, "Ns": 5, "Delta": 1e-6, "frequency": 29}, "axes": axes}
     results = module.run({**sweep, "record": {"time": 0.7, "control": True}}, tmp_path / "pulses", progress=False)
     triggers = pa.table(results.triggers(["seed", "place", "advance", "advance_drive", "excluded"]))
+    pulses = pa.table(results.pulses(["place_high", "jobs", "advance_mean"]))
+    assert pulses["place_high"][0].as_py() == 1 and pulses["jobs"][0].as_py() == sum(pulses["jobs"].to_pylist()[1:])
     assert len(triggers) == 2 * 3 and min(triggers["advance_drive"].drop_null().to_pylist()) >= 0
 
 
