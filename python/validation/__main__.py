@@ -10,7 +10,7 @@ from pathlib import Path
 from stickslip import ResultsError
 from stickslip.tables import MissingResult
 
-from . import beyond, friction, intervals, phase, triggering
+from . import beyond, claims, friction, intervals, phase, triggering
 from .document import figure, paragraph, table
 
 #: The paper's statements by the figures that show them.
@@ -34,6 +34,8 @@ QUESTIONS = (
     phase.stiff_drive,
     triggering.pulses,
     triggering.tides,
+    claims.correlation,
+    claims.weakening,
     beyond.choices,
     beyond.energies,
 )

@@ -27,11 +27,11 @@ macro_rules! presets {
 }
 
 /// By question, as their names sort.
-const PRESETS: [Preset; 26] = presets! {
-    "choices" "choices-startup" "drag" "drag-strong" "energies" "fig2" "fig3" "fig3-precise" "fig4" "friction"
+const PRESETS: [Preset; 28] = presets! {
+    "choices" "choices-startup" "correlation" "drag" "drag-strong" "energies" "fig2" "fig3" "fig3-precise" "fig4" "friction"
     "friction-drives" "locking-contacts" "locking-disorder" "locking-drive-alone" "locking-edge" "locking-map"
     "locking-size" "locking-staircase" "locking-stiff-drive" "locking-tongue" "sliding-edge" "sliding-regimes"
-    "sliding-velocity" "stochasticity" "tide" "triggering"
+    "sliding-velocity" "stochasticity" "tide" "triggering" "weakening"
 };
 
 /// The names that `--preset` takes.

@@ -16,7 +16,7 @@ use crate::model::standard_normal_quantile;
 use crate::table::columns::Interval;
 use crate::table::value::floored;
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, LN_10, PI, TAU};
 
 /// Units, at least: of fewer jobs, each is cut into stretches. An error is then known to 27 %.
 const MIN_UNITS: usize = 8;
@@ -175,6 +175,21 @@ impl Units {
         let square =
             x.value * x.value * of_y - 2.0 * x.value * y.value * of_both + y.value * y.value * of_x;
         units <= 2.0 || square < (units - 1.0) * quantile * (of_x * of_y - of_both * of_both)
+    }
+
+    /// The decimal logarithm of Schuster's p: how probable a mean as long as theirs is for vectors without a direction
+    /// (A. Schuster, Proc. R. Soc. London 61, 455 (1897)). They count as the independent ones whose mean would vary as
+    /// much, if these are fewer.
+    pub(super) fn schuster(&self) -> Option<f64> {
+        let [count, ..] = self.total;
+        let length = length(self.total)?;
+        let component = |of: fn(Sums) -> f64| {
+            let mean = self.estimate(|sums| (sums[0] > 0.0).then(|| of(sums) / sums[0]))?;
+            mean.covariance(&mean)
+        };
+        let variance = component(|[_, x, _]| x)? + component(|[_, _, y]| y)?;
+        let independent = (1.0 - length * length) / variance;
+        Some(-independent.min(count) * length * length / LN_10)
     }
 
     /// The interval of the length of their mean, with 0 in it where they may have no direction: chance alone makes the
@@ -748,6 +763,36 @@ pub(super) mod tests {
             });
             assert!((92.5..97.5).contains(&length), "{size:?}: {length}");
         }
+    }
+
+    #[test]
+    fn schusters_p_is_below_a_twentieth_in_one_of_twenty_samples_without_a_direction() {
+        const REPETITIONS: u64 = 2000;
+        let mut share = |memory: f64| {
+            let is_rare = |repetition: &u64| {
+                let mut draws = Draws::new(*repetition);
+                let mut job = || {
+                    let start = TAU * draws.uniform();
+                    let steps = draws.autoregressive(memory, 20);
+                    // Uniform, as its start is.
+                    let angles = steps
+                        .iter()
+                        .map(|step| unit(start + (1.0 - memory) * 20.0 * step));
+                    angles.collect::<Vec<_>>()
+                };
+                let vectors = Units::of((0..32).map(|seed| (seed, job())));
+                vectors.schuster().unwrap() < libm::log10(0.05)
+            };
+            (0..REPETITIONS).filter(is_rare).count() as f64 / REPETITIONS as f64
+        };
+        let found = [0.0, 0.9].map(&mut share);
+        assert!(
+            found.iter().all(|share| (0.03..0.08).contains(share)),
+            "{found:?}"
+        );
+        // Of one direction, the number counts.
+        let equal = Units::of((0..8).map(|seed| (seed, vec![unit(0.3); 5])));
+        assert!((equal.schuster().unwrap() + 40.0 / LN_10).abs() < 1e-9);
     }
 
     #[test]

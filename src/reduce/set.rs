@@ -434,6 +434,7 @@ impl FinishedSet {
         let (length, interval) = self.note("resultant_length", length, SHARE);
         self.row.resultant_length = length;
         self.row.length_interval = interval.map(|ends| self.phases.with_zero(ends));
+        self.row.schuster = self.phases.schuster();
     }
 
     fn lost_of_phases(&self, phases: &Units) -> f64 {

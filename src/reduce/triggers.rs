@@ -440,6 +440,7 @@ mod tests {
         let rows = |triggered: usize| -> Vec<TriggerRow> {
             let row = |number: usize| TriggerRow {
                 parameters: Selected::new(pulsed(1.15, 1e-7).with_seed(number as u64 % 8)),
+                place: Some(0.5),
                 advance: Some(0.0),
                 triggered: Some(number < triggered),
                 triggered_drive: Some(false),

@@ -95,6 +95,7 @@ columns! {
             "the same by the drive alone: slips at the loads of the control; null without a control", "R, drive" "Resultant length by the drive alone";
         resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds", "R, excess" "Resultant length beyond the drive's";
         resultant_excess_interval as "resultant_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
+        schuster as "schuster_log10_p": Option<f64> = "", "log10 of Schuster's p, that phases have no direction, correlated slips counting less; it rejects this where the drive alone makes R, too: quote resultant_excess", "log p" "log₁₀ of Schuster's p";
         drop_mean: Option<f64> = "N", "mean stress drop", "⟨ΔF⟩";
         drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop", "σ(ΔF)" "S.d. of the stress drop";

@@ -19,11 +19,14 @@ CHEAP = ("drag", "drag-strong", "locking-contacts", "sliding-velocity")
 OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "predicted-cost.png", "speed-against-error.png"}
 #: Custom figures: the flags of `stickslip plot`, as in scripts/reproduce, a line for each.
 OWN = {
+    "correlation": "--x eta --y resultant_length --colour frequency --log x",
     "fig3-precise": "--x eta --y phase_mean --colour V0 --log x",
     "locking-drive-alone": "--x eta --y resultant_excess --colour V0 --log x",
     "locking-staircase": "--x T --y tau_50/T --colour Delta --log y",
     "tide": """--x T/tau_control --y phase_mean --colour V0 --log x
         --x T/tau_control --y resultant_excess --colour V0 --log x""",
+    "weakening": """--x Delta --y mean_friction --colour frequency
+        --x Delta*frequency --y mean_friction --colour frequency --log x""",
 }
 
 

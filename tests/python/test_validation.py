@@ -180,9 +180,9 @@ def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
 
 #: The sweeps whose results the document needs.
 SWEEPS = (
-    "choices choices-startup drag drag-strong energies fig2 fig3 fig4 friction friction-drives locking-contacts"
+    "choices choices-startup correlation drag drag-strong energies fig2 fig3 fig4 friction friction-drives locking-contacts"
     " locking-disorder locking-drive-alone locking-map locking-size locking-staircase locking-stiff-drive stochasticity"
-    " tide triggering"
+    " tide triggering weakening"
 ).split()
 
 

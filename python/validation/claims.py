@@ -1,0 +1,137 @@
+"""Claims of the literature on other sliders, put to this one: each a sweep, criteria that can fail, and what is lacking."""
+
+import math
+from pathlib import Path
+
+import numpy
+import pandas
+from scipy import stats
+from scipy.optimize import isotonic_regression
+
+from stickslip.statistics import bootstrap
+from stickslip.tables import Sweep
+
+from .document import Section
+from .kinematics import random_load_phases
+
+#: Frequency in Hz from which correlation depends on the amplitude alone in the laboratory; R that says nothing more.
+HIGH, SATURATED = 80, 0.95
+#: Share of the friction without modulation at which a slider counts as weakened.
+WEAKENED = 0.8
+RANKS = (numpy.arange(4000) + 0.5) / 4000
+
+
+def at_random(eta: float) -> float:
+    """R of slips at random loads."""
+    return abs(numpy.exp(1j * random_load_phases(eta, RANKS)).mean())
+
+
+def rms(values: pandas.Series) -> float:
+    return math.sqrt((values**2).mean())
+
+
+def off_others(sets: pandas.DataFrame, column: str) -> pandas.Series:
+    """R of each set less the mean of the others with the same value of a column."""
+    groups = sets.groupby(sets[column].round(12))["resultant_length"]
+    return (groups.transform("sum") - sets["resultant_length"]) / (groups.transform("size") - 1) - sets["resultant_length"]
+
+
+def correlation(results: Path) -> Section:
+    section = Section("Correlation with the load: by frequency, or by amplitude", "`sweeps/correlation.toml`", ("correlation",))
+    sets = Sweep(results / "correlation").sets()
+    sets = sets[sets["resultant_length"].notna()]
+    sets = sets.assign(off=sets["resultant_length"] - sets["eta"].map(at_random))
+    off = {"η": sets["off"], "f": off_others(sets, "frequency"), "Δ": off_others(sets, "Delta")}
+    curve, *others = (
+        bootstrap(lambda frame: rms(frame["off"]), sets.assign(off=values), "set_id") for values in off.values()
+    )
+    section.check(
+        "R is a function of η",
+        "rms of R about that of random loads, nothing fitted, below that about the mean of the other sets of a frequency"
+        " and of an amplitude",
+        f"{curve.text(3)}; {others[0].text(2)}, {others[1].text(2)}",
+        *(curve.high < other.low for other in others),
+    )
+    half = (sets["resultant_excess_high"] - sets["resultant_excess_low"]) / 2
+    bonferroni = stats.norm.ppf(1 - 0.025 / len(sets)) / stats.norm.ppf(0.975)
+    beyond = sets["resultant_excess"].abs()[sets["resultant_excess"].abs() > bonferroni * half]
+    section.check(
+        "the drive alone makes it",
+        "no set has an R that is significantly off the drive's (Bonferroni) by 0.05 or more",
+        f"{len(beyond)} of {len(sets)} are off it at all" + (f", by {beyond.max():.4f} at most" if len(beyond) else ""),
+        not (beyond > 0.05).any(),
+    )
+    high = sets[sets["frequency"] > HIGH]["resultant_length"].groupby(sets["Delta"].round(12))
+    spans = (high.max() - high.min())[high.min() < SATURATED]
+    section.check(
+        "amplitude alone at high frequency, as in Savage and Marone (2007)",
+        f"R of an amplitude is the same to 0.05 above {HIGH} Hz, where it is below {SATURATED} at some",
+        f"it spans {', '.join(f'{span:.3f} at {1e6 * amplitude:g} µm' for amplitude, span in spans.items())}",
+        *(bool(span < 0.05) for span in spans),
+    )
+    low, top = sets[sets["eta"] < 1].query("has_phase"), sets[sets["eta"] > 100]
+    section.check(
+        "failure at the peak of the rate at low frequency, later at high",
+        "mean phase within 0.3 rad of −π/2 for η < 1 and of 0 for η > 100",
+        f"{low['phase_mean'].mean():.2f} rad, {top['phase_mean'].mean():.2f} rad".replace("-", "−"),
+        abs(low["phase_mean"].mean() + math.pi / 2) < 0.3,
+        abs(top["phase_mean"].mean()) < 0.3,
+    )
+    rejected = sets["schuster_log10_p"] < -5
+    section.remark(
+        f"Schuster's test rejects random times with p < 1e-5 in {rejected.sum()} of {len(sets)} sets, down to"
+        f" 1e{sets['schuster_log10_p'].min():.0f}, though the slider adds next to nothing.",
+        "Contacts here do not age: the regime of amplitude alone, which a laboratory fault has, is no matter of kinematics.",
+    )
+    return section
+
+
+def thresholds(jobs: pandas.DataFrame) -> pandas.Series:
+    """By frequency in Hz, the amplitude in m at which the friction has fallen to `WEAKENED`, from an isotonic curve."""
+    friction = jobs["mean_friction"] * jobs["averaged_time"]
+    sums = friction.groupby([jobs["frequency"], jobs["Delta"]]).sum()
+    means = sums / jobs["averaged_time"].groupby([jobs["frequency"], jobs["Delta"]]).sum()
+    still = means.xs(0.0, level="frequency").iloc[0]
+    found = {}
+    for frequency, curve in means.drop(0.0, level="frequency").groupby(level="frequency"):
+        ratio = isotonic_regression(curve.to_numpy() / still, increasing=False).x
+        amplitudes = numpy.log(curve.index.get_level_values("Delta"))
+        # Of a level stretch, its middle.
+        found[frequency] = math.exp(numpy.interp(WEAKENED, ratio[::-1], amplitudes[::-1]))
+    return pandas.Series(found)
+
+
+def slope(jobs: pandas.DataFrame) -> float:
+    """Of the threshold against frequency, both as logarithms."""
+    found = thresholds(jobs)
+    return float(numpy.polyfit(numpy.log(found.index), numpy.log(found), 1)[0])
+
+
+def weakening(results: Path) -> Section:
+    section = Section(
+        "Weakening by vibration: by displacement, velocity or acceleration", "`sweeps/weakening.toml`", ("weakening", "weakening-velocity")
+    )
+    jobs = Sweep(results / "weakening").table("jobs")
+    jobs = jobs.assign(frequency=(1 / jobs["T"]).fillna(0.0).round(6))
+    found = thresholds(jobs)
+    exponent = bootstrap(slope, jobs, "seed")
+    section.check(
+        "a velocity sets it, as in Lastakowski et al. (2015)",
+        "slope of the amplitude at which friction has fallen by 20 % against frequency, both as logarithms: its interval"
+        " holds −1",
+        exponent.text(2),
+        exponent.low <= -1 <= exponent.high,
+    )
+    section.check("nor an acceleration", "its interval excludes −2", exponent.text(2), not exponent.low <= -2 <= exponent.high)
+    for name, power in (("displacement Δ", 0), ("velocity 2π f Δ", 1), ("acceleration (2π f)² Δ", 2)):
+        values = found * (2 * math.pi * found.index.to_numpy()) ** power
+        relative = values / numpy.exp(numpy.log(values).mean())
+        of_each = {f"{frequency:.0f} Hz": f"{value:.2f}" for frequency, value in relative.items()}
+        section.rows.append({"threshold, over its geometric mean": name, **of_each, "factor": f"{max(values) / min(values):.1f}"})
+    microns = ", ".join(f"{1e6 * value:.2f} µm at {frequency:.0f} Hz" for frequency, value in found.items())
+    section.remark(
+        f"The amplitudes are {microns}.",
+        "This slider is loaded at its edge: the force sets it, K_d Δ being nearly the same at all frequencies."
+        " It has no load along its length, and no mass beside its own that a vibration must move.",
+    )
+    return section
