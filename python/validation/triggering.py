@@ -121,7 +121,7 @@ def pulses(results: Path) -> Section:
         " 2015](https://doi.org/10.1002/2014JB011611)), responses of either sign of block chains ([Franović et al."
         " 2016](https://arxiv.org/abs/1606.03079)).",
         f"The slip after the next keeps {kept.text(2)} of the advance.",
-        f"Pulses of no size advance slips by up to {1e3 * all_rows['noise'].max():.1f} ms, by the error of the solver.",
+        f"Negligible pulses (1e-15 m) shift slips by up to {1e3 * all_rows['noise'].max():.1f} ms: rounding errors grow (chaos).",
     )
     section.remark("Intervals of the criteria, not of the table, are corrected for the 36 comparisons of the table (Bonferroni).")
     section.why = (

@@ -386,7 +386,7 @@ impl Chart<'_> {
             entries.push(entry(Mark::Dot(ALONE), format!("by the drive alone{of}")));
         }
         if self.ys.iter().any(|y| self.reduction(y).is_some()) {
-            let text = "K_d Δ = 0.2 to 0.3 of the peak force: friction falls, says the paper";
+            let text = "K_d Δ = 0.2 to 0.3 of the peak force: friction falls (Capozza et al.)";
             entries.push(entry(Mark::Patch(STRIPE), text));
         }
         entries
@@ -406,7 +406,7 @@ impl Chart<'_> {
         let symbols: Vec<String> = pooled.map(|swept| swept.label().symbol).collect();
         let symbols = distinct(symbols.iter().map(String::as_str));
         (!symbols.is_empty())
-            .then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))
+            .then(|| format!("pooled: sets that differ in {}", symbols.join(", ")))
     }
 
     /// What bars are, and what is not there.

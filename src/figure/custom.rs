@@ -366,7 +366,7 @@ pub(super) mod tests {
             ..figure()
         };
         assert!(strokes(&figure()) > strokes(&measured));
-        let pooled = "not told apart: sets that differ in Δ";
+        let pooled = "pooled: sets that differ in Δ";
         assert!(svg(&measured).contains(pooled) && !svg(&figure()).contains(pooled));
         assert!(
             !svg(&CustomFigure {

@@ -106,7 +106,7 @@ pub(super) fn intervals(points: &[Point], beside: &Beside, look: &Look) -> Optio
             ..Panel::inside(height, x.clone(), y, layers)
         }
     });
-    let note = "not told apart: sets that differ in Δ";
+    let note = "pooled: sets that differ in Δ";
     let look = &look.with_note(if has_both { note } else { "" });
     let layout = Layout::column(560.0);
     Some(panel::draw(NAME, look, layout, &entries, panels.into()))

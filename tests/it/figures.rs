@@ -391,7 +391,7 @@ fn sets_without_modulation_stand_in_every_panel_of_a_period() {
         let overview = format!("{directory}/figures/overview.svg");
         let overview = fs::read_to_string(folder.path(&overview)).unwrap();
         assert!(
-            !overview.contains("not told apart") && overview.contains(">η = 5<"),
+            !overview.contains("pooled") && overview.contains(">η = 5<"),
             "{directory}"
         );
         assert_eq!(overview.contains(">Δ = 0<"), directory == "with");
