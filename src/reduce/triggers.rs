@@ -80,7 +80,7 @@ columns! {
 }
 
 tables! {
-    PulseRow = "pulses", "One row per pulse, with all places in the cycle at which it begins, and one per tenth of the cycle, if there are any pulses but those up to 1e-12 m";
+    PulseRow = "pulses", "One row per pulse, and one per tenth of the cycle in which it begins; those up to 1e-12 m have none";
 }
 
 impl PulseRow {

@@ -13,7 +13,7 @@ import pytest
 from conftest import ROOT
 
 PAGES = [
-    *map(ROOT.joinpath, ("README.md", "CHANGELOG.md", "results/README.md", "crates/physics/README.md")),
+    *map(ROOT.joinpath, ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "results/README.md", "crates/physics/README.md")),
     *sorted((ROOT / "docs").glob("*.md")),
 ]
 

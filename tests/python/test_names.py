@@ -13,7 +13,7 @@ SOURCES = {
     for path in sorted((ROOT / folder).rglob("*"))
     if path.is_file() and path.suffix in ("", ".rs", ".py", ".js")
 }
-DOCUMENTS = [ROOT / "README.md", ROOT / "results" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "results" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 #: A name of several words.
 NAME = r"[a-z]{2}\w*_\w*[a-z0-9]"
 
