@@ -102,7 +102,7 @@ mod tests {
             ("sqrt(tau_mean + 1)", ""),
         ] {
             let values = Values::of::<SetRow>(&[], formula).unwrap();
-            assert_eq!(values.column.unit, unit, "{formula}");
+            assert_eq!(values.label.unit, unit, "{formula}");
         }
     }
 }
