@@ -104,7 +104,7 @@ impl Values {
     ) -> Self {
         let label = match *formula {
             Expression::Name(place) => Label::of(columns, place),
-            _ => Label::of_formula(text, columns, unit_of_formula(formula, columns).to_owned()),
+            _ => Label::of_formula(text, columns, unit_of_formula(formula, columns)),
         };
         let names = formula.names().into_iter();
         Self {
