@@ -9,7 +9,7 @@ use crate::reduce::{
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::solver::{Solver, SolverKey};
 use crate::table::Table;
-use crate::table::columns::{Column, Kind, Row};
+use crate::table::columns::{Class, Column, Kind, Row};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -81,33 +81,19 @@ fn table(fields: &[(Description, Value)]) -> String {
 /// The section of a table in the documentation, in Markdown: a line for each column. Parameters of the model, described
 /// on another page, share a line, and so do columns that an earlier table has, and a statistic and its interval.
 pub(crate) fn markdown<T: Table>(earlier: &[(&'static str, Vec<Column>)]) -> String {
-    let is_parameter = |column: &Column| {
-        Symbol::from_key(&column.name)
-            .is_some_and(|symbol| symbol.description().meaning == column.meaning)
-    };
+    let is_parameter = |column: &Column| column.class == Class::Parameter;
     let earlier_table = |column: &Column| {
-        let without_symbol = |column: &Column| Column {
-            symbol: "",
-            words: "",
-            ..column.clone()
-        };
-        let is_same = |known: &Column| without_symbol(known) == without_symbol(column);
+        let stored = |of: &Column| (of.name.clone(), of.unit, of.meaning, of.kind, of.nullable);
+        let is_same = |known: &Column| stored(known) == stored(column);
         let has_it = |(_, columns): &&(_, Vec<Column>)| columns.iter().any(is_same);
         let table = earlier.iter().find(has_it).map(|(name, _)| *name);
         table.filter(|_| !is_parameter(column))
     };
     let share_a_line = |one: &Column, next: &Column| {
         let is_known = |column| earlier_table(column).is_some();
-        let is_interval = next.meaning.starts_with(INTERVAL)
-            && next.name.strip_suffix("_low") == Some(&*one.name);
-        let is_pair = one
-            .name
-            .strip_suffix("_low")
-            .is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
         (is_known(one) && is_known(next) && earlier_table(one) == earlier_table(next))
             || (is_parameter(one) && is_parameter(next))
-            || is_interval
-            || (is_pair && one.meaning.starts_with(INTERVAL))
+            || next.is_end()
     };
     let line = |columns: &[Column]| {
         let names: Vec<String> = columns

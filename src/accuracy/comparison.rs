@@ -142,11 +142,7 @@ impl Bias {
             let bias = own.value - other.value;
             let half = own.half_width().zip(other.half_width());
             let half = half.map(|(own, other)| libm::hypot(own, other));
-            let interval = half.map(|half| Interval {
-                low: bias - half,
-                high: bias + half,
-            });
-            (bias, interval)
+            (bias, half.map(|half| Interval::around(bias, half)))
         };
         let (of_mean, interval_of_mean) = of(|sample| &sample.mean);
         let (of_deviation, interval_of_deviation) = of(|sample| &sample.deviation);

@@ -222,10 +222,7 @@ mod tests {
             reference_deviation: 0.01,
             bias: Bias {
                 of_mean: bias,
-                interval_of_mean: Some(Interval {
-                    low: bias - 1e-3,
-                    high: bias + 1e-3,
-                }),
+                interval_of_mean: Some(Interval::around(bias, 1e-3)),
                 freedom: Some(1e9),
                 ..Bias::default()
             },

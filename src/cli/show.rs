@@ -265,7 +265,8 @@ fn chosen_columns(
     for name in chosen {
         columns.push(match Values::of(all, name) {
             Ok(mut values) => {
-                if values.sources.iter().all(|source| source != values.name()) {
+                let mut sources = values.sources.iter();
+                if sources.all(|source| source.name != values.name()) {
                     add_intervals(results, rows, &mut values)?;
                 }
                 values
@@ -308,7 +309,8 @@ fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
         };
         record.push((name.to_string(), value));
         if values.intervals.iter().any(Option::is_some) {
-            let (low, high) = values.intervals[set].unzip();
+            let ends = values.intervals[set].map(|ends| (ends.low, ends.high));
+            let (low, high) = ends.unzip();
             record.push((format!("{name}_low"), low.into()));
             record.push((format!("{name}_high"), high.into()));
         }
@@ -345,7 +347,7 @@ fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
 
 /// Adds a column of the first sets.
 fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: usize) {
-    let label = values.label();
+    let label = &values.label;
     let is_interval = values.column.name == "tau_mean";
     let bound = |set: usize| rows.get(set).filter(|_| is_interval)?.tau_bound;
     let bounds = (0..values.numbers.len()).filter_map(bound);
@@ -353,8 +355,8 @@ fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: u
     let digits = values.digits();
     let cell = |set: usize| match (values.numbers[set], values.intervals[set]) {
         (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
-        (Some(value), Some((low, high))) => {
-            with_interval(factor * value, factor * low, factor * high)
+        (Some(value), Some(ends)) => {
+            with_interval(factor * value, factor * ends.low, factor * ends.high)
         }
         (Some(value), None) => digits.number(factor * value),
         (None, _) => match bound(set) {
@@ -363,7 +365,7 @@ fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: u
         },
     };
     let cells = (0..values.numbers.len().min(most)).map(cell);
-    columns.add(values.is_worded(), label.short(unit), cells);
+    columns.add(values.is_worded(), label.short(&unit), cells);
 }
 
 /// The parameters but one in which some rows differ.
@@ -480,7 +482,7 @@ fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
     }
     let number = |value: f64| digits.number(factor * value);
     columns.words("edge of", edges, EdgeRow::crossed);
-    columns.words(label.short(unit), edges, |edge| {
+    columns.words(label.short(&unit), edges, |edge| {
         edge.edge
             .map_or_else(|| side(edge, sets).to_owned(), number)
     });
@@ -519,9 +521,9 @@ fn table_of_pairs(pairs: &[EdgePair]) -> String {
     let (factor, unit) = label.scale(largest);
     columns.words("edge of", pairs, |pair| pair.edges[1].crossed());
     columns.words("less that of", pairs, |pair| pair.edges[0].crossed());
-    columns.words(label.short(unit), pairs, |pair| {
-        let [low, high] = pair.interval.map_or([f64::NAN; 2], |(low, high)| {
-            [low, high].map(|end| factor * end)
+    columns.words(label.short(&unit), pairs, |pair| {
+        let [low, high] = pair.interval.map_or([f64::NAN; 2], |ends| {
+            [ends.low, ends.high].map(|end| factor * end)
         });
         with_interval(factor * pair.difference, low, high)
     });

@@ -7,7 +7,7 @@ use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::{Quantity, belongs_to_all, distinct, parameter, shows_phase, without_value};
+use super::quantity::{Quantity, belongs_to_all, distinct, shows_angle, without_value};
 use super::style::{
     BAR_WIDTH, BLACK, DARK_GREY, Dot, GREY, INKS, Ink, Look, Place, RADIUS, REFERENCE, STRIPE,
     Stroke, WHITE, drive_alone,
@@ -16,6 +16,7 @@ use super::{BadOption, Beside};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetRow, Values, is_same, swept};
+use crate::sets::parameter;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -193,7 +194,7 @@ impl<'a> Chart<'a> {
         {
             return Vec::new();
         }
-        let is_other = |swept: &&Values| parameter(swept.name()) != Some(symbol);
+        let is_other = |swept: &&Values| parameter(&swept.column) != Some(symbol);
         let others = self.rows.swept.iter().filter(is_other);
         let others: Vec<_> = others.map(Values::places).collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
@@ -327,7 +328,7 @@ impl<'a> Chart<'a> {
     fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
         let is_fixed = |symbol| {
             let mut swept = self.rows.swept.iter();
-            swept.all(|swept| parameter(swept.name()) != Some(symbol))
+            swept.all(|swept| parameter(&swept.column) != Some(symbol))
         };
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
         let mut sets = self.rows.sets.iter();
@@ -397,13 +398,13 @@ impl Chart<'_> {
         let asked = self.ys.iter().chain([&self.x]).chain(&self.colour);
         let asked = asked.map(|quantity| &quantity.column);
         let sources = asked.chain(&self.panels).flat_map(|values| &values.sources);
-        let shown: Vec<Option<Symbol>> = sources.map(|source| parameter(source)).collect();
-        let is_pooled = |swept: &&Values| !shown.contains(&parameter(swept.name()));
+        let shown: Vec<Option<Symbol>> = sources.map(parameter).collect();
+        let is_pooled = |swept: &&Values| !shown.contains(&parameter(&swept.column));
         let others = self.rows.others.iter();
         let others = others.flat_map(|sets| swept(&self.rows.sets[sets.clone()]));
         let all: Vec<Values> = self.rows.swept.iter().cloned().chain(others).collect();
         let pooled = all.iter().filter(is_pooled);
-        let symbols: Vec<String> = pooled.map(|swept| swept.label().symbol).collect();
+        let symbols: Vec<String> = pooled.map(|swept| swept.label.symbol.clone()).collect();
         let symbols = distinct(symbols.iter().map(String::as_str));
         (!symbols.is_empty())
             .then(|| format!("pooled: sets that differ in {}", symbols.join(", ")))
@@ -420,16 +421,16 @@ impl Chart<'_> {
             notes.push(format!("bars cut at the frame: {bars_cut}"));
         }
         let count = self.count();
-        let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));
         let is_still = |set: &usize| {
-            shows_intervals && self.slides(*set) && self.rows.sets[*set].tau_mean.is_none()
+            let has_no_interval = self.slides(*set) && self.rows.sets[*set].tau_mean.is_none();
+            has_no_interval && self.ys.iter().any(|y| !y.has(*set))
         };
         let still = (0..count).filter(is_still).count();
         if still > 0 {
             notes.push(format!("{still} of {count} sets slide: no intervals"));
         }
         let mut quantities = self.ys.iter().chain([&self.x]);
-        let shows_phase = quantities.any(|shown| shows_phase(shown.name()));
+        let shows_phase = quantities.any(|shown| shows_angle(&shown.column));
         let has_none = |row: &SetRow| !row.has_phase && row.phase_mean.is_some();
         let is_unphased =
             |set: &usize| shows_phase && self.rows.sets.get(*set).is_some_and(has_none);

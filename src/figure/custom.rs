@@ -1,10 +1,11 @@
 //! Custom figures: any column of the table of sets, or of slips, or a formula of columns, against any other.
 
 use super::chart::{Chart, Rows};
-use super::quantity::{Limits, Quantity, parameter};
+use super::quantity::{Limits, Quantity};
 use super::{BadOption, Look, Picture, check_text};
 use crate::model::Symbol;
 use crate::reduce::{Condition, Values};
+use crate::sets::parameter;
 use crate::table::columns::Row;
 use crate::table::value::words;
 use anyhow::Result;
@@ -99,7 +100,7 @@ pub(super) fn custom<'a>(
     let mut shown: Vec<Symbol> = x.joined_along(swept).into_iter().collect();
     shown.extend(panels.iter().flat_map(Quantity::parameters));
     let is_free =
-        |swept: &&Values| parameter(swept.name()).is_some_and(|symbol| !shown.contains(&symbol));
+        |swept: &&Values| parameter(&swept.column).is_some_and(|symbol| !shown.contains(&symbol));
     let next = || Some(swept.iter().find(is_free)?.name().to_owned());
     // Formulas have letters that no file name should have.
     let is_plain = |letter: char| letter.is_alphanumeric() || letter == '_';

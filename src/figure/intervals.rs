@@ -74,7 +74,7 @@ pub(super) fn intervals(points: &[Point], beside: &Beside, look: &Look) -> Optio
     // The same colours whatever has a phase.
     let digits = Digits::THREE.distinguishing(&values);
     let hues = values.iter().map(|value| to_unit * value);
-    let hues = Hues::of(&colour.short(unit), hues, |value| {
+    let hues = Hues::of(&colour.short(&unit), hues, |value| {
         colour.setting(value / to_unit, digits)
     });
     let is_shown = |shown| phased.iter().any(|slip| is_same(value(slip.0), shown));

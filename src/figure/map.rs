@@ -12,6 +12,7 @@ use super::style::{BLACK, Dot, Fill, Ink, Look, Place, Stroke, WHITE, cell_shade
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{FREQUENCY, SetRow, Values, differing, has_even_steps};
+use crate::table::columns::Class;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -87,7 +88,8 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     };
     let panel = |column: &str| {
         let quantity = of(column)?;
-        let is_of_periods = column == "periods";
+        let class = quantity.column.column.class;
+        let is_of_periods = class == Class::Category;
         let is_known = |set: &usize| !is_of_periods || sets[*set].has_phase;
         let number = |set: usize| quantity.number(set).filter(|_| is_known(&set));
         let most = if is_of_periods {
@@ -97,8 +99,8 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         };
         let ends = || bounds((0..sets.len()).filter_map(number).map(|n| n.min(most)));
         let label = quantity.axis_label();
-        let scale = scale_of(column, &label, ends())?;
-        let is_excess = column == "resultant_excess";
+        let scale = scale_of(class, &label, ends())?;
+        let is_excess = class == Class::Excess;
         let colour = if is_excess { diverging } else { cell_shade };
         let mut bar = ColourBar::of_axis(&scale, colour);
         if is_of_periods {
@@ -142,9 +144,9 @@ fn period_column(sets: &[SetRow]) -> &'static str {
 }
 
 /// The scale of the colours of a column, whose values lie between these ends.
-fn scale_of(column: &str, label: &str, ends: Option<(f64, f64)>) -> Option<Axis> {
-    Some(match column {
-        "periods" => {
+fn scale_of(class: Class, label: &str, ends: Option<(f64, f64)>) -> Option<Axis> {
+    Some(match class {
+        Class::Category => {
             let (first, last) = ends.unwrap_or_default();
             Axis::linear(
                 "Median interval in periods, n",
@@ -152,12 +154,12 @@ fn scale_of(column: &str, label: &str, ends: Option<(f64, f64)>) -> Option<Axis>
                 last.max(first + 1.0),
             )
         }
-        "resultant_excess" => {
+        Class::Excess => {
             let (low, high) = ends?;
             let most = MIN_EXCESS.max(-low).max(high);
             Axis::linear(label, -most, most)
         }
-        "slip_share" | "locking_index" => Axis::linear(label, 0.0, 1.0),
+        Class::Share => Axis::linear(label, 0.0, 1.0),
         _ => {
             let ends = ends?;
             let from_zero = (ends.0.min(0.0), ends.1);

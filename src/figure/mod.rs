@@ -278,8 +278,8 @@ fn draw_slips(
     let quantity = |option, name: &str| {
         let quantity = Quantity::of(&slips, option, name)?;
         let mut sources = quantity.column.sources.iter();
-        match sources.find(|source| unknown.contains(source)) {
-            Some(source) => Err(BadOption::new(option, source, "was not measured").into()),
+        match sources.find(|source| unknown.contains(&source.name)) {
+            Some(source) => Err(BadOption::new(option, &source.name, "was not measured").into()),
             None => Ok(quantity),
         }
     };

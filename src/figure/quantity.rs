@@ -7,8 +7,9 @@ use super::hues::Hues;
 use super::style::INKS;
 use crate::model::Symbol;
 use crate::reduce::{FREQUENCY, Values, ascending, has_even_steps, is_spread, quantile};
-use crate::sets::label;
-use crate::table::columns::Row;
+use crate::sets::{label, parameter};
+use crate::table::columns::{Column, Row};
+use std::borrow::Cow;
 
 const MAX_WORDS: usize = 12;
 /// Values of a statistic from which on one alone says nothing of its scale.
@@ -30,24 +31,15 @@ pub(super) struct Quantity<'a> {
     pub(super) drive: Option<Values>,
     /// To the unit of the axis.
     pub(super) factor: f64,
-    pub(super) unit: &'static str,
+    pub(super) unit: Cow<'static, str>,
     pub(super) is_log: bool,
     pub(super) limits: Limits,
     pub(super) label: Option<&'a str>,
 }
 
-/// The parameter that a column shows.
-pub(super) fn parameter(column: &str) -> Option<Symbol> {
-    if ["eta", FREQUENCY].contains(&column) {
-        Some(Symbol::T)
-    } else {
-        Symbol::from_key(column)
-    }
-}
-
-/// Whether a column holds mean phases: only sets with a phase have a place.
-pub(super) fn shows_phase(column: &str) -> bool {
-    column.contains("phase_mean")
+/// Whether values show phases. Of mean ones, only those of sets with a phase have a place.
+pub(super) fn shows_angle(values: &Values) -> bool {
+    values.sources.iter().any(Column::is_angle)
 }
 
 impl Quantity<'_> {
@@ -58,7 +50,7 @@ impl Quantity<'_> {
     ) -> Result<Self, BadOption> {
         let mut column =
             Values::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
-        if shows_phase(column.name())
+        if shows_angle(&column)
             && let Ok(phased) = Values::of(rows, "has_phase")
         {
             let has_phase = |word: f64| phased.word(word) == Some("yes");
@@ -67,11 +59,9 @@ impl Quantity<'_> {
             }
             column.distinct = ascending(column.numbers.iter().copied().flatten());
         }
-        let drive = match column.name() {
-            "resultant_length" => Values::of(rows, "resultant_drive").ok(),
-            "locking_index" => Values::of(rows, "locking_index_drive").ok(),
-            _ => None,
-        };
+        let mut columns = R::columns().into_iter();
+        let drive = columns.find(|other| other.class.explained() == Some(column.name()));
+        let drive = drive.and_then(|drive| Values::of(rows, &drive.name).ok());
         let drive = drive.filter(|drive| drive.numbers.iter().any(Option::is_some));
         Ok(Self {
             drive,
@@ -81,7 +71,7 @@ impl Quantity<'_> {
 
     pub(super) fn of_values(option: &'static str, column: Values) -> Self {
         let (factor, unit) = column.scale();
-        let symbol = parameter(column.name());
+        let symbol = parameter(&column.column);
         let is_log = if symbol.is_some() {
             column.is_logarithmic()
         } else {
@@ -107,20 +97,20 @@ impl Quantity<'_> {
     /// The parameters that it is made of; none if anything else enters.
     pub(super) fn parameters(&self) -> Vec<Symbol> {
         let sources = self.column.sources.iter();
-        let symbols: Option<Vec<Symbol>> = sources.map(|source| parameter(source)).collect();
+        let symbols: Option<Vec<Symbol>> = sources.map(parameter).collect();
         symbols.unwrap_or_default()
     }
 
     /// The first of the swept parameters that it is made of, if it is made of parameters alone.
     pub(super) fn joined_along(&self, swept: &[Values]) -> Option<Symbol> {
         let own = self.parameters();
-        let mut swept = swept.iter().filter_map(|swept| parameter(swept.name()));
+        let mut swept = swept.iter().filter_map(|swept| parameter(&swept.column));
         swept.find(|symbol| own.contains(symbol))
     }
 
     pub(super) fn axis_label(&self) -> String {
         self.label
-            .map_or_else(|| self.column.label().axis(self.unit), str::to_owned)
+            .map_or_else(|| self.column.label.axis(&self.unit), str::to_owned)
     }
 
     /// Each value once, ascending.
@@ -142,7 +132,7 @@ impl Quantity<'_> {
     }
 
     pub(super) fn interval(&self, set: usize) -> Option<Ends> {
-        self.column.intervals[set].map(|(low, high)| (self.factor * low, self.factor * high))
+        self.column.intervals[set].map(|ends| (self.factor * ends.low, self.factor * ends.high))
     }
 
     pub(super) fn refuse(&self, problem: &str) -> BadOption {
@@ -166,7 +156,7 @@ impl Quantity<'_> {
         let label = self.axis_label();
         let short_label = self
             .label
-            .map_or_else(|| self.column.label().short(self.unit), str::to_owned);
+            .map_or_else(|| self.column.label.short(&self.unit), str::to_owned);
         if self.column.is_worded() {
             let mut axis = self.axis_of_words(&label)?;
             axis.short_label = short_label;
@@ -258,7 +248,7 @@ impl Quantity<'_> {
             return Err(self.refuse("no set has a value of it"));
         }
         let word = |value: f64| values.setting(value / self.factor);
-        let label = self.column.label().short(self.unit);
+        let label = self.column.label.short(&self.unit);
         Ok(Hues::of(&label, self.distinct(), word))
     }
 }
@@ -271,8 +261,8 @@ fn lies_decades_apart(column: &Values) -> bool {
     let values = &column.distinct;
     // Shares are seen near 0, where their intervals reach it.
     let intervals = column.intervals.iter().flatten();
-    let intervals = intervals.filter(|_| column.column.unit.is_empty());
-    let least = intervals.map(|(low, _)| *low).fold(least, f64::min);
+    let intervals = intervals.filter(|_| column.label.unit.is_empty());
+    let least = intervals.map(|ends| ends.low).fold(least, f64::min);
     // A single set, such as the only one that slides, changes no scale.
     let alone = usize::from(values.len() >= FEW_VALUES);
     let ends = (values[alone], values[values.len() - 1 - alone]);
@@ -291,7 +281,7 @@ pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str>
 
 /// Whether sets without a value of a column belong to every value: without modulation there is no period.
 pub(super) fn belongs_to_all(values: &Values) -> bool {
-    parameter(values.name()) == Some(Symbol::T)
+    parameter(&values.column) == Some(Symbol::T)
 }
 
 /// What sets without a value of a column are called: of a period, that they have no modulation.
@@ -299,7 +289,7 @@ pub(super) fn without_value(values: &Values) -> String {
     if belongs_to_all(values) {
         "Δ = 0".to_owned()
     } else {
-        format!("no {}", values.label().symbol)
+        format!("no {}", values.label.symbol)
     }
 }
 
@@ -307,7 +297,7 @@ pub(super) fn without_value(values: &Values) -> String {
 pub(super) fn axis_of(column: &str, values: impl Iterator<Item = f64>) -> (String, f64) {
     let label = label(column);
     let (factor, unit) = label.scale(values.fold(0.0, f64::max));
-    (label.axis(unit), factor)
+    (label.axis(&unit), factor)
 }
 
 /// At least two values of a swept quantity, and how they are spaced.

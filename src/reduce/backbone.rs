@@ -4,7 +4,7 @@ use super::estimate::{Estimate, Units, length};
 use super::set::FinishedSet;
 use super::top_of_phases;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::table::columns::columns;
+use crate::table::columns::{Class, columns};
 use crate::table::tables;
 use crate::table::value::floored;
 use serde::Serialize;
@@ -25,12 +25,12 @@ columns! {
         slips: u64 = "", "slips of all sets";
         phase_mean: Option<f64> = "rad", "circular mean of the phase of all slips";
         phase_mean_low: Option<f64> = "rad",
-            "lower end of its 95 % confidence interval, for these sets; the whole turn if no direction is excluded";
-        phase_mean_high: Option<f64> = "rad", "upper end";
+            "lower end of its 95 % confidence interval, for these sets; the whole turn if no direction is excluded", "", Class::Low;
+        phase_mean_high: Option<f64> = "rad", "upper end", "", Class::High;
         resultant_length: Option<f64> = "", "|<exp(i phi)>| of all slips";
         set_phase_mean: Option<f64> = "rad", "circular mean over the sets that have a phase of their mean phase";
-        set_phase_mean_low: Option<f64> = "rad", "lower end of its 95 % confidence interval, for these sets";
-        set_phase_mean_high: Option<f64> = "rad", "upper end";
+        set_phase_mean_low: Option<f64> = "rad", "lower end of its 95 % confidence interval, for these sets", "", Class::Low;
+        set_phase_mean_high: Option<f64> = "rad", "upper end", "", Class::High;
         phase_minimum as "phi_min": Option<f64> = "rad", "least phase of Eq. 2 at the centre; null for eta < 1";
         asymptote: f64 = "rad", "-2 sqrt(pi / eta) at the centre";
     }

@@ -12,10 +12,14 @@ use super::values::Values;
 use crate::model::{Parameters, Symbol};
 use crate::results::tables::RecordedTable;
 use crate::results::{Results, ResultsError};
-use crate::sets::{SetRow, column_of};
+use crate::sets::{SetRow, column_of, label};
 use crate::table::columns::Kind;
 use std::collections::{BTreeMap, HashMap};
 
+/// What the names and labels of columns of a side end with, and of their difference.
+const A: (&str, &str) = ("a", ", A");
+const B: (&str, &str) = ("b", ", B");
+const DIFFERENCE: (&str, &str) = ("difference", ", B − A");
 /// What is compared: columns of the sets.
 const STATISTICS: [&str; 3] = ["tau_mean", "mean_friction", "resultant_length"];
 
@@ -135,13 +139,17 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsEr
     let of_pair = |pair: &Pair<'_>| (&found_in_a[&pair.a.set_id], &found_in_b[&pair.b.set_id]);
     let sets: Vec<(&FinishedSet, &FinishedSet)> = pairs.iter().map(of_pair).collect();
 
-    let seeds = |name: &str, count: fn(&Pair<'_>) -> usize| {
+    let column = |name: &str, (side, words): (&str, &str), kind, found: Vec<_>| {
+        let label = label(name).with(words);
+        Values::computed(&format!("{name}_{side}"), label, kind, found)
+    };
+    let seeds = |side, count: fn(&Pair<'_>) -> usize| {
         let counts = pairs.iter().map(|pair| (Some(count(pair) as f64), None));
-        Values::computed(name, Kind::Count, counts)
+        column("seeds", side, Kind::Count, counts.collect())
     };
     let mut found = vec![
-        seeds("seeds_a", |pair| pair.seeds_of_a.len()),
-        seeds("seeds_b", |pair| pair.seeds_of_b.len()),
+        seeds(A, |pair| pair.seeds_of_a.len()),
+        seeds(B, |pair| pair.seeds_of_b.len()),
     ];
     for name in STATISTICS {
         let of = |set: &FinishedSet| set.estimates.get(name).cloned();
@@ -152,19 +160,13 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsEr
             Estimate::both(difference.as_ref())
         };
         let number = |set: &FinishedSet| (of(set).map(|found| found.value), None);
-        let in_a = sets.iter().map(|(a, _)| number(a));
-        let in_b = sets.iter().map(|(_, b)| number(b));
-        let differences = sets.iter().map(difference);
-        let name = |which| format!("{name}_{which}");
-        let mut of_statistic = [
-            Values::computed(&name("a"), Kind::Real, in_a),
-            Values::computed(&name("b"), Kind::Real, in_b),
-            Values::computed(&name("difference"), Kind::Real, differences),
-        ];
-        let largest = of_statistic
-            .iter()
-            .map(|values| values.largest)
-            .fold(0.0, f64::max);
+        let in_a = sets.iter().map(|(a, _)| number(a)).collect();
+        let in_b = sets.iter().map(|(_, b)| number(b)).collect();
+        let differences = sets.iter().map(difference).collect();
+        let mut of_statistic = [(A, in_a), (B, in_b), (DIFFERENCE, differences)]
+            .map(|(side, found)| column(name, side, Kind::Real, found));
+        let sizes = of_statistic.iter().map(|values| values.largest);
+        let largest = sizes.fold(0.0, f64::max);
         for values in &mut of_statistic {
             values.largest = largest;
         }

@@ -486,11 +486,11 @@ pub(super) fn edge_rows(
     Ok(rows)
 }
 
-/// The edges of two statistics on one row, by how much the second lies further, and the ends of its interval.
+/// The edges of two statistics on one row, by how much the second lies further, and its interval.
 pub struct EdgePair {
     pub edges: [EdgeRow; 2],
     pub difference: f64,
-    pub interval: Option<(f64, f64)>,
+    pub interval: Option<Interval>,
 }
 
 /// Of the first statistic and each other, by the seeds of both.
@@ -546,7 +546,7 @@ pub fn pairs_of_edges(results: &Results<'_>) -> Result<Vec<EdgePair>, ResultsErr
                     row(line.statistic.key, other),
                 ],
                 difference,
-                interval: half.map(|half| (difference - half, difference + half)),
+                interval: half.map(|half| Interval::around(difference, half)),
             });
         }
     }

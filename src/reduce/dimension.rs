@@ -1,14 +1,14 @@
-//! The unit of a formula, by the dimensions of its columns: `sqrt(Kd/M)` is in 1/s. A formula has one if its value
-//! changes by a power of the size of each base unit; a sum of a time and a length does not.
+//! The unit of a formula, by the exponents of its columns: `sqrt(Kd/M)` is in 1/s.
 
 use crate::sweep::Expression;
 use crate::table::columns::Column;
 
 /// Base units. Energies, rates and masses are powers of these.
 const BASE: [&str; 3] = ["N", "m", "s"];
+type Exponents = [f64; BASE.len()];
 
 /// Units of columns as powers of the base units.
-const UNITS: [(&str, [f64; BASE.len()]); 9] = [
+const UNITS: [(&str, Exponents); 9] = [
     ("", [0.0, 0.0, 0.0]),
     ("1", [0.0, 0.0, 0.0]),
     ("rad", [0.0, 0.0, 0.0]),
@@ -20,49 +20,33 @@ const UNITS: [(&str, [f64; BASE.len()]); 9] = [
     ("kg", [1.0, -1.0, 2.0]),
 ];
 
-/// By which the base units are made smaller, one at a time.
-const FACTOR: f64 = 4.0;
-/// Multiples of a half up to rounding.
-const ROUNDING: f64 = 1e-9;
-
-/// The unit of a formula of these columns; empty for a pure number, and where the dimensions do not agree.
-pub(super) fn unit_of_formula(formula: &Expression<usize>, columns: &[Column]) -> &'static str {
-    let value = |scaled: Option<usize>| {
-        formula.evaluate(&|&place| {
-            // Values that nothing but a common unit makes alike.
-            let plain = 1.0 + libm::sqrt(2.0 + place as f64);
-            let power = scaled.map_or(0.0, |base| power(columns[place].unit, base));
-            plain * libm::pow(FACTOR, power)
-        })
-    };
-    let power = |base: usize| {
-        let halves = 2.0 * libm::log(value(Some(base)) / value(None)) / libm::log(FACTOR);
-        let is_power = (halves - halves.round()).abs() < ROUNDING;
-        is_power.then(|| 0.5 * halves.round())
-    };
-    let powers: Option<Vec<f64>> = (0..BASE.len()).map(power).collect();
-    // A few bytes for each formula that somebody types.
-    powers.map_or("", |powers| written(&powers).leak())
+/// The unit of a formula of these columns; empty for a pure number, and where it adds unlike units.
+pub(super) fn unit_of_formula(formula: &Expression<usize>, columns: &[Column]) -> String {
+    let exponents = formula.exponents(&|&place| exponents(columns[place].unit));
+    exponents.map_or_else(String::new, written)
 }
 
-/// The power of a base unit in a unit such as `N/m`; NaN for an unknown one.
-fn power(unit: &str, base: usize) -> f64 {
-    let power = |part: &str| {
-        let known = UNITS.iter().find(|known| known.0 == part);
-        known.map_or(f64::NAN, |known| known.1[base])
+/// Of a unit such as `N/m`; `None` for an unknown one.
+fn exponents(unit: &str) -> Option<Exponents> {
+    let known = |part: &str| {
+        let mut units = UNITS.iter();
+        units.find(|known| known.0 == part).map(|known| known.1)
     };
-    let mut powers = unit.split('/').map(power);
-    let above = powers.next().unwrap_or(0.0);
-    above - powers.sum::<f64>()
+    let mut parts = unit.split('/').map(known);
+    let above = parts.next()??;
+    parts.try_fold(above, |all, below| {
+        let below = below?;
+        Some(std::array::from_fn(|unit| all[unit] - below[unit]))
+    })
 }
 
 /// As a fraction of products.
-fn written(powers: &[f64]) -> String {
+fn written(powers: Exponents) -> String {
     let product = |sign: f64| {
         let powers = BASE
             .iter()
             .zip(powers)
-            .filter(|(_, power)| sign * *power > 0.0);
+            .filter(|(_, power)| sign * power > 0.0);
         let factors = powers.map(|(base, power)| match power.abs() {
             1.0 => (*base).to_owned(),
             2.0 => format!("{base}²"),
@@ -102,7 +86,7 @@ mod tests {
             ("sqrt(tau_mean + 1)", ""),
         ] {
             let values = Values::of::<SetRow>(&[], formula).unwrap();
-            assert_eq!(values.column.unit, unit, "{formula}");
+            assert_eq!(values.label.unit, unit, "{formula}");
         }
     }
 }

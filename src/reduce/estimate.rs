@@ -471,21 +471,13 @@ impl Estimate {
         })
     }
 
-    /// Its value and the ends of its interval.
-    pub(super) fn both(of: Option<&Self>) -> (Option<f64>, Option<(f64, f64)>) {
-        let interval = of.and_then(Self::interval);
-        (
-            of.map(|of| of.value),
-            interval.map(|ends| (ends.low, ends.high)),
-        )
+    /// Its value and its interval.
+    pub(super) fn both(of: Option<&Self>) -> (Option<f64>, Option<Interval>) {
+        (of.map(|of| of.value), of.and_then(Self::interval))
     }
 
     pub(crate) fn interval(&self) -> Option<Interval> {
-        let half = self.half_width()?;
-        Some(Interval {
-            low: self.value - half,
-            high: self.value + half,
-        })
+        Some(Interval::around(self.value, self.half_width()?))
     }
 }
 /// Student's t for a two-sided probability, at a whole number >= 1 of degrees of freedom.

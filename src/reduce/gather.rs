@@ -17,7 +17,7 @@ use crate::results::tables::{All, JobOfSlip, RecordedTable};
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, SetRow};
 use crate::sweep::Plan;
-use crate::table::columns::columns;
+use crate::table::columns::{Class, columns};
 use crate::table::file::Dataset;
 use crate::table::tables;
 use crate::table::value::words;
@@ -250,7 +250,7 @@ columns! {
     /// A slip as a point of a scatter figure.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Point {
-        drive_velocity as "V0": f64 = "m/s", "drive velocity";
+        drive_velocity as "V0": f64 = "m/s", "drive velocity", "", Class::Parameter;
         amplitude as "Delta": f64 = "m", "amplitude of the modulation at the onset";
         period as "T": Option<f64> = "s", "period of the modulation at the onset";
         eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";

@@ -242,12 +242,8 @@ impl<'a> RoundsOfSets<'a> {
 /// wanted. `None` if none of them has a value.
 pub fn error_over_target(row: &SetRow, precision: &Precision) -> Option<f64> {
     let errors = precision.statistics.iter().filter_map(|statistic| {
-        let value = row.number(statistic.key)?;
-        let ends = ["low", "high"].map(|end| row.number(&format!("{}_{end}", statistic.key)));
-        let half = match ends {
-            [Some(low), Some(high)] => 0.5 * (high - low),
-            _ => f64::INFINITY,
-        };
+        let (value, interval) = row.estimate(statistic.key)?;
+        let half = interval.map_or(f64::INFINITY, |ends| 0.5 * (ends.high - ends.low));
         let target = match precision.target {
             Target::Relative(share) => share * value.abs(),
             Target::Absolute(target) => target,

@@ -5,11 +5,11 @@ use super::estimate::{
     Estimate, MAX_UNSEEN, Numbers, Sums, Units, at_rank, length, mean, plus, unit,
 };
 use super::{resultant_at_random, top_of_phases};
-use crate::model::{Parameters, Selected, Symbol};
+use crate::model::{Parameters, Selected};
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
-use crate::sets::{FREQUENCY, SetRow};
-use crate::table::columns::{Interval, columns};
+use crate::sets::{SetRow, parameter};
+use crate::table::columns::{Column, Interval, columns};
 use crate::table::value::floored;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
@@ -284,14 +284,12 @@ pub(super) struct FinishedSet {
 
 impl FinishedSet {
     /// A statistic, or a parameter; `None` of what has no error that is known.
-    pub(super) fn estimate(&self, column: &str) -> Option<Estimate> {
-        let is_exact = matches!(column, FREQUENCY | "eta") || Symbol::from_key(column).is_some();
-        let exact = || {
-            Some(Estimate::exact(
-                self.row.number(column).filter(|_| is_exact)?,
-            ))
-        };
-        self.estimates.get(column).cloned().or_else(exact)
+    pub(super) fn estimate(&self, column: &Column) -> Option<Estimate> {
+        let known = self.estimates.get(&*column.name).cloned();
+        known.or_else(|| {
+            parameter(column)?;
+            self.row.number(&column.name).map(Estimate::exact)
+        })
     }
 
     /// Notes the estimate of a column: its value, and its interval within a range.
@@ -301,8 +299,7 @@ impl FinishedSet {
         estimate: Option<Estimate>,
         [least, most]: [f64; 2],
     ) -> (Option<f64>, Option<Interval>) {
-        let value = estimate.as_ref().map(|estimate| estimate.value);
-        let interval = estimate.as_ref().and_then(Estimate::interval);
+        let (value, interval) = Estimate::both(estimate.as_ref());
         self.estimates
             .extend(estimate.map(|estimate| (column, estimate)));
         let within = |Interval { low, high }| Interval {

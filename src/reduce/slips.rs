@@ -99,7 +99,7 @@ pub fn add_intervals(
     let is_measured = values
         .sources
         .iter()
-        .any(|name| Statistic::from_key(name).is_some());
+        .any(|source| Statistic::from_key(&source.name).is_some());
     let Some(formula) = formula(values.name(), &columns)
         .ok()
         .filter(|_| is_measured && has_jobs)
@@ -117,9 +117,7 @@ pub fn add_intervals(
                 return Ok(());
             };
             let set = set.finish_with(explained).0;
-            let of = names
-                .iter()
-                .map(|column| set.estimate(&columns[*column].name));
+            let of = names.iter().map(|column| set.estimate(&columns[*column]));
             let found = of.collect::<Option<Vec<_>>>().map(|of| {
                 let value = |values: &[f64]| {
                     let known: HashMap<usize, f64> =
@@ -128,7 +126,7 @@ pub fn add_intervals(
                 };
                 Estimate::of_all(&of.iter().collect::<Vec<_>>(), value)
             });
-            values.intervals[place] = Estimate::both(found.as_ref()).1;
+            values.intervals[place] = found.as_ref().and_then(Estimate::interval);
             Ok(())
         },
     )

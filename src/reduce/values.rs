@@ -5,9 +5,9 @@
 
 use super::dimension::unit_of_formula;
 use crate::model::Symbol;
-use crate::sets::{Digits, FREQUENCY, Label, SetRow, is_same, label};
+use crate::sets::{Digits, FREQUENCY, Label, SetRow, is_same, parameter};
 use crate::sweep::{Expression, nearest, synonym};
-use crate::table::columns::{Column, Kind, Row, Value};
+use crate::table::columns::{Column, Interval, Kind, Row, Value};
 use crate::table::value::{Shortest, floored};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -16,12 +16,13 @@ use std::collections::BTreeSet;
 #[derive(Clone, Debug)]
 pub struct Values {
     pub column: Column,
+    pub label: Label,
     /// The columns that it is made of: itself, or those that the formula names.
-    pub sources: Vec<Cow<'static, str>>,
+    pub sources: Vec<Column>,
     /// A number for each row, in SI units; for a word, its place among the words.
     pub numbers: Vec<Option<f64>>,
-    /// Ends of the confidence intervals, where there are any.
-    pub intervals: Vec<Option<(f64, f64)>>,
+    /// Their confidence intervals, where there are any.
+    pub intervals: Vec<Option<Interval>>,
     /// Each number once, ascending.
     pub distinct: Vec<f64>,
     /// The words that occur, sorted; empty for a column of numbers.
@@ -37,11 +38,6 @@ impl Values {
         let Some(column) = place(name, &columns) else {
             return Self::of_formula(rows, name, &columns);
         };
-        let end = |end: &str| {
-            let name = format!("{}_{end}", columns[column].name);
-            columns.iter().position(|column| column.name == name)
-        };
-        let ends = end("low").zip(end("high"));
         let mut numbers = Vec::new();
         let mut intervals = Vec::new();
         let mut given = Vec::new();
@@ -54,7 +50,7 @@ impl Values {
                 cells.push(cell.number());
             });
             numbers.push(cells[column].filter(|number| number.is_finite()));
-            intervals.push(ends.and_then(|(low, high)| cells[low].zip(cells[high])));
+            intervals.push(Interval::of(&columns, column, &cells));
         }
         let words: BTreeSet<String> = given.iter().flatten().cloned().collect();
         let words: Vec<String> = words.into_iter().collect();
@@ -63,6 +59,7 @@ impl Values {
         }
         Ok(Self::new(
             columns[column].clone(),
+            Label::of(&columns, column),
             numbers,
             intervals,
             words,
@@ -71,13 +68,15 @@ impl Values {
 
     fn new(
         column: Column,
+        label: Label,
         numbers: Vec<Option<f64>>,
-        intervals: Vec<Option<(f64, f64)>>,
+        intervals: Vec<Option<Interval>>,
         words: Vec<String>,
     ) -> Self {
         Self {
-            sources: vec![column.name.clone()],
+            sources: vec![column.clone()],
             column,
+            label,
             distinct: ascending(numbers.iter().copied().flatten()),
             largest: numbers
                 .iter()
@@ -96,33 +95,38 @@ impl Values {
         Ok(Self::of_numbers(text, &formula, columns, found))
     }
 
-    /// The numbers of a formula of columns, with their unit, and the ends of their intervals.
+    /// The numbers of a formula of columns, with their unit, and their intervals.
     pub(super) fn of_numbers(
         text: &str,
         formula: &Expression<usize>,
         columns: &[Column],
-        found: impl Iterator<Item = (Option<f64>, Option<(f64, f64)>)>,
+        found: impl Iterator<Item = (Option<f64>, Option<Interval>)>,
     ) -> Self {
-        let mut values = Self::computed(text, Kind::Real, found);
+        let label = match *formula {
+            Expression::Name(place) => Label::of(columns, place),
+            _ => Label::of_formula(text, columns, unit_of_formula(formula, columns)),
+        };
         let names = formula.names().into_iter();
-        values.sources = names.map(|&place| columns[place].name.clone()).collect();
-        values.column.unit = unit_of_formula(formula, columns);
-        values
+        Self {
+            sources: names.map(|&place| columns[place].clone()).collect(),
+            ..Self::computed(text, label, Kind::Real, found)
+        }
     }
 
-    /// A column of computed values and the ends of their intervals.
+    /// A column of computed values and their intervals.
     pub(super) fn computed(
         name: &str,
+        label: Label,
         kind: Kind,
-        found: impl Iterator<Item = (Option<f64>, Option<(f64, f64)>)>,
+        found: impl IntoIterator<Item = (Option<f64>, Option<Interval>)>,
     ) -> Self {
         let column = Column {
             name: name.to_owned().into(),
             kind,
             ..Column::default()
         };
-        let (numbers, intervals) = found.unzip();
-        Self::new(column, numbers, intervals, Vec::new())
+        let (numbers, intervals) = found.into_iter().unzip();
+        Self::new(column, label, numbers, intervals, Vec::new())
     }
 
     /// The same without η = 0, which stands for no modulation: as the period, it has no value there.
@@ -150,39 +154,28 @@ impl Values {
         self.words.get(floored(value)).map(String::as_str)
     }
 
-    pub fn label(&self) -> Label {
-        let mut label = label(self.name());
-        if !self.column.unit.is_empty() {
-            label.unit = self.column.unit;
-        }
-        label
-    }
-
     /// The factor to the unit in which they are read best, and that unit.
-    pub fn scale(&self) -> (f64, &'static str) {
-        self.label().scale(self.largest)
+    pub fn scale(&self) -> (f64, Cow<'static, str>) {
+        self.label.scale(self.largest)
     }
 
     /// The digits that distinguish its values if it is a parameter, or computed from parameters; three for a statistic,
     /// whose interval says how many are certain.
     pub fn digits(&self) -> Digits {
         let numbers = self.numbers.iter().flatten().copied();
-        match self.name() {
-            "T" | "eta" | FREQUENCY => Digits::THREE.distinguishing(&self.distinct),
-            name if Symbol::from_key(name).is_some() => {
-                Digits::THREE.distinguishing(&numbers.collect::<Vec<_>>())
-            }
-            _ if self.column.kind == Kind::Count => Digits::ALL,
-            _ => Digits::THREE,
+        match parameter(&self.column) {
+            Some(Symbol::T) => Digits::THREE.distinguishing(&self.distinct),
+            Some(_) => Digits::THREE.distinguishing(&numbers.collect::<Vec<_>>()),
+            None if self.column.kind == Kind::Count => Digits::ALL,
+            None => Digits::THREE,
         }
     }
 
     /// Its symbol and one of its values or words.
     pub fn setting(&self, value: f64) -> String {
-        let label = self.label();
         self.word(value).map_or_else(
-            || label.setting(value, self.digits()),
-            |word| format!("{}: {word}", label.symbol),
+            || self.label.setting(value, self.digits()),
+            |word| format!("{}: {word}", self.label.symbol),
         )
     }
 
@@ -279,9 +272,8 @@ pub(super) fn evaluate(expression: &Expression<usize>, row: &impl Row) -> f64 {
 
 /// The place of a column by its name, or by its heading in printed tables.
 fn place(name: &str, columns: &[Column]) -> Option<usize> {
-    let place = |is_meant: &dyn Fn(&Column) -> bool| columns.iter().position(is_meant);
-    place(&|column| column.name == name)
-        .or_else(|| place(&|column| label(&column.name).symbol == name))
+    let named = columns.iter().position(|column| column.name == name);
+    named.or_else(|| (0..columns.len()).find(|&place| Label::of(columns, place).symbol == name))
 }
 
 fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
@@ -297,11 +289,9 @@ fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
 fn unknown(name: &str, columns: &[Column]) -> String {
     const MAX_NAMES: usize = 8;
     let names: Vec<&str> = columns.iter().map(|column| &*column.name).collect();
-    let is_longer = |known: &str| {
-        let is_part = known.starts_with(name) || known.ends_with(&format!("_{name}"));
-        is_part && !known.ends_with("_low") && !known.ends_with("_high")
-    };
-    let longer = names.iter().copied().filter(|known| is_longer(known));
+    let is_longer = |known: &&str| known.starts_with(name) || known.ends_with(&format!("_{name}"));
+    let offered = columns.iter().filter(|column| !column.is_end());
+    let longer = offered.map(|column| &*column.name).filter(is_longer);
     let longer: Vec<&str> = longer.take(MAX_NAMES).collect();
     let meant = match synonym(name, &names) {
         None if !longer.is_empty() => Some(longer.join(", ")),
@@ -393,10 +383,7 @@ mod tests {
             }),
             is_control: period.is_some(),
             tau_mean: Some(2.0),
-            tau_interval: Some(Interval {
-                low: 1.0,
-                high: 3.0,
-            }),
+            tau_interval: Some(Interval::around(2.0, 1.0)),
             tau_deviation: Some(1.0),
             mean_friction: period.map(|_| 400.0),
             ..SetRow::default()
@@ -412,7 +399,7 @@ mod tests {
             (vec![Some(1.0), Some(0.0)], vec!["no".into(), "yes".into()])
         );
         let tau = Values::of(&rows(), "tau_mean").unwrap();
-        assert!(tau.intervals == [Some((1.0, 3.0)); 2] && !tau.is_worded());
+        assert!(tau.intervals == [Some(Interval::around(2.0, 1.0)); 2] && !tau.is_worded());
         assert_eq!(
             Values::of(&rows(), FREQUENCY).unwrap().numbers,
             [Some(50.0), None]
@@ -464,7 +451,7 @@ mod tests {
     #[test]
     fn values_that_agree_in_ten_digits_have_one_place() {
         let found = [2.0, 1.0, 1.0 + 5e-11, 1.0 + 2e-10].map(|number| (Some(number), None));
-        let values = Values::computed("x", Kind::Real, found.into_iter());
+        let values = Values::computed("x", Label::new("x"), Kind::Real, found);
         assert_eq!(values.places(), [2, 0, 0, 1].map(Some));
     }
 

@@ -81,11 +81,8 @@ function save(name, blob) {
 }
 const isNumeric = (column) => column.kind === "real" || column.kind === "count";
 /** Whether a menu offers it: it has values, and is no end of an interval, which is shown with its value. */
-const isOffered = ({ name, values }) =>
-  !/^set_id$|_(low|high)$/.test(name) && values.some((value) => value !== null && !Number.isNaN(value));
-/** What the drive alone explains of other columns. */
-const DRIVE_ALONE = { resultant_length: "resultant_drive", locking_index: "locking_index_drive" };
-
+const isOffered = ({ name, is_end, values }) =>
+  name !== "set_id" && !is_end && values.some((value) => value !== null && !Number.isNaN(value));
 /** The columns of a table by name, each with its values. */
 const byName = ({ columns, values }) =>
   new Map(columns.map((column, k) => [column.name, { ...column, values: values[k] }]));
@@ -112,9 +109,9 @@ class Report {
     for (const column of [...parameters, this.columns.get("eta"), this.columns.get("frequency")]) {
       if (column && isNumeric(column)) column.digits = distinguishing(column.values, 3);
     }
-    for (const [name, alone] of Object.entries(DRIVE_ALONE)) {
-      const column = this.columns.get(alone);
-      column.meaning = column.meaning.replace("the same", this.columns.get(name).meaning.split(":")[0]);
+    for (const column of this.columns.values()) {
+      const explained = this.columns.get(column.by_drive);
+      if (explained) column.meaning = column.meaning.replace("the same", explained.meaning.split(":")[0]);
     }
     this.offered = [...this.columns.values()].filter(isOffered);
     const isSwept = ({ values }) => new Set(values).size > 1;

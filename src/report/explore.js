@@ -341,7 +341,7 @@ class Explorer {
       tip,
       pick,
     };
-    const drive = report.offered.find(({ name }) => name === DRIVE_ALONE[y.name]);
+    const drive = report.offered.find(({ by_drive }) => by_drive === y.name);
     const alone = drive
       ? [
           {

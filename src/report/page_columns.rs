@@ -5,7 +5,7 @@ use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, read_sets, 
 use crate::results::layout::Layout;
 use crate::results::tables::{JobOfSlip, RecordedTable};
 use crate::results::{Results, ResultsError};
-use crate::sets::{Label, label};
+use crate::sets::Label;
 use crate::sweep::Sweep;
 use crate::table::Table;
 use crate::table::columns::{Column, Row, Value};
@@ -25,51 +25,51 @@ pub(super) struct Columns {
     #[serde(rename = "columns")]
     described: Vec<Json>,
     values: Vec<Vec<Json>>,
-    /// All columns of the rows, and whether the page has them.
+    /// The labels of the columns of the rows; none of those that the page leaves out.
     #[serde(skip)]
-    all: Vec<(bool, Column)>,
+    labels: Vec<Option<Label>>,
 }
 
 impl Columns {
     fn of<R: Row>(is_shown: impl Fn(&Column) -> bool) -> Self {
-        let columns = R::columns().into_iter();
-        let all: Vec<(bool, Column)> = columns.map(|column| (is_shown(&column), column)).collect();
-        let described = |(_, column): &(bool, Column)| {
+        let columns = R::columns();
+        let label = |place| is_shown(&columns[place]).then(|| Label::of(&columns, place));
+        let described = |column: &Column| {
             let Column { name, unit, .. } = column;
             let meaning = column.meaning;
             let kind = column.kind.word();
-            json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind })
+            let [is_end, by_drive] = [json!(column.is_end()), json!(column.class.explained())];
+            json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind, "is_end": is_end, "by_drive": by_drive })
         };
-        let shown = all.iter().filter(|column| column.0);
+        let shown = columns.iter().filter(|column| is_shown(column));
         let described: Vec<Json> = shown.map(described).collect();
         Self {
             values: vec![Vec::new(); described.len()],
             described,
-            all,
+            labels: (0..columns.len()).map(label).collect(),
         }
     }
 
     /// Gives each column its label in the unit in which its values are read best, and the factor to that; no unit to one
     /// without values.
-    fn label(&mut self, label: impl Fn(&Column) -> Label) {
-        let shown = self.all.iter().filter(|column| column.0);
-        let labels = shown.map(|column| label(&column.1));
+    fn label(&mut self) {
+        let labels = self.labels.iter().flatten();
         for ((column, values), label) in self.described.iter_mut().zip(&self.values).zip(labels) {
             let sizes = values.iter().filter_map(Json::as_f64).map(f64::abs);
             let largest = sizes.reduce(f64::max);
-            let (factor, unit) = largest.map_or((1.0, ""), |largest| label.scale(largest));
-            column["label"] = label.axis(unit).into();
-            column["symbol"] = label.symbol.into();
+            let (factor, unit) = largest.map_or((1.0, "".into()), |largest| label.scale(largest));
+            column["label"] = label.axis(&unit).into();
+            column["symbol"] = label.symbol.as_str().into();
             column["unit"] = unit.into();
             column["factor"] = factor.into();
         }
     }
 
     fn push<R: Row>(&mut self, row: &R, json: impl Fn(Value<'_>) -> Json) {
-        let mut all = self.all.iter();
+        let mut labels = self.labels.iter();
         let mut values = self.values.iter_mut();
         row.cells(&mut |cell| {
-            if all.next().is_some_and(|column| column.0)
+            if let Some(Some(_)) = labels.next()
                 && let Some(column) = values.next()
             {
                 column.push(json(cell));
@@ -167,7 +167,7 @@ impl Sets {
                 shown.push(row);
             }
         }
-        sets.columns.label(|column| label(&column.name));
+        sets.columns.label();
         for swept in &swept(&shown) {
             let name = swept.name().to_owned();
             sets.swept.push((name, swept.is_logarithmic()));
@@ -242,11 +242,7 @@ impl Slips {
             slips.job.push(slips.jobs.len() - 1);
             slips.columns.push(&slip, rounded);
         }
-        slips.columns.label(|column| Label {
-            symbol: column.symbol.to_owned(),
-            what: column.words.to_owned(),
-            unit: column.unit,
-        });
+        slips.columns.label();
         Ok(slips)
     }
 }

@@ -7,7 +7,7 @@ use crate::model::{Parameters, Selected, Selection, Symbol};
 use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
 use crate::sweep::Sweep;
 use crate::table::arrow::{Gaps, RowBuffer};
-use crate::table::columns::{Row as _, columns};
+use crate::table::columns::{Class, Row as _, columns};
 use crate::table::tables;
 use crate::table::value::words;
 use arrow_schema::SchemaRef;
@@ -49,8 +49,9 @@ columns! {
     /// What the modulation amounts to.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Loading {
-        frequency: Option<f64> = "Hz", "1/T; null without modulation";
-        eta: f64 = "", "2 pi Delta / (T V0), harmonic against uniform loading rate; 0 without modulation";
+        frequency: Option<f64> = "Hz", "1/T; null without modulation", "1/T" "Modulation frequency", Class::Period;
+        eta: f64 = "", "2 pi Delta / (T V0), harmonic against uniform loading rate; 0 without modulation",
+            "η" "η = 2πΔ / (T V₀)", Class::Period;
     }
 }
 

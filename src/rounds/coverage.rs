@@ -240,11 +240,8 @@ struct Repetition {
 
 impl Repetition {
     fn of(row: &SetRow, truth: &SetRow, statistic: Statistic) -> Option<Self> {
-        let [value, low, high] =
-            ["", "_low", "_high"].map(|end| row.number(&format!("{}{end}", statistic.key)));
-        let value = value?;
-        let low = low?;
-        let high = high?;
+        let (value, interval) = row.estimate(statistic.key)?;
+        let Interval { low, high } = interval?;
         let off = value - truth.number(statistic.key)?;
         let turns = if statistic.is_angle() {
             TAU * (off / TAU).round()

@@ -471,10 +471,7 @@ fn precision(keys: &[&str], target: Target) -> Precision {
 }
 
 fn row(mean: f64, half: f64) -> SetRow {
-    let interval = Some(Interval {
-        low: mean - half,
-        high: mean + half,
-    });
+    let interval = Some(Interval::around(mean, half));
     SetRow {
         tau_mean: Some(mean),
         tau_interval: interval,

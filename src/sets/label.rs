@@ -3,7 +3,8 @@
 
 use super::SetRow;
 use crate::model::Symbol;
-use crate::table::columns::{Row, Value};
+use crate::table::columns::{Class, Column, Row, Value};
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 /// Digits that distinguish all doubles.
@@ -22,75 +23,14 @@ pub struct Label {
     /// What it is, without its symbol, for the axis of a figure.
     pub what: String,
     /// Its SI unit; empty for a pure number or a word.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
 }
 
-/// What ends the names of columns of intervals and of a comparison.
-const COMPARED: [(&str, &str); 5] = [
-    ("_low", ", lower end"),
-    ("_high", ", upper end"),
-    ("_a", ", A"),
-    ("_b", ", B"),
-    ("_difference", ", B − A"),
-];
-
-/// The label of a column of the sets, or of a comparison of such; that of a formula has symbols in place of columns.
+/// The label of a column of the sets.
 pub fn label(column: &str) -> Label {
-    for (end, words) in COMPARED {
-        if let Some(column) = column.strip_suffix(end) {
-            let mut label = label(column);
-            label.symbol += words;
-            label.what += words;
-            return label;
-        }
-    }
-    let is_of_formula = |letter: char| !letter.is_alphanumeric() && letter != '_';
-    if column.contains(is_of_formula) {
-        let words = column.split_inclusive(is_of_formula).map(|part| {
-            let name = part.trim_end_matches(is_of_formula);
-            label(name).symbol + &part[name.len()..]
-        });
-        let symbol = words
-            .collect::<String>()
-            .replace('*', "·")
-            .replace("sqrt", "√");
-        return Label {
-            what: symbol.clone(),
-            symbol,
-            unit: "",
-        };
-    }
-    let plain = column.strip_suffix("_mean").unwrap_or(column);
-    let plain = plain.replace('_', " ");
-    let described = SetRow::columns()
-        .into_iter()
-        .find(|known| known.name == column);
-    let Some(described) = described else {
-        return Label {
-            what: capitalised(&plain),
-            symbol: plain,
-            unit: "",
-        };
-    };
-    let parameter = Symbol::from_key(column);
-    let meaning = match parameter {
-        Some(_) => first_clause(described.meaning),
-        None if described.meaning.len() <= LONGEST => described.meaning,
-        None => &plain,
-    };
-    Label {
-        what: if described.words.is_empty() {
-            capitalised(meaning)
-        } else {
-            described.words.to_owned()
-        },
-        symbol: match parameter {
-            Some(parameter) => symbol_of(parameter),
-            None if described.symbol.is_empty() => plain,
-            None => described.symbol.to_owned(),
-        },
-        unit: described.unit,
-    }
+    let columns = SetRow::columns();
+    let place = columns.iter().position(|known| known.name == column);
+    place.map_or_else(|| Label::new(column), |place| Label::of(&columns, place))
 }
 
 /// What a meaning says before it goes into details.
@@ -99,15 +39,80 @@ fn first_clause(meaning: &str) -> &str {
 }
 
 impl Label {
+    /// Of a pure number without a description.
+    pub fn new(symbol: &str) -> Self {
+        Self {
+            symbol: symbol.to_owned(),
+            what: capitalised(symbol),
+            unit: "".into(),
+        }
+    }
+
+    /// Of a column among those of its rows.
+    pub fn of(columns: &[Column], place: usize) -> Self {
+        let column = &columns[place];
+        if column.class == Class::Low {
+            return Self::of(columns, place - 1).with(", lower end");
+        }
+        if column.class == Class::High {
+            return Self::of(columns, place - 2).with(", upper end");
+        }
+        let plain = column.name.replace('_', " ");
+        let parameter = Symbol::from_key(&column.name);
+        let meaning = match parameter {
+            Some(_) => first_clause(column.meaning),
+            None if column.meaning.len() <= LONGEST => column.meaning,
+            None => &plain,
+        };
+        Self {
+            what: if column.words.is_empty() {
+                capitalised(meaning)
+            } else {
+                column.words.to_owned()
+            },
+            symbol: match parameter {
+                Some(parameter) => symbol_of(parameter),
+                None if column.symbol.is_empty() => plain,
+                None => column.symbol.to_owned(),
+            },
+            unit: column.unit.into(),
+        }
+    }
+
+    /// Of a formula in this unit: with symbols in place of its columns.
+    pub fn of_formula(text: &str, columns: &[Column], unit: String) -> Self {
+        let is_sign = |letter: char| !letter.is_alphanumeric() && letter != '_';
+        let symbols = text.split_inclusive(is_sign).map(|part| {
+            let name = part.trim_end_matches(is_sign);
+            let place = columns.iter().position(|known| known.name == name);
+            let symbol = place.map(|place| Self::of(columns, place).symbol);
+            symbol.unwrap_or_else(|| name.to_owned()) + &part[name.len()..]
+        });
+        let symbols: String = symbols.collect();
+        let symbol = symbols.replace('*', "·").replace("sqrt", "√");
+        Self {
+            what: symbol.clone(),
+            symbol,
+            unit: unit.into(),
+        }
+    }
+
+    /// With further words.
+    pub fn with(mut self, words: &str) -> Self {
+        self.symbol += words;
+        self.what += words;
+        self
+    }
+
     /// The factor to the unit in which values up to this are read best, and that unit: times and lengths below 1 in
     /// thousandths or millionths, all others in SI units.
-    pub fn scale(&self, largest: f64) -> (f64, &'static str) {
-        match self.unit {
-            "s" if largest < 1e-3 => (1e6, "µs"),
-            "s" if largest < 1.0 => (1e3, "ms"),
-            "m" if largest < 1e-3 => (1e6, "µm"),
-            "m" if largest < 1.0 => (1e3, "mm"),
-            unit => (1.0, unit),
+    pub fn scale(&self, largest: f64) -> (f64, Cow<'static, str>) {
+        match &*self.unit {
+            "s" if largest < 1e-3 => (1e6, "µs".into()),
+            "s" if largest < 1.0 => (1e3, "ms".into()),
+            "m" if largest < 1e-3 => (1e6, "µm".into()),
+            "m" if largest < 1.0 => (1e3, "mm".into()),
+            _ => (1.0, self.unit.clone()),
         }
     }
 
@@ -131,7 +136,7 @@ impl Label {
     /// The symbol and a value, in the unit in which it is read best.
     pub fn setting(&self, value: f64, digits: Digits) -> String {
         let (factor, unit) = match value {
-            0.0 => (1.0, ""),
+            0.0 => (1.0, "".into()),
             _ => self.scale(value.abs()),
         };
         let typeset = digits.typeset(factor * value);
@@ -296,16 +301,21 @@ mod tests {
 
     #[test]
     fn times_and_lengths_have_the_unit_that_suits_the_largest() {
-        let scaled = |column: &str, largest| label(column).scale(largest);
+        let scaled = |column: &str, largest| {
+            let (factor, unit) = label(column).scale(largest);
+            (factor, unit.into_owned())
+        };
         assert_eq!(
             (scaled("tau_mean", 0.1), scaled("tau_mean", 13.0)),
-            ((1e3, "ms"), (1.0, "s"))
+            ((1e3, "ms".into()), (1.0, "s".into()))
         );
         assert_eq!(
             (scaled("Delta", 1e-6), scaled("V0", 1e-6)),
-            ((1e6, "µm"), (1.0, "m/s"))
+            ((1e6, "µm".into()), (1.0, "m/s".into()))
         );
-        assert_eq!(label("tau_sd / (2 * tau_mean)").symbol, "σ(τ) / (2 · ⟨τ⟩)");
+        let formula =
+            Label::of_formula("tau_sd / (2 * tau_mean)", &SetRow::columns(), String::new());
+        assert_eq!(formula.symbol, "σ(τ) / (2 · ⟨τ⟩)");
         let settings = [
             ("Delta", 1e-6),
             ("Delta", 0.0),
@@ -360,7 +370,7 @@ mod tests {
 
     #[test]
     fn axes_have_words_a_symbol_and_a_unit_each_once() {
-        let axis = |column: &str, largest| label(column).axis(label(column).scale(largest).1);
+        let axis = |column: &str, largest| label(column).axis(&label(column).scale(largest).1);
         let found = [
             ("tau_mean", 0.1),
             ("Delta", 1e-6),

@@ -263,7 +263,7 @@ fn without_controls(rounds: &Rounds, file: &Section<'_>) -> Result<(), Refused> 
         Goal::Edges(_) => "refine",
     };
     let mut statistics = rounds.statistics().iter();
-    match statistics.find(|statistic| statistic.needs_control()) {
+    match statistics.find(|statistic| statistic.needs_control) {
         None => Ok(()),
         Some(Statistic { key, .. }) => {
             let problem =

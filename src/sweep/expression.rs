@@ -13,6 +13,8 @@
 //! Names of the conditions of a sweep are the keys of the parameters, `eta` and `frequency`, in SI. Read by operator
 //! precedence (V. R. Pratt, POPL 1973).
 
+use std::array;
+
 /// Most words and signs of a condition: it is read and evaluated by recursion.
 const MAX_WORDS: usize = 500;
 
@@ -124,6 +126,30 @@ impl<N> Expression<N> {
             Self::Combined(combined) => {
                 let (left, operator, right) = &**combined;
                 (operator.combine)(left.evaluate(value), right.evaluate(value))
+            }
+        }
+    }
+
+    /// The exponents of the base units of the number, with these of the names; `None` if it adds unlike units.
+    pub fn exponents<const UNITS: usize>(
+        &self,
+        of: &dyn Fn(&N) -> Option<[f64; UNITS]>,
+    ) -> Option<[f64; UNITS]> {
+        match self {
+            Self::Constant(_) => Some([0.0; UNITS]),
+            Self::Name(name) => of(name),
+            Self::Negative(number) => number.exponents(of),
+            Self::Root(number) => Some(number.exponents(of)?.map(|exponent| 0.5 * exponent)),
+            Self::Combined(combined) => {
+                let (left, operator, right) = &**combined;
+                let left = left.exponents(of)?;
+                let right = right.exponents(of)?;
+                let product = |sign: f64| array::from_fn(|unit| left[unit] + sign * right[unit]);
+                match operator.sign {
+                    "*" => Some(product(1.0)),
+                    "/" => Some(product(-1.0)),
+                    _ => (left == right).then_some(left),
+                }
             }
         }
     }

@@ -205,7 +205,7 @@ fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<Refinement, Refus
         });
     }
     let problem = "crosses no threshold; allowed are periods, ";
-    let by = read_statistics(entry, Statistic::can_cross, problem)?;
+    let by = read_statistics(entry, |known| known.can_cross, problem)?;
     if let Some(value) = section.entry("value") {
         return Err(value.refuse("belongs to by = \"periods\"; remove it"));
     }

@@ -104,22 +104,21 @@ fn each_slip_is_a_dot_with_the_unit_of_its_column_or_formula() {
     let slips = folder.table("r", "slips").reals("drop").len();
     // The legend has dots, too.
     assert!(plain.matches("<circle").count() >= slips);
-    for text in ["Interval (ms)", "Drop (N)", &format!("{slips} slips")] {
+    for text in [
+        "Interval τ (ms)",
+        "Stress drop ΔF (N)",
+        &format!("{slips} slips"),
+    ] {
         assert!(plain.contains(text), "{text}");
     }
     let chosen = svg("--x V0*interval --y sqrt(drop/peak_force) --where slip==2 --panels Delta");
-    for text in [
-        "V₀·interval (µm)",
-        ">√(drop/peak force)<",
-        ">(b)<",
-        "slip==2;",
-    ] {
+    for text in ["V₀·τ (µm)", ">√(ΔF/F)<", ">(b)<", "slip==2;"] {
         assert!(chosen.contains(text), "{text}");
     }
     // Against what was swept, the means of slips have intervals.
     folder.ends(0, "plot r --x V0 --y precursors -o own.svg");
     let means = fs::read_to_string(folder.path("own.svg")).unwrap();
-    assert!(means.contains(">Precursors<") && means.contains("bars: 95 %"));
+    assert!(means.contains(">Precursors before the slip<") && means.contains("bars: 95 %"));
     let shown = folder
         .ends(0, "show r --columns next_interval,drop/peak_force")
         .stdout;

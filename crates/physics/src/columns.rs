@@ -15,12 +15,53 @@
 //!
 //! From this follow the struct and its documentation, the columns with their types, a writer and a reader. `name as
 //! "key"` is for a field whose name differs from that of its column. After the meaning may stand the symbol of a
-//! quantity in figures, and a few words for its axis. A field without unit and meaning holds the columns of another row
-//! type, or is a projection: it reads a column that another row type describes. Rows side by side are tuples. Nothing
-//! here knows Arrow, files or JSON, and no derive of theirs has a place for units and meanings.
+//! quantity in figures, a few words for its axis, and its [`Class`]. A field without unit and meaning holds the columns
+//! of another row type, or is a projection: it reads a column that another row type describes. Rows side by side are
+//! tuples. Nothing here knows Arrow, files or JSON, and no derive of theirs has a place for units and meanings.
 
 pub use super::value::{Field, Kind, Value};
 use std::borrow::Cow;
+
+/// The unit of angles.
+pub const ANGLE: &str = "rad";
+
+/// What the values of a column are, for what chooses columns or shows them: nothing is inferred from a name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Class {
+    /// An id, or a number that is always known.
+    #[default]
+    Plain,
+    Parameter,
+    /// What stands for the period of the modulation: η or the frequency.
+    Period,
+    Mean,
+    Spread,
+    /// A number from 0 to 1.
+    Share,
+    /// A quantile, which jumps from value to value.
+    Quantile,
+    /// What goes with a mean: its lower bound, its bias, or the mean of the control.
+    Auxiliary,
+    /// A word, flag or count that distinguishes rows.
+    Category,
+    /// What the drive alone explains of the column of this name.
+    ByDrive(&'static str),
+    /// What the drive alone does not explain.
+    Excess,
+    /// The ends of the confidence interval of the column before.
+    Low,
+    High,
+}
+
+impl Class {
+    /// The column of which this is the part that the drive alone explains.
+    pub const fn explained(self) -> Option<&'static str> {
+        match self {
+            Self::ByDrive(of) => Some(of),
+            _ => None,
+        }
+    }
+}
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Column {
@@ -33,8 +74,24 @@ pub struct Column {
     pub symbol: &'static str,
     /// What it is, for the axis of a figure; empty if the meaning says it in a few words.
     pub words: &'static str,
+    pub class: Class,
     pub kind: Kind,
     pub nullable: bool,
+}
+
+impl Column {
+    pub fn is_angle(&self) -> bool {
+        self.unit == ANGLE
+    }
+
+    pub const fn is_end(&self) -> bool {
+        matches!(self.class, Class::Low | Class::High)
+    }
+}
+
+/// Whether the column at a place has an interval, whose ends are the next two.
+pub fn has_interval(columns: &[Column], place: usize) -> bool {
+    matches!(columns.get(place + 1), Some(next) if next.class == Class::Low)
 }
 
 /// A row, or a part of one: a single cell, or several that belong together.
@@ -128,16 +185,38 @@ pub struct Interval {
     pub high: f64,
 }
 
+impl Interval {
+    pub const fn around(middle: f64, half: f64) -> Self {
+        let [low, high] = [middle - half, middle + half];
+        Self { low, high }
+    }
+
+    /// That of the column at a place among the numbers of a row.
+    pub fn of(columns: &[Column], place: usize, numbers: &[Option<f64>]) -> Option<Self> {
+        if !has_interval(columns, place) {
+            return None;
+        }
+        Some(Self {
+            low: numbers[place + 1]?,
+            high: numbers[place + 2]?,
+        })
+    }
+}
+
 /// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
 impl Row for Option<Interval> {
     fn columns_as(described: Column) -> Vec<Column> {
-        let end = |end: &str, meaning| Column {
+        let end = |end: &str, class, meaning| Column {
             name: format!("{}_{end}", described.name).into(),
             meaning,
+            class,
             nullable: true,
             ..described.clone()
         };
-        vec![end("low", described.meaning), end("high", "upper end")]
+        vec![
+            end("low", Class::Low, described.meaning),
+            end("high", Class::High, "upper end"),
+        ]
     }
 
     fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
@@ -163,12 +242,14 @@ macro_rules! columns {
     (@name $field:ident $name:literal) => { $name };
     (@text) => { "" };
     (@text $text:tt) => { $text };
+    (@class) => { $crate::columns::Class::Plain };
+    (@class $class:expr) => { $class };
     (@in) => { "" };
     (@in "") => { "" };
     (@in $unit:tt) => { concat!(", in ", $unit) };
     ($(#[$attribute:meta])* $visibility:vis struct $row:ident {
         $($field:ident $(as $name:literal)? : $type:ty
-            $(= $unit:tt, $meaning:tt $(, $symbol:literal $($words:literal)?)?)?;)*
+            $(= $unit:tt, $meaning:tt $(, $symbol:literal $($words:literal)? $(, $class:expr)?)?)?;)*
     }) => {
         $(#[$attribute])*
         #[allow(rustdoc::invalid_html_tags, reason = "meanings are plain text")]
@@ -187,6 +268,7 @@ macro_rules! columns {
                     meaning: $crate::columns!(@text $($meaning)?),
                     symbol: $crate::columns!(@text $($($symbol)?)?),
                     words: $crate::columns!(@text $($($($words)?)?)?),
+                    class: $crate::columns!(@class $($($($class)?)?)?),
                     ..$crate::columns::Column::default()
                 })),*].concat()
             }

@@ -269,7 +269,7 @@ fn generated() -> Json {
     let is_real = |quantity: &Quantity| *quantity != Quantity::BREAK_ON && !quantity.is_count();
     let definitions = &mut schema["definitions"];
     definitions["estimate"]["enum"] = keys_of(|statistic| statistic.has_interval);
-    definitions["crossing"]["enum"] = keys_of(|statistic| statistic.can_cross());
+    definitions["crossing"]["enum"] = keys_of(|statistic| statistic.can_cross);
     definitions["refinable"]["enum"] = Quantity::all().filter(is_real).map(Quantity::key).collect();
     schema
 }

@@ -166,6 +166,7 @@ macro_rules! fields {
                             meaning: $meaning,
                             symbol: concat!($($symbol)?),
                             words: concat!($($($words)?)?),
+                            class: $crate::columns::Class::Parameter,
                             kind: <$type as $crate::value::Field>::KIND,
                             nullable: <$type as $crate::value::Field>::NULLABLE,
                         },
