@@ -15,7 +15,7 @@ use super::style::{
 use super::{BadOption, Beside};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, Values, is_same, swept};
+use crate::reduce::{SetRow, Values, is_same, resultant_at_random, swept};
 use crate::sets::parameter;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -32,6 +32,7 @@ const PANEL_HEIGHT: f64 = 220.0;
 const PANEL_GAP: f64 = 26.0;
 /// Between columns, for the labels of their axes.
 const LABEL_GAP: f64 = 16.0;
+const CURVE_POINTS: usize = 200;
 /// Lines between sets; more would be a net.
 const MAX_LINES: usize = 24;
 pub(super) const LINE_WIDTH: f64 = 1.0;
@@ -235,6 +236,11 @@ impl<'a> Chart<'a> {
         if y.name() == "slip_share" {
             layers.extend(Regime::MIN_SHARES.map(|share| Layer::Level(share, REFERENCE)));
         }
+        if self.is_against_eta(y) {
+            let places = dots.x_axis.evenly_placed(CURVE_POINTS).into_iter();
+            let curve = places.map(|eta| (eta, resultant_at_random(eta)));
+            layers.push(Layer::Curve(curve.collect(), REFERENCE));
+        }
         layers.extend(dots.free.iter().filter_map(level));
         for line in &dots.lines {
             let mut line = line.clone();
@@ -324,6 +330,11 @@ impl<'a> Chart<'a> {
         set.is_some_and(|set| set.regime == Some(Regime::Sliding))
     }
 
+    /// Whether the resultant at random loads is a curve, as it depends on η alone.
+    fn is_against_eta(&self, y: &Quantity<'_>) -> bool {
+        y.name() == "resultant_length" && self.x.name() == "eta"
+    }
+
     /// Amplitudes at which the paper finds a significant reduction of the friction to begin, on the x axis.
     fn reduction(&self, y: &Quantity<'_>) -> Option<Ends> {
         let is_fixed = |symbol| {
@@ -370,6 +381,9 @@ impl Chart<'_> {
             let [mixed, sliding] = Regime::MIN_SHARES;
             let text = format!("mixed above {mixed}, sliding above {sliding}");
             entries.push(entry(Mark::Line(REFERENCE), text));
+        }
+        if self.ys.iter().any(|y| self.is_against_eta(y)) {
+            entries.push(entry(Mark::Line(REFERENCE), "at random loads"));
         }
         let has_drive = |set: &&usize| self.ys.iter().any(|y| self.drive_at(y, **set).is_some());
         let explained = inside.iter().filter(has_drive);

@@ -50,7 +50,7 @@ use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
 
 /// Resultant of slips at random loads: of the density 1 - η sin φ, for η >= 1 from φ_min to Φ_max.
-fn resultant_at_random(eta: f64) -> f64 {
+pub(crate) fn resultant_at_random(eta: f64) -> f64 {
     let Some((low, high)) = minimum_phase(eta).zip(load_maximum_phase(eta)) else {
         return 0.5 * eta;
     };
