@@ -114,7 +114,9 @@ def share(flags: pandas.Series, units: pandas.Series | pandas.Index) -> Estimate
     # Wilson, J. Am. Stat. Assoc. 22, 209 (1927); Kish's effective number.
     middle = (value + t**2 / (2 * number)) / (1 + t**2 / number)
     half_width = t / (1 + t**2 / number) * (value * (1 - value) / number + (t / (2 * number)) ** 2) ** 0.5
-    return Estimate(value, max(middle - half_width, 0.0), min(middle + half_width, 1.0), rough.units)
+    low, high = max(middle - half_width, 0.0), min(middle + half_width, 1.0)
+    # Rounding must not leave 0 or 1 outside where none or all are seen.
+    return Estimate(value, min(low, value), max(high, value), rough.units)
 
 
 def difference(

@@ -391,7 +391,7 @@ fn table_of_pulses(results: &Results<'_>) -> Result<String> {
     if pulses.is_empty() {
         return Ok(String::new());
     }
-    let parameters = pulses.iter().map(|row| row.pulse().clone());
+    let parameters = pulses.iter().map(PulseRow::pulse);
     let mut columns = parameters_but(Symbol::PulseStart, parameters);
     columns.numbers("pulses", &pulses, |row| row.jobs.to_string());
     let mut add = |name: &str, of: fn(&PulseRow) -> (Option<f64>, Option<Interval>)| {

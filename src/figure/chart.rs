@@ -420,8 +420,7 @@ impl Chart<'_> {
         let pooled = all.iter().filter(is_pooled);
         let symbols: Vec<String> = pooled.map(|swept| swept.label.symbol.clone()).collect();
         let symbols = distinct(symbols.iter().map(String::as_str));
-        (!symbols.is_empty())
-            .then(|| format!("pooled: sets that differ in {}", symbols.join(", ")))
+        (!symbols.is_empty()).then(|| format!("pooled: sets that differ in {}", symbols.join(", ")))
     }
 
     /// What bars are, and what is not there.

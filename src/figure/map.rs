@@ -195,7 +195,10 @@ fn legend(is_locking: bool, sets: &[SetRow]) -> Vec<Entry> {
             opacity: 1.0,
         };
         return vec![
-            entry(Mark::Line(LINE), "η = 1; above, the load falls in each period"),
+            entry(
+                Mark::Line(LINE),
+                "η = 1; above, the load falls in each period",
+            ),
             entry(Mark::Patch(free), "no phase"),
         ];
     }

@@ -465,9 +465,10 @@ impl Estimate {
         let square = t * t / number;
         let middle = (share + 0.5 * square) / (1.0 + square);
         let half = t / (1.0 + square) * ((spread + 0.25 * square) / number).sqrt();
+        // Rounding must not leave 0 or 1 outside where none or all are seen.
         Some(Interval {
-            low: (middle - half).max(0.0),
-            high: (middle + half).min(1.0),
+            low: (middle - half).clamp(0.0, share),
+            high: (middle + half).clamp(share, 1.0),
         })
     }
 
@@ -613,6 +614,20 @@ pub(super) mod tests {
                 "{freedom}: {} for {expected}",
                 student_at(CONFIDENCE, freedom)
             );
+        }
+    }
+
+    #[test]
+    fn intervals_of_shares_hold_zero_and_one_where_none_and_all_are_seen() {
+        for (units, flag) in (2..200).flat_map(|units| [(units, 0.0), (units, 1.0)]) {
+            let flags = Units::of((0..units).map(|seed| (seed, vec![[1.0, flag, 0.0]; 8])));
+            let ends = flags
+                .estimate(mean)
+                .unwrap()
+                .share_interval(8.0 * units as f64)
+                .unwrap();
+            let held = if flag > 0.0 { ends.high } else { ends.low };
+            assert_eq!(held, flag, "{units} {ends:?}");
         }
     }
 

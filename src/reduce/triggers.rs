@@ -59,7 +59,8 @@ columns! {
 tables! { TriggerRow = "triggers", "One row per job with a pulse, if there are any"; }
 
 columns! {
-    /// Pulses that differ in their start and seed alone, and begin in the same part of the cycle.
+    /// Pulses that differ in their start and seed alone, and begin in the same part of the cycle. Parameters are those of
+    /// the first.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct PulseRow {
         parameters: Selected<AllButSeed>;
@@ -80,7 +81,7 @@ columns! {
 }
 
 tables! {
-    PulseRow = "pulses", "One row per pulse, and one per tenth of the cycle in which it begins; those up to 1e-12 m have none";
+    PulseRow = "pulses", "One row per pulse, and one per tenth of the cycle in which it begins; `pulse_start` is that of the first";
 }
 
 impl PulseRow {
@@ -89,8 +90,11 @@ impl PulseRow {
     }
 
     /// The parameters of the pulse, where it begins left out.
-    pub fn pulse(&self) -> &Parameters {
-        &self.parameters.parameters
+    pub fn pulse(&self) -> Parameters {
+        Parameters {
+            pulse_start: None,
+            ..self.parameters.parameters.clone()
+        }
     }
 }
 
@@ -278,6 +282,7 @@ impl<'a> Pulses<'a> {
 
     /// Their means; `None` if there are none. Pulses of a seed meet the same slip, so intervals need `MIN_SEEDS` of them.
     pub fn row(&self, [place_low, place_high]: [f64; 2]) -> Option<PulseRow> {
+        let first = self.rows.first()?;
         let count = self.rows.len() as f64;
         let seeds: BTreeSet<u64> = self.rows.iter().map(|row| row.parameters.seed).collect();
         let if_many = |interval: Option<Interval>| interval.filter(|_| seeds.len() >= MIN_SEEDS);
@@ -287,7 +292,7 @@ impl<'a> Pulses<'a> {
         let excess = triggered.excess.allowing_for(MAX_UNSEEN / count);
         let interval = |of: fn(&Means) -> &Estimate| if_many(of(advance.as_ref()?).interval());
         Some(PulseRow {
-            parameters: Selected::new(self.parameters.clone()),
+            parameters: Selected::new(first.parameters.with_seed(0)),
             place_low,
             place_high,
             jobs: self.rows.len() as u64,
