@@ -5,7 +5,8 @@ use crate::run::reduce_and_draw;
 use crate::watched::watched;
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use stickslip::measured::{Experiment, Given, Request, Sources};
+use stickslip::figure::draw_drop_size;
+use stickslip::measured::{Experiment, Given, NoPlateau, Request, Sources, TraceRequest};
 use stickslip::results::layout::Layout;
 use stickslip::run::{Options, Shard};
 use stickslip::sweep::Job;
@@ -21,10 +22,19 @@ pub fn measured(
     stream: &[u8],
     columns: Vec<KeyFromUnit>,
     set: Vec<KeyFromUnit>,
+    trace: Option<(String, usize)>,
     out: PathBuf,
 ) -> PyResult<Vec<(String, String)>> {
-    let experiment =
-        read(stream, &columns, &set).map_err(|error| Error::Sweep(format!("{error:#}")))?;
+    let trace = trace.map(|(drop_size, smooth)| TraceRequest::new(&drop_size, smooth));
+    let experiment = read(stream, &columns, &set, trace.transpose()).map_err(|error| {
+        let refused = error.downcast_ref::<NoPlateau>();
+        let figure =
+            refused.map(|refused| draw_drop_size(&Layout::new(&Disk, &out), &refused.sizes));
+        match figure.transpose() {
+            Ok(_) => Error::Sweep(format!("{error:#}")),
+            Err(failed) => failed.into(),
+        }
+    })?;
     let sweep = &experiment.sweep;
     watched(
         py,
@@ -42,6 +52,10 @@ pub fn measured(
                 let report = joined.run(&kernel, &mut |_| ())?;
                 if report.jobs_left == 0 && !report.stopped {
                     joined.reduce(|| reduce_and_draw(&layout, sweep.name()))?;
+                    let sizes = experiment.drop_sizes.as_ref();
+                    sizes
+                        .map(|sizes| draw_drop_size(&layout, sizes))
+                        .transpose()?;
                 }
                 Ok(())
             })
@@ -52,14 +66,21 @@ pub fn measured(
     Ok(experiment.read)
 }
 
-fn read(stream: &[u8], columns: &[KeyFromUnit], set: &[KeyFromUnit]) -> anyhow::Result<Experiment> {
+fn read(
+    stream: &[u8],
+    columns: &[KeyFromUnit],
+    set: &[KeyFromUnit],
+    trace: anyhow::Result<Option<TraceRequest>>,
+) -> anyhow::Result<Experiment> {
+    let trace = trace?;
     let given = |(key, from, unit): &KeyFromUnit| Given::new(key, from, unit.as_deref());
     let all =
         |given_all: &[KeyFromUnit]| given_all.iter().map(given).collect::<anyhow::Result<_>>();
     let request = Request {
-        sources: Sources::new(all(columns)?, all(set)?)?,
-        options: format!("columns={columns:?}, set={set:?}"),
+        sources: Sources::new(all(columns)?, all(set)?, trace.is_some())?,
+        options: format!("columns={columns:?}, set={set:?}, trace={trace:?}"),
+        trace,
         ..Request::default()
     };
-    Experiment::read_stream(stream, &request)
+    Experiment::read_stream(stream.to_vec(), &request)
 }

@@ -109,6 +109,7 @@ def measured(
     stream: bytes,
     columns: list[tuple[str, str, str | None]],
     set: list[tuple[str, str, str | None]],
+    trace: tuple[str, int] | None,
     out: str | PathLike[str],
 ) -> list[tuple[str, str]]: ...
 def sweep_of(directory: str | PathLike[str]) -> tuple[str, str]: ...

@@ -17,8 +17,10 @@ def measured(
     columns: Mapping[str, str | tuple[str, str]] | None = None,
     set: Mapping[str, float | str | tuple[float | str, str]] | None = None,
     maximum: float | tuple[float, str] | None = None,
+    drop_size: float | str | tuple[float, str] | None = None,
+    smooth: int = 1,
 ) -> Results:
-    """Reads measured slips into a results directory, as `stickslip measured` does; needs pyarrow.
+    """Reads measured slips, or those of a trace, into a results directory, as `stickslip measured` does; needs pyarrow.
 
     Prints what was read on standard error. The directory keeps the checksum of the rows, not the table.
 
@@ -27,7 +29,7 @@ def measured(
     Parameters
     ----------
     table
-        A row for each slip: of pandas, polars, DuckDB or pyarrow, or a dict of columns.
+        A row for each slip, or for each sample of a trace: of pandas, polars, DuckDB or pyarrow, or a dict of columns.
     out
         New results directory.
     columns
@@ -36,6 +38,10 @@ def measured(
         The value of a key in all rows, with its unit if that is not of SI.
     maximum
         A time at which the modulation has a maximum, in s, or with its unit; 0 by default.
+    drop_size
+        Rows are samples of a trace, and slips its falls by at least this much, in N or with its unit; or "auto".
+    smooth
+        Samples of a trace of which the mean is taken for one.
 
     Examples
     --------
@@ -50,7 +56,12 @@ def measured(
     if maximum is not None:
         settings["maximum"] = maximum
     path = arguments.path("out", out)
-    read = _stickslip.measured(_stream(table), _given("columns", columns or {}), _given("set", settings), path)
+    trace = None
+    if drop_size is not None:
+        size, *unit = drop_size if isinstance(drop_size, tuple) else (drop_size,)
+        trace = (":".join([str(size), *unit]), smooth)
+    given = (_given("columns", columns or {}), _given("set", settings))
+    read = _stickslip.measured(_stream(table), *given, trace, path)
     for key, words in read:
         print(f"{key:<10} {words}", file=sys.stderr)
     return Results(path)

@@ -3,10 +3,11 @@
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
-    Beside, CustomFigure, Dots, Drawn, Limits, Look, PictureFormat, Size, Style, draw_all,
-    draw_custom, remarks, write_custom,
+    Beside, CustomFigure, Dots, Drawn, Limits, Look, Picture, PictureFormat, Size, Style, draw_all,
+    draw_custom, measured_trace, remarks, write_custom,
 };
-use crate::reduce::{SetRow, SlipOfSet, renew};
+use crate::measured::stretch;
+use crate::reduce::{SetRow, SlipOfSet, read_sets, renew, sample_of_slips};
 use crate::results::Results;
 use crate::results::destination::Destination;
 use crate::results::layout::Layout;
@@ -52,6 +53,12 @@ pub struct Arguments {
     /// ends of their paths that differ]
     #[arg(long, value_name = "NAME", requires = "others")]
     legend: Vec<String>,
+    /// Draw the measured force itself from this time on, in s, with its slips
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["x", "others"])]
+    from: Option<f64>,
+    /// Draw it until this time, in s
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["x", "others"])]
+    until: Option<f64>,
     #[command(flatten)]
     custom: CustomFlags,
     /// File of the custom figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
@@ -74,6 +81,7 @@ Examples:
   stickslip plot results/sliding-velocity --x V0 --y tau_mean --log xy
   stickslip plot results/fig3 --x eta --y phase_mean --colour V0 --panels Delta --log x -o phase.pdf
   stickslip plot results/mine --with results/fig3                      measured slips beside the model
+  stickslip plot results/mine --from 12 --until 15                     a stretch of the trace that slips came from
   stickslip plot results/friction --x Delta --y mean_friction --colour T --xlim 0:4e-6 \\
     --size 86mmx60mm --style print --format pdf";
 
@@ -105,6 +113,12 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         .collect();
     let others = layouts.iter().map(|other| renew(&Results::read(other)?));
     let others = others.collect::<Result<Vec<Results<'_>>>>()?;
+    if arguments.from.or(arguments.until).is_some() {
+        let picture = trace(&results, arguments)?;
+        let files = write_custom(layout, picture, &look, &arguments.format)?;
+        output::lines(files.iter().map(|path| shown(path).to_string()))?;
+        return Ok(Exit::Done);
+    }
     let beside = Beside::read(&results, &others, &arguments.legend)?;
     if arguments.custom.of == Dots::Slips && !others.is_empty() {
         let problem = "--with: figures of slips show one directory; leave --of slips out";
@@ -135,6 +149,36 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     }
     output::lines(drawn.files.iter().map(|path| shown(path).to_string()))?;
     Ok(Exit::Done)
+}
+
+/// A stretch of the trace that slips came from.
+fn trace(results: &Results<'_>, arguments: &Arguments) -> Result<Picture> {
+    let sweep = results.sweep();
+    let measured = sweep.measured();
+    let measured = measured.ok_or_else(|| {
+        UsageError(
+            "--from, --until: slips were computed; `simulate --plot` draws their trace".into(),
+        )
+    })?;
+    let [from, until] = [
+        arguments.from.unwrap_or(0.0),
+        arguments.until.unwrap_or(f64::INFINITY),
+    ];
+    let refused = |error: anyhow::Error| UsageError(format!("{error:#}"));
+    let trace = stretch(measured, from..=until).map_err(refused)?;
+    let sets = read_sets(results.layout()).collect::<Result<Vec<_>, _>>()?;
+    let (slips, ..) = sample_of_slips(results, &sets, None)?;
+    let onsets: Vec<f64> = slips.iter().map(|slip| slip.1.1.onset).collect();
+    let mut parameters = sweep
+        .jobs_of_grid()
+        .next()
+        .map(|job| job.parameters)
+        .unwrap_or_default();
+    if measured.options.contains("maximum") {
+        // The modulation is drawn with a maximum at 0.
+        parameters.modulation_period = None;
+    }
+    Ok(measured_trace(&parameters, &trace, &onsets).map_err(refused)?)
 }
 
 /// Where a picture goes, and the format that the name ends in.

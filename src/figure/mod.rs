@@ -15,6 +15,7 @@ mod beside;
 mod chart;
 mod custom;
 mod drag;
+mod drop_size;
 mod edge_values;
 mod frame;
 mod histograms;
@@ -35,9 +36,10 @@ mod work_precision;
 
 pub use beside::Beside;
 pub use custom::{CustomFigure, Dots};
+pub use drop_size::draw_drop_size;
 pub use picture::{Picture, PictureFormat};
 pub use quantity::Limits;
-pub use simulation::simulation;
+pub use simulation::{measured_trace, simulation};
 pub use style::{INKS, Ink, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 

@@ -17,6 +17,7 @@ use anyhow::{Result, anyhow};
 use std::f64::consts::TAU;
 
 const NAME: &str = "simulation";
+const MEASURED: &str = "trace";
 /// Width of the panels without a map, and beside the colour bar of one.
 const WIDTHS: [f64; 2] = [658.0, 588.0];
 const MICROMETRES: f64 = 1e6;
@@ -61,12 +62,40 @@ pub fn simulation(
     onsets: [&[f64]; 2],
 ) -> Result<Picture> {
     let of_all = common(std::iter::once(parameters), &[]);
-    let look = &Look::default().with_note(&format!("{of_all}, seed {}", parameters.seed));
+    let look = Look::default().with_note(&format!("{of_all}, seed {}", parameters.seed));
+    draw(NAME, &look, parameters, trace, map, onsets)
+}
+
+/// Draws the measured force in N against time in s, under the modulation that is known, with the onsets of slips.
+pub fn measured_trace(
+    parameters: &Parameters,
+    trace: &[(f64, f64)],
+    onsets: &[f64],
+) -> Result<Picture> {
+    let look = Look::default();
+    draw(
+        MEASURED,
+        &look,
+        parameters,
+        Some(trace),
+        None,
+        [&[], onsets],
+    )
+}
+
+fn draw(
+    name: &'static str,
+    look: &Look,
+    parameters: &Parameters,
+    trace: Option<&[(f64, f64)]>,
+    map: Option<&[MapRow]>,
+    onsets: [&[f64]; 2],
+) -> Result<Picture> {
     let instants = trace.into_iter().flatten().map(|sample| sample.0);
     let instants = instants.chain(map.into_iter().flatten().map(|cell| cell.time));
     let (first, last) = bounds(instants)
         .filter(|(first, last)| last > first)
-        .ok_or_else(|| anyhow!("figure {NAME}: there are fewer than two instants to draw"))?;
+        .ok_or_else(|| anyhow!("figure {name}: there are fewer than two instants to draw"))?;
     let (factor, unit) = label("tau_mean").scale(last);
     let time = Axis::linear(&format!("Time t ({unit})"), factor * first, factor * last);
     // A ramped modulation is not drawn, nor one that is too fast.
@@ -76,10 +105,10 @@ pub fn simulation(
     let peaks = period.map(|period| time.multiples_of(factor * period, MAX_PEAKS));
     let mut legend = Vec::new();
     let mut marks = Vec::new();
-    for (onsets, (stroke, name)) in onsets.into_iter().zip(ONSETS) {
+    for (onsets, (stroke, word)) in onsets.into_iter().zip(ONSETS) {
         let shown = onsets.iter().filter(|onset| (first..=last).contains(onset));
         let shown: Vec<(f64, Stroke)> = shown.map(|onset| (factor * onset, stroke)).collect();
-        legend.extend((!shown.is_empty()).then(|| entry(Mark::Line(stroke), name)));
+        legend.extend((!shown.is_empty()).then(|| entry(Mark::Line(stroke), word)));
         marks.extend(shown);
     }
     let shared = Shared {
@@ -100,7 +129,7 @@ pub fn simulation(
     let contacts = map.map(|map| shared.contacts(map));
     let panels = [modulation, force, contacts].into_iter().flatten();
     let layout = Layout::column(shared.width);
-    Ok(panel::draw(NAME, look, layout, &legend, panels.collect()))
+    Ok(panel::draw(name, look, layout, &legend, panels.collect()))
 }
 
 impl Shared<'_> {

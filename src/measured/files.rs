@@ -1,4 +1,4 @@
-//! Tables of slips as files: Parquet, by its types, or CSV.
+//! Tables as files: Parquet, by its types, or CSV.
 //!
 //! Contract: a file is read as it is, or refused; each refusal of a row names its line. A library that panics on a
 //! damaged file makes an error. Memory: what a row holds beside its file is that of [`Rows`].
@@ -91,59 +91,101 @@ fn is_stream(path: &Path) -> bool {
     streams.iter().any(|stream| path.starts_with(stream))
 }
 
-/// Reads a table, and says how its file is known again, but for its name; a pipe, which is gone, has no checksum.
-pub fn read(path: &Path, sources: &Sources, decimal_comma: bool) -> Result<(Rows, SourceFile)> {
+/// A table that can be read more than once.
+#[derive(Debug)]
+pub enum Table {
+    File(File),
+    /// Of a pipe.
+    Bytes(Bytes),
+    /// In Arrow's own format, as a program that runs writes it: no file, which could be damaged.
+    Stream(Vec<u8>),
+}
+
+/// Rows of a table at which they are passed on.
+const PIECE: usize = 1 << 16;
+
+/// Opens a table, and says how its file is known again, but for its name; a pipe, which is gone, has no checksum.
+pub fn open(path: &Path) -> Result<(Table, SourceFile)> {
     if is_stream(path) {
         let mut bytes = Vec::new();
         File::open(path)?.read_to_end(&mut bytes)?;
-        let rows = read_table(Bytes::from(bytes), sources, decimal_comma)?;
-        return Ok((rows, SourceFile::default()));
+        return Ok((Table::Bytes(bytes.into()), SourceFile::default()));
     }
     let file = open_regular(path)?;
     let file = file.context("is no file; save the table to one, or give it through /dev/stdin")?;
     let known = identified(file.get_read(0)?)?;
-    Ok((read_table(file, sources, decimal_comma)?, known))
+    Ok((Table::File(file), known))
+}
+
+/// Takes rows and forgets them.
+pub type Take<'a> = &'a mut dyn FnMut(&mut Rows) -> Result<()>;
+
+impl Table {
+    /// Reads all rows.
+    pub fn rows(&self, sources: &Sources, decimal_comma: bool) -> Result<Rows> {
+        self.read(sources, decimal_comma, &mut |_| Ok(()))
+    }
+
+    /// Reads rows in pieces; returns what was not taken of them.
+    pub fn read(&self, sources: &Sources, decimal_comma: bool, take: Take<'_>) -> Result<Rows> {
+        let mut take_complete = |rows: &mut Rows| {
+            rows.finish()?;
+            take(rows)
+        };
+        let take = &mut take_complete;
+        let mut rows = match self {
+            Self::File(file) => read_table(file.try_clone()?, sources, decimal_comma, take)?,
+            Self::Bytes(bytes) => read_table(bytes.clone(), sources, decimal_comma, take)?,
+            Self::Stream(bytes) => read_stream(bytes, sources, take)?,
+        };
+        take(&mut rows)?;
+        Ok(rows)
+    }
 }
 
 fn read_table(
     table: impl ChunkReader + 'static,
     sources: &Sources,
     decimal_comma: bool,
+    take: Take<'_>,
 ) -> Result<Rows> {
     let mut begin = Vec::new();
     table.get_read(0)?.take(4).read_to_end(&mut begin)?;
-    let mut rows = if begin == b"PAR1" {
+    if begin == b"PAR1" {
         ensure!(
             !decimal_comma,
             "is Parquet, whose numbers have no decimal commas"
         );
-        let read = catch_unwind(AssertUnwindSafe(|| read_parquet(table, sources)));
-        read.unwrap_or_else(|_| bail!("is damaged: its reader broke off; write it again"))?
-    } else {
-        read_text(BufReader::new(table.get_read(0)?), sources, decimal_comma)?
-    };
-    rows.finish()?;
-    Ok(rows)
+        let read = catch_unwind(AssertUnwindSafe(|| read_parquet(table, sources, take)));
+        return read.unwrap_or_else(|_| bail!("is damaged: its reader broke off; write it again"));
+    }
+    let text = BufReader::new(table.get_read(0)?);
+    read_text(text, sources, decimal_comma, take)
 }
 
-fn read_parquet(table: impl ChunkReader + 'static, sources: &Sources) -> Result<Rows> {
+fn read_parquet(
+    table: impl ChunkReader + 'static,
+    sources: &Sources,
+    take: Take<'_>,
+) -> Result<Rows> {
     let builder = ParquetRecordBatchReaderBuilder::try_new(table)?;
     let mut rows = Rows::new(&names_of(builder.schema()), sources)?;
     let mask = ProjectionMask::roots(builder.parquet_schema(), rows.places());
-    for batch in builder.with_projection(mask).build()? {
+    let builder = builder.with_projection(mask).with_batch_size(PIECE);
+    for batch in builder.build()? {
         rows.push_batch(&batch?)?;
+        take(&mut rows)?;
     }
     Ok(rows)
 }
 
-/// Reads a stream of Arrow's own format, as a program that runs writes it: no file, which could be damaged.
-pub fn read_stream(bytes: &[u8], sources: &Sources) -> Result<Rows> {
+fn read_stream(bytes: &[u8], sources: &Sources, take: Take<'_>) -> Result<Rows> {
     let schema = StreamReader::try_new(bytes, None)?.schema();
     let mut rows = Rows::new(&names_of(&schema), sources)?;
     for batch in StreamReader::try_new(bytes, Some(rows.places()))? {
         rows.push_batch(&batch?)?;
+        take(&mut rows)?;
     }
-    rows.finish()?;
     Ok(rows)
 }
 
@@ -155,7 +197,12 @@ fn names_of(schema: &Schema) -> Vec<String> {
 const NOT_TEXT: &str = "is neither Parquet nor text in UTF-8; save it as one of them, or read it with pandas or SciPy in Python";
 
 /// Reads CSV: names stand in the first line that is not empty and no remark, and their separator is that of all.
-fn read_text(mut text: impl BufRead, sources: &Sources, decimal_comma: bool) -> Result<Rows> {
+fn read_text(
+    mut text: impl BufRead,
+    sources: &Sources,
+    decimal_comma: bool,
+    take: Take<'_>,
+) -> Result<Rows> {
     let mut remark = None;
     let mut line = String::new();
     let mut number = 0;
@@ -222,6 +269,9 @@ fn read_text(mut text: impl BufRead, sources: &Sources, decimal_comma: bool) -> 
         let text = |place: usize| &record[place];
         let added = rows.push_texts(end, text, |text| parse(text, decimal_comma));
         added.with_context(|| format!("line {end}"))?;
+        if rows.count.is_multiple_of(PIECE) {
+            take(&mut rows)?;
+        }
     }
     Ok(rows)
 }

@@ -5,9 +5,10 @@
 use crate::sweep::hint;
 use crate::table::value::words;
 use anyhow::{Context, Result, bail, ensure};
+use toml_edit::Array;
 
 words! {
-    /// What a table of slips can say.
+    /// What a table of slips, or of the samples of a trace, can say.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Key {
         Onset = "onset",
@@ -21,6 +22,9 @@ words! {
         Frequency = "frequency",
         Maximum = "maximum",
         End = "end",
+        Time = "time",
+        Force = "force",
+        Displacement = "displacement",
     }
 }
 
@@ -28,12 +32,12 @@ impl Key {
     /// Its SI unit; empty for a name.
     pub const fn unit(self) -> &'static str {
         match self {
-            Self::Onset | Self::T | Self::Maximum | Self::End => "s",
-            Self::Drop | Self::PeakForce => "N",
+            Self::Onset | Self::T | Self::Maximum | Self::End | Self::Time => "s",
+            Self::Drop | Self::PeakForce | Self::Force => "N",
             Self::Run => "",
             Self::V0 => "m/s",
             Self::Kd => "N/m",
-            Self::Delta => "m",
+            Self::Delta | Self::Displacement => "m",
             Self::Frequency => "Hz",
         }
     }
@@ -44,9 +48,24 @@ impl Key {
         matches!(self, V0 | Kd | Delta | T | Frequency)
     }
 
-    /// Whether each slip has one of its own; what others say was set, and written in a few digits.
-    pub const fn is_of_slip(self) -> bool {
-        matches!(self, Self::Onset | Self::Drop | Self::PeakForce)
+    /// Whether each slip or sample has one of its own; what others say was set, and written in a few digits.
+    pub const fn is_of_row(self) -> bool {
+        matches!(self, Self::Onset | Self::Drop | Self::PeakForce) || self.is_of_trace()
+    }
+
+    /// Whether it is one of samples.
+    pub const fn is_of_trace(self) -> bool {
+        matches!(self, Self::Time | Self::Force | Self::Displacement)
+    }
+
+    /// Whether a table can say it: of a trace, or of slips.
+    const fn is_of(self, is_trace: bool) -> bool {
+        let is_found = matches!(self, Self::Onset | Self::Drop | Self::PeakForce | Self::End);
+        if is_trace {
+            !is_found
+        } else {
+            !self.is_of_trace()
+        }
     }
 
     /// Whether it means nothing without modulation.
@@ -56,7 +75,7 @@ impl Key {
 }
 
 /// The unit of drops that are no force, such as those of a friction coefficient.
-const PURE: &str = "1";
+pub const PURE: &str = "1";
 
 /// What gives a key, as `KEY=FROM:UNIT` says: a column of this name, or this value.
 #[derive(Clone, Debug)]
@@ -71,15 +90,20 @@ pub struct Given {
 impl Given {
     /// In SI without a unit.
     pub fn new(word: &str, from: &str, unit: Option<&str>) -> Result<Self> {
+        ensure!(
+            word != "velocity",
+            "integrate it to a displacement, and add --column displacement=NAME:UNIT"
+        );
         let key = Key::from_word(word);
         let key = key.with_context(|| hint(word, &Key::ALL.map(Key::word)))?;
         ensure!(!from.is_empty(), "must be {word}=NAME or {word}=NAME:UNIT");
         let si = key.unit();
         let unit = unit.unwrap_or(si);
-        let is_pure = key == Key::Drop && unit == PURE;
+        let can_be_pure = matches!(key, Key::Drop | Key::Force);
+        let is_pure = can_be_pure && unit == PURE;
         let factor = if is_pure { Some(1.0) } else { factor(unit, si) };
         let factor = factor.with_context(|| {
-            let or_pure = if key == Key::Drop {
+            let or_pure = if can_be_pure {
                 ", or 1 if it is no force"
             } else {
                 ""
@@ -108,12 +132,12 @@ impl Given {
     }
 
     pub fn is_pure(&self) -> bool {
-        self.unit == PURE
+        self.unit == PURE || self.key == Key::Displacement
     }
 }
 
 /// The factor from a unit to that of SI.
-fn factor(unit: &str, si: &str) -> Option<f64> {
+pub fn factor(unit: &str, si: &str) -> Option<f64> {
     const PREFIXES: [&str; 9] = ["", "n", "u", "µ", "μ", "m", "c", "k", "M"];
     const FACTORS: [f64; 9] = [1.0, 1e-9, 1e-6, 1e-6, 1e-6, 1e-3, 1e-2, 1e3, 1e6];
     if let (Some((above, below)), Some((of, over))) = (unit.split_once('/'), si.split_once('/')) {
@@ -122,6 +146,7 @@ fn factor(unit: &str, si: &str) -> Option<f64> {
     let mut prefixes = PREFIXES.iter();
     let place = prefixes.position(|prefix| unit.strip_prefix(prefix) == Some(si));
     match (unit, si) {
+        (PURE, PURE) => Some(1.0),
         ("min", "s") => Some(60.0),
         ("h", "s") => Some(3600.0),
         _ => place.map(|place| FACTORS[place]),
@@ -135,16 +160,71 @@ pub struct Sources {
     columns: Vec<Given>,
     /// Values for all rows.
     pub settings: Vec<Given>,
+    /// Whether rows are samples of a trace.
+    is_trace: bool,
 }
 
 impl Sources {
-    pub fn new(columns: Vec<Given>, settings: Vec<Given>) -> Result<Self> {
+    pub fn new(columns: Vec<Given>, settings: Vec<Given>, is_trace: bool) -> Result<Self> {
         for key in Key::ALL {
             let all = columns.iter().chain(&settings);
             let is_once = all.filter(|given| given.key == key).count() < 2;
             ensure!(is_once, "{} is given twice; keep one", key.word());
         }
-        Ok(Self { columns, settings })
+        let mut all = columns.iter().chain(&settings);
+        if let Some(other) = all.find(|given| !given.key.is_of(is_trace)) {
+            let word = other.key.word();
+            bail!(if is_trace {
+                format!(
+                    "{word} is of slips, which are found in a trace: leave it out, or --drop-size"
+                )
+            } else {
+                format!(
+                    "{word} is of a trace: say which falls are slips, as in --drop-size 30:mN, or auto"
+                )
+            });
+        }
+        let sources = Self {
+            columns,
+            settings,
+            is_trace,
+        };
+        ensure!(
+            !(sources.has(Key::Force) && sources.has(Key::Displacement)),
+            "force and displacement are given; keep one"
+        );
+        Ok(sources)
+    }
+
+    pub fn has(&self, key: Key) -> bool {
+        self.all().any(|given| given.key == key)
+    }
+
+    /// What `--column` and `--set` must say for them.
+    pub fn flags(&self) -> [Array; 2] {
+        let flag = |Given {
+                        key, from, unit, ..
+                    }: &Given| format!("{}={from}:{unit}", key.word());
+        [&self.columns, &self.settings].map(|all| all.iter().map(flag).collect())
+    }
+
+    /// The column of a key, by default the one of its name.
+    pub fn given(&self, key: Key) -> Result<Given> {
+        let asked = self.columns.iter().find(|column| column.key == key);
+        asked.map_or_else(
+            || Given::new(key.word(), key.word(), None),
+            |given| Ok(given.clone()),
+        )
+    }
+
+    /// What each row must say.
+    fn is_needed(&self, key: Key) -> bool {
+        match key {
+            Key::Onset => !self.is_trace,
+            Key::Time => self.is_trace,
+            Key::Force => self.is_trace && !self.has(Key::Displacement),
+            _ => false,
+        }
     }
 
     pub fn all(&self) -> impl Iterator<Item = &Given> {
@@ -154,11 +234,14 @@ impl Sources {
     /// The columns among these names that give a key, with their places.
     pub fn choose(&self, names: &[String]) -> Result<Vec<(Given, usize)>> {
         let mut chosen: Vec<(Given, usize)> = Vec::new();
-        for key in Key::ALL {
+        for key in Key::ALL.into_iter().filter(|key| key.is_of(self.is_trace)) {
             let word = key.word();
-            let asked = self.columns.iter().find(|column| column.key == key);
-            let given =
-                asked.map_or_else(|| Given::new(word, word, None), |given| Ok(given.clone()))?;
+            let is_asked = self.columns.iter().any(|column| column.key == key);
+            let given = self.given(key)?;
+            // Of force and displacement, what is given counts.
+            if key.is_of_trace() && !is_asked && !self.is_needed(key) {
+                continue;
+            }
             let name = given.from.clone();
             let mut found = (0..names.len()).filter(|&place| names[place] == name);
             let place = found.next();
@@ -169,7 +252,7 @@ impl Sources {
                 !is_set || place.is_none(),
                 "has a column {name} beside --set {word}; keep one"
             );
-            if place.is_none() && (asked.is_some() || key == Key::Onset && !is_set) {
+            if place.is_none() && (is_asked || self.is_needed(key) && !is_set) {
                 let known: Vec<&str> = names.iter().map(String::as_str).collect();
                 let hint = hint(&name, &known);
                 bail!("has no column {name}; {hint}, in --column {word}=NAME:UNIT");
@@ -190,7 +273,11 @@ impl Sources {
         {
             let (word, unit) = without_unit(name);
             let is_meant = |key: &Key| {
-                key.word().eq_ignore_ascii_case(word) && self.all().all(|given| given.key != *key)
+                let can_be =
+                    key.is_of(self.is_trace) && (!key.is_of_trace() || self.is_needed(*key));
+                can_be
+                    && key.word().eq_ignore_ascii_case(word)
+                    && self.all().all(|given| given.key != *key)
             };
             if let Some(key) = Key::ALL.into_iter().find(is_meant) {
                 let key = key.word();
@@ -263,7 +350,7 @@ mod tests {
             let texts: Vec<String> = texts.iter().map(|text| (*text).to_owned()).collect();
             Given::parse_all("--set", &texts).unwrap()
         };
-        let sources = Sources::new(Vec::new(), set(&["V0=1e-4", "Delta=0"])).unwrap();
+        let sources = Sources::new(Vec::new(), set(&["V0=1e-4", "Delta=0"]), false).unwrap();
         for (column, flag) in [
             ("Drop", "'drop=Drop'"),
             ("drop [mN]", "'drop=drop [mN]:mN'"),
@@ -279,7 +366,7 @@ mod tests {
         let chosen = sources.choose(&names("onset,v0,delta (um),shear"));
         assert_eq!(chosen.unwrap().len(), 1);
         let column = Given::new("onset", "t", Some("ms")).unwrap();
-        let sources = Sources::new(vec![column], set(&["V0=1e-4", "Delta=0"])).unwrap();
+        let sources = Sources::new(vec![column], set(&["V0=1e-4", "Delta=0"]), false).unwrap();
         assert_eq!(sources.choose(&names("t,x")).unwrap().len(), 1);
     }
 }

@@ -2,9 +2,10 @@
 //!
 //! ```text
 //! tables -> rows -> series -> a sweep with a job for each, and their slips
+//! traces -> rows
 //! ```
 //!
-//! `keys.rs`: what gives a key; `files.rs`: Parquet and CSV; `rows.rs`: typed columns; `series.rs`: stretches of rows
+//! `keys.rs`: what gives a key; `files.rs`: Parquet and CSV; `rows.rs`: typed columns; `trace.rs`: rows of the slips in a trace; `series.rs`: stretches of rows
 //! of one run and with the same parameters, whose numbers are seeds. Contract: the statistics of measured slips are
 //! those of the model's, by the same code. Nothing is guessed: what is not understood is refused with its place. Ids
 //! follow from what was read, not from where it lay.
@@ -13,9 +14,11 @@ mod files;
 mod keys;
 mod rows;
 mod series;
+mod trace;
 
 pub use files::{Compared, compare_files};
 pub use keys::{Given, Sources};
+pub use trace::{DropSizes, NoPlateau, TraceRequest, stretch};
 
 use crate::model::Symbol;
 use crate::model::theory::to_twelve_digits;
@@ -26,6 +29,7 @@ use crate::table::checksum::hexadecimal;
 use crate::table::shown::shown;
 use crate::table::value::Shortest;
 use anyhow::{Context, Result, bail};
+use files::Table;
 use keys::Key;
 use rows::Rows;
 use series::{PARAMETERS, Series, series_of};
@@ -49,6 +53,8 @@ pub struct Request {
     pub decimal_comma: bool,
     /// The flags that say so, as a shell takes them.
     pub options: String,
+    /// How slips are found, if rows are samples.
+    pub trace: Option<TraceRequest>,
 }
 
 /// A sweep with a job for each series, and their rows.
@@ -59,6 +65,8 @@ pub struct Experiment {
     series: Vec<Series>,
     /// What was read, each with its heading.
     pub read: Vec<(String, String)>,
+    /// Of a trace.
+    pub drop_sizes: Option<DropSizes>,
 }
 
 /// Numbers of slips, each list empty if no table has them, NaN where one is missing.
@@ -104,26 +112,48 @@ impl SlipColumns {
 }
 
 impl Experiment {
-    /// Reads files. An error names the file, and the line if it is about one.
+    /// Reads files. An error names the file, and the line if it is about one; [`NoPlateau`] is one of a trace.
     pub fn read(paths: &[PathBuf], request: &Request) -> Result<Self> {
-        let mut reading = Reading::default();
         let mut files = Vec::new();
+        let mut tables = Vec::new();
         for path in paths {
             let name = shown(path).to_string();
-            let of_file = || name.clone();
-            let read = files::read(path, &request.sources, request.decimal_comma);
-            let (rows, file) = read.with_context(of_file)?;
-            reading.add(&name, rows).with_context(of_file)?;
+            let (table, file) = files::open(path).with_context(|| name.clone())?;
+            tables.push((name.clone(), table));
             files.push(SourceFile { name, ..file });
         }
-        reading.finish(&files, &sweep_name(&paths[0]), request)
+        Self::of_tables(&tables, &files, &sweep_name(&paths[0]), request)
     }
 
     /// Reads a table that a program has at hand, as a stream in Arrow's own format.
-    pub fn read_stream(stream: &[u8], request: &Request) -> Result<Self> {
+    pub fn read_stream(stream: Vec<u8>, request: &Request) -> Result<Self> {
+        let table = ("table".to_owned(), Table::Stream(stream));
+        Self::of_tables(&[table], &[], "measured", request)
+    }
+
+    fn of_tables(
+        tables: &[(String, Table)],
+        files: &[SourceFile],
+        name: &str,
+        request: &Request,
+    ) -> Result<Self> {
         let mut reading = Reading::default();
-        reading.add("table", files::read_stream(stream, &request.sources)?)?;
-        reading.finish(&[], "measured", request)
+        if let Some(trace) = &request.trace {
+            let traced = trace::find(tables, request, trace)?;
+            reading.columns = traced.columns;
+            reading.found = traced.found;
+            reading.drop_sizes = Some(traced.sizes);
+            for ((name, _), rows) in tables.iter().zip(traced.rows) {
+                reading.add(name, rows).with_context(|| name.clone())?;
+            }
+        } else {
+            for (name, table) in tables {
+                let rows = table.rows(&request.sources, request.decimal_comma);
+                let added = rows.and_then(|rows| reading.add(name, rows));
+                added.with_context(|| name.clone())?;
+            }
+        }
+        reading.finish(files, name, request)
     }
 
     /// What was measured of a job.
@@ -136,7 +166,7 @@ impl Experiment {
                 slips: Arc::clone(&self.slips),
                 rows: series.rows.clone(),
                 modulation: Modulation {
-                    period: parameters.modulation_period,
+                    period: parameters.modulation_period.filter(|_| series.has_phases()),
                     amplitude: parameters.modulation_amplitude,
                 },
                 eta: parameters.eta(),
@@ -196,6 +226,9 @@ struct Reading {
     /// The column of each key, and the range of its numbers.
     columns: Vec<(Given, [f64; 2])>,
     unused: Vec<String>,
+    /// Of a trace, as of [`Experiment`].
+    found: Vec<(String, String)>,
+    drop_sizes: Option<DropSizes>,
 }
 
 impl Reading {
@@ -227,7 +260,7 @@ impl Reading {
         }
     }
 
-    fn finish(self, files: &[SourceFile], name: &str, request: &Request) -> Result<Experiment> {
+    fn finish(mut self, files: &[SourceFile], name: &str, request: &Request) -> Result<Experiment> {
         self.refuse_twins()?;
         let names: Array = files.iter().map(|file| &*file.name).collect();
         let lengths: Array = files.iter().map(|file| file.bytes.cast_signed()).collect();
@@ -235,13 +268,19 @@ impl Reading {
         let begins: Array = self.series.iter().map(|series| &*series.place).collect();
         let options = Toml::from(&*request.options);
         let rows = self.checksum();
-        let rest = self.rest_of_sweep(&request.sources)?;
+        let mut rest = self.rest_of_sweep(&request.sources)?;
+        if request.trace.is_some() && self.series.len() == 1 {
+            let [columns, settings] = request.sources.flags();
+            rest = format!("trace_columns = {columns}\ntrace_set = {settings}\n{rest}");
+        }
         let text = format!(
             "name = \"{name}\"\n[measured]\nfiles = {names}\nbytes = {lengths}\nsha256 = {checksums}\n\
              rows = \"{rows}\"\noptions = {options}\nseries = {begins}\n{rest}"
         );
         let sweep = Sweep::parse_made(&text, "tables")?;
+        let drop_sizes = self.drop_sizes.take();
         Ok(Experiment {
+            drop_sizes,
             read: self.in_words(&sweep, &request.sources),
             sweep,
             slips: Arc::new(self.slips),
@@ -361,7 +400,21 @@ impl Reading {
         let mut words: Vec<_> = columns
             .chain(sources.settings.iter().map(setting))
             .collect();
+        words.extend_from_slice(&self.found);
         let mut add = |head: &str, text: String| words.push((head.to_owned(), text));
+        let uncertainties = self.series.iter().filter_map(|series| series.uncertainty);
+        if let Some(most) = uncertainties.max_by(f64::total_cmp) {
+            let count = self.series.iter().filter(|series| !series.has_phases());
+            let lost = match count.count() {
+                0 => String::new(),
+                count => format!("; more than T/10 in {count} series, whose R and excess are null"),
+            };
+            let most = Shortest(to_twelve_digits(most));
+            add(
+                "onsets",
+                format!("known to {most} s, the largest median of a series{lost}"),
+            );
+        }
         if !self.unused.is_empty() {
             add("not used", self.unused.join(", "));
         }

@@ -1,6 +1,7 @@
-//! Rows of slips, column by column in SI: the same of CSV and of Arrow's columns, by their types.
+//! Rows of slips or samples, column by column in SI: the same of CSV and of Arrow's columns, by their types.
 
-use super::keys::{Given, Key, Sources};
+use super::keys::{Given, Key, PURE, Sources};
+use crate::observe::SampledSlip;
 use anyhow::{Context, Result, bail, ensure};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
@@ -27,6 +28,21 @@ pub struct Rows {
     /// The line of each row of a text, counted from 1.
     lines: Vec<u64>,
     pub count: usize,
+    /// Rows that were there and are forgotten.
+    earlier: usize,
+    /// Of the onsets that were found in a trace, in s; else empty.
+    pub uncertainties: Vec<f64>,
+}
+
+/// The slips of a run of samples.
+#[derive(Debug)]
+pub struct RunOfSlips {
+    pub name: Option<String>,
+    /// Of all columns of the samples.
+    pub values: Vec<f64>,
+    /// When the record ended, in s.
+    pub end: f64,
+    pub slips: Vec<SampledSlip>,
 }
 
 /// A key of all rows.
@@ -60,7 +76,91 @@ impl Rows {
             run_names: HashMap::new(),
             lines: Vec::new(),
             count: 0,
+            earlier: 0,
+            uncertainties: Vec::new(),
         })
+    }
+
+    /// Forgets its rows, so that others can follow.
+    pub fn clear(&mut self) {
+        let columns = self.columns.iter_mut();
+        columns.for_each(|column| column.numbers.clear());
+        self.runs.clear();
+        self.lines.clear();
+        self.earlier += self.count;
+        self.count = 0;
+    }
+
+    /// The slips of runs of these samples, which are forgotten: with drops in N, or in what the samples have.
+    pub fn with_slips(
+        mut self,
+        runs: impl Iterator<Item = RunOfSlips>,
+        is_force: bool,
+    ) -> Result<Self> {
+        self.clear();
+        self.earlier = 0;
+        let unit = if is_force { Key::Drop.unit() } else { PURE };
+        let mut found = Vec::new();
+        for (key, unit) in [
+            (Key::Onset, None),
+            (Key::End, None),
+            (Key::Drop, Some(unit)),
+            (Key::PeakForce, None),
+        ] {
+            found.push(KeyColumn {
+                given: Given::new(key.word(), key.word(), unit)?,
+                place: None,
+                numbers: Vec::new(),
+            });
+        }
+        for run in runs {
+            for slip in run.slips {
+                let peak_force = if is_force { slip.peak_force } else { f64::NAN };
+                let numbers = [slip.onset, run.end, slip.drop, peak_force];
+                let all = found.iter_mut().zip(numbers);
+                let others = self.columns.iter_mut().zip(run.values.iter().copied());
+                for (column, number) in all.chain(others) {
+                    column.numbers.push(number);
+                }
+                run.name.iter().for_each(|name| self.push_run(name));
+                self.uncertainties.push(slip.uncertainty);
+                self.count += 1;
+            }
+        }
+        self.columns
+            .retain(|column| !column.given.key.is_of_trace());
+        let is_run = |column: &&mut KeyColumn| column.given.key == Key::Run;
+        self.columns
+            .iter_mut()
+            .filter(is_run)
+            .for_each(|column| column.numbers.clear());
+        self.columns.extend(found);
+        Ok(self)
+    }
+
+    /// What a row says of its run in each column, NaN in others.
+    pub fn values(&self, row: usize) -> Vec<f64> {
+        let number = |column: &KeyColumn| {
+            let number = column.numbers.get(row).copied();
+            number
+                .filter(|_| !column.given.key.is_of_row())
+                .unwrap_or(f64::NAN)
+        };
+        self.columns.iter().map(number).collect()
+    }
+
+    /// Whether a row is of the run of that above it, with the same parameters.
+    pub fn is_as_above(&self, row: usize) -> bool {
+        let is_same =
+            |column: &KeyColumn| column.numbers[row].to_bits() == column.numbers[row - 1].to_bits();
+        let can_vary =
+            |column: &&KeyColumn| column.place.is_some() && column.given.key.is_parameter();
+        self.run(row) == self.run(row - 1) && self.columns.iter().filter(can_vary).all(is_same)
+    }
+
+    pub fn run_name(&self, row: usize) -> Option<String> {
+        self.has_runs()
+            .then(|| self.name_of(self.run(row)).to_owned())
     }
 
     /// Places of the columns that are read, in order.
@@ -98,7 +198,12 @@ impl Rows {
     /// Where a row stands, as messages say it.
     pub fn place(&self, row: usize) -> String {
         let line = self.lines.get(row);
-        line.map_or_else(|| format!("row {}", row + 1), |line| format!("line {line}"))
+        let row = self.earlier + row + 1;
+        if self.uncertainties.is_empty() {
+            line.map_or_else(|| format!("row {row}"), |line| format!("line {line}"))
+        } else {
+            format!("slip {row}")
+        }
     }
 
     fn push_run(&mut self, name: &str) {
@@ -165,7 +270,7 @@ impl Rows {
             );
             let found = reals(array, given.key).with_context(in_column)?;
             if let Some(row) = found.iter().position(|number| number.is_infinite()) {
-                let row = self.count + row + 1;
+                let row = self.earlier + self.count + row + 1;
                 bail!("row {row}: column {name}: must be finite");
             }
             numbers.extend(found.into_iter().map(|number| number * given.factor));
@@ -179,7 +284,11 @@ impl Rows {
 
     /// All rows are there: values for all of them become columns.
     pub fn finish(&mut self) -> Result<()> {
-        ensure!(self.count > 0, "has no slips below its names of columns");
+        let rows = self.earlier + self.count;
+        ensure!(
+            rows > 0,
+            "has no slips or samples below its names of columns"
+        );
         for KeyColumn {
             given,
             place,
@@ -206,7 +315,7 @@ pub fn is_missing(text: &str) -> bool {
 
 /// The numbers of an array, NaN where one is missing; durations in s.
 fn reals(array: &dyn Array, key: Key) -> Result<Vec<f64>> {
-    let was_set = !key.is_of_slip();
+    let was_set = !key.is_of_row();
     Ok(match array.data_type() {
         DataType::Int8 => converted::<Int8Type>(array, f64::from),
         DataType::Int16 => converted::<Int16Type>(array, f64::from),
@@ -252,7 +361,11 @@ fn converted<T: ArrowPrimitiveType>(
     array: &dyn Array,
     real: impl Fn(T::Native) -> f64,
 ) -> Vec<f64> {
-    let values = array.as_primitive::<T>().iter();
+    let array = array.as_primitive::<T>();
+    if array.null_count() == 0 {
+        return array.values().iter().copied().map(real).collect();
+    }
+    let values = array.iter();
     values.map(|value| value.map_or(f64::NAN, &real)).collect()
 }
 

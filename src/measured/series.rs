@@ -12,6 +12,9 @@ use std::ops::Range;
 const MIN_SAMPLES: usize = 100;
 const EQUAL: f64 = 1e-6;
 
+/// Largest uncertainty of onsets that have phases, by the period.
+pub const MAX_UNCERTAINTY: f64 = 0.1;
+
 /// Parameters that an experiment can know.
 pub const PARAMETERS: [Symbol; 4] = [Symbol::V0, Symbol::Kd, Symbol::Delta, Symbol::T];
 
@@ -22,6 +25,8 @@ pub struct Series {
     pub parameters: [Option<f64>; 4],
     /// When its record ended, in s.
     pub end: Option<f64>,
+    /// Median uncertainty of the onsets in s, if they were found in a trace.
+    pub uncertainty: Option<f64>,
     /// Where it begins, in words.
     pub place: String,
 }
@@ -30,6 +35,12 @@ impl Series {
     /// Of its modulation, in s.
     pub const fn period(&self) -> Option<f64> {
         self.parameters[3]
+    }
+
+    /// Whether onsets are known well enough for phases.
+    pub fn has_phases(&self) -> bool {
+        let both = self.uncertainty.zip(self.period());
+        both.is_none_or(|(uncertainty, period)| uncertainty <= MAX_UNCERTAINTY * period)
     }
 
     fn mean_interval(&self, onsets: &[f64]) -> f64 {
@@ -56,7 +67,8 @@ impl Series {
         let off = (periods - periods.round()).abs();
         ensure!(
             periods.round() >= 1.0 && off < EQUAL * periods,
-            "{count} rows at equal distances of {mean} s are samples of a trace; a table of slips has a row for each slip"
+            "{count} rows at equal distances of {mean} s are samples of a trace; a table of slips has a row for each slip. \
+             For a trace write --column time=NAME:UNIT --column force=NAME:UNIT --drop-size auto"
         );
         Ok(())
     }
@@ -69,10 +81,9 @@ pub fn series_of(rows: &Rows) -> Result<Vec<Series>> {
     let mut all: Vec<Series> = Vec::new();
     let mut seen = HashSet::new();
     for row in 0..rows.count {
-        let run = rows.run(row);
         let in_row = || rows.place(row);
-        let is_as_above = row > 0 && run == rows.run(row - 1) && has_parameters_above(rows, row);
-        if !is_as_above {
+        if row == 0 || !rows.is_as_above(row) {
+            let run = rows.run(row);
             let parameters = parameters(rows, row).with_context(in_row)?;
             let is_of_last =
                 |last: &Series| rows.run(last.rows.start) == run && last.parameters == parameters;
@@ -89,6 +100,7 @@ pub fn series_of(rows: &Rows) -> Result<Vec<Series>> {
                     rows: row..row,
                     parameters,
                     end: ends.map(|ends| ends[row]),
+                    uncertainty: None,
                     place: rows.place(row),
                 });
             }
@@ -101,24 +113,21 @@ pub fn series_of(rows: &Rows) -> Result<Vec<Series>> {
             series.rows.end = row + 1;
         }
     }
-    for series in &all {
+    for series in &mut all {
+        if let Some(uncertainties) = rows.uncertainties.get(series.rows.clone()) {
+            let mut sorted = uncertainties.to_vec();
+            sorted.sort_by(f64::total_cmp);
+            series.uncertainty = sorted.get(sorted.len() / 2).copied();
+            continue;
+        }
         let checked = series.refuse_samples(onsets);
         checked.with_context(|| series.place.clone())?;
     }
     Ok(all)
 }
 
-/// Whether a row says the same of parameters as that above it.
-fn has_parameters_above(rows: &Rows, row: usize) -> bool {
-    let mut columns = rows
-        .columns
-        .iter()
-        .filter(|column| column.given.key.is_parameter());
-    columns.all(|column| column.numbers[row].to_bits() == column.numbers[row - 1].to_bits())
-}
-
 /// The parameters of a row, in the order of [`PARAMETERS`].
-fn parameters(rows: &Rows, row: usize) -> Result<[Option<f64>; 4]> {
+pub fn parameters(rows: &Rows, row: usize) -> Result<[Option<f64>; 4]> {
     let raw = |key: Key| rows.of(key).map(|numbers| numbers[row]);
     let amplitude = raw(Key::Delta);
     let number = |key: Key| {

@@ -11,6 +11,8 @@ pub struct Measured {
     pub rows: String,
     /// The flags that read the files again.
     pub options: String,
+    /// Of a trace of forces with one run: `--column` and `--set`, each `KEY=FROM:UNIT`.
+    pub trace: Option<[Vec<String>; 2]>,
     /// Columns of slips that are known beside the onset.
     columns: Vec<String>,
     /// Those of them that have another unit than the model's, or none: `drop` alone can be one.
@@ -43,7 +45,16 @@ const KNOWN: &[&str] = &[
 impl Measured {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, Refused> {
         section.only(&[
-            "files", "bytes", "sha256", "rows", "options", "series", "columns", "pure",
+            "files",
+            "bytes",
+            "sha256",
+            "rows",
+            "options",
+            "series",
+            "columns",
+            "pure",
+            "trace_columns",
+            "trace_set",
         ])?;
         let required = |key| section.required(key, "`stickslip measured` writes this section");
         let text = |entry: &Entry<'_>| {
@@ -55,6 +66,9 @@ impl Measured {
             entry.list().ok_or_else(|| entry.must_be("a list"))
         };
         let texts = |key| all(list(key)?.iter().map(text));
+        let trace = section
+            .entry("trace_columns")
+            .map(|_| -> Result<_, Refused> { Ok([texts("trace_columns")?, texts("trace_set")?]) });
         // Where each series begins is for readers alone.
         texts("series")?;
         let names = texts("files")?;
@@ -75,6 +89,7 @@ impl Measured {
             files: files.map(file).collect(),
             rows: text(&required("rows")?)?,
             options: text(&required("options")?)?,
+            trace: trace.transpose()?,
             columns: texts("columns")?,
             pure: texts("pure")?,
         })

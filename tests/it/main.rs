@@ -29,4 +29,5 @@ mod runs;
 mod sharing;
 mod show;
 mod simulate;
+mod traces;
 mod unreadable;

@@ -1108,7 +1108,7 @@ fn no_cut_or_changed_file_makes_a_panic() {
     let parquet = fs::read(folder.path("slips.parquet")).unwrap();
     let given = |text: &str| Given::parse_all("--set", &[text.to_owned()]).unwrap();
     let request = Request {
-        sources: Sources::new(Vec::new(), given("Delta=0")).unwrap(),
+        sources: Sources::new(Vec::new(), given("Delta=0"), false).unwrap(),
         ..Request::default()
     };
     let text = lines("run,onset,drop,V0", |n| format!("\"a\",{n}.5,3e2,1e-4"));

@@ -24,10 +24,66 @@ columns! {
 
 /// The shear force, in N, and the displacement of the driven end, in m, at a time in s.
 #[derive(Clone, Copy, Debug, Default)]
-struct Instant {
-    time: f64,
-    force: f64,
-    driven: f64,
+pub struct Instant {
+    pub time: f64,
+    pub force: f64,
+    pub driven: f64,
+}
+
+/// A fall of the force from a largest value to a least one.
+#[derive(Clone, Copy, Debug)]
+pub struct Fall {
+    pub top: Instant,
+    pub bottom: Instant,
+}
+
+impl Fall {
+    /// How much deeper it is than what a drive of this stiffness, in N/m, takes away alone.
+    pub fn size(&self, stiffness: f64) -> f64 {
+        let by_drive = stiffness * (self.top.driven - self.bottom.driven).max(0.0);
+        self.top.force - self.bottom.force - by_drive
+    }
+}
+
+/// Follows a force from turning point to turning point. A rise by `least` ends a fall, and the reverse.
+#[derive(Clone, Debug)]
+pub struct Zigzag {
+    pub least: f64,
+    pub top: Instant,
+    /// The least force since, once it has fallen by `least`.
+    bottom: Option<Instant>,
+}
+
+impl Zigzag {
+    pub const fn new(least: f64, top: Instant) -> Self {
+        Self {
+            least,
+            top,
+            bottom: None,
+        }
+    }
+
+    /// The fall that ends now, as seen from a force that has not turned since the last instant.
+    pub fn follow(&mut self, now: Instant) -> Option<Fall> {
+        match &mut self.bottom {
+            None if now.force >= self.top.force => self.top = now,
+            None if now.force <= self.top.force - self.least => self.bottom = Some(now),
+            Some(bottom) if now.force <= bottom.force => *bottom = now,
+            Some(bottom) if now.force >= bottom.force + self.least => {
+                let ended = self.under_way();
+                (self.top, self.bottom) = (now, None);
+                return ended;
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// The fall that a rise has not ended yet.
+    pub fn under_way(&self) -> Option<Fall> {
+        let top = self.top;
+        self.bottom.map(|bottom| Fall { top, bottom })
+    }
 }
 
 /// A drop, from `start` to `end` in s, of a size in N.
@@ -42,10 +98,7 @@ struct Drop {
 #[derive(Clone, Debug)]
 pub(super) struct DropDetector {
     drive: Drive,
-    least: f64,
-    top: Instant,
-    /// The least force since, once it has fallen by the drop size.
-    bottom: Option<Instant>,
+    zigzag: Zigzag,
     drops: Vec<Drop>,
 }
 
@@ -54,18 +107,17 @@ impl DropDetector {
     pub(super) fn new(parameters: &Parameters, least: f64) -> Self {
         Self {
             drive: Drive::new(parameters),
-            least,
-            top: Instant::default(),
-            bottom: None,
+            zigzag: Zigzag::new(least, Instant::default()),
             drops: Vec::new(),
         }
     }
 
     pub(super) fn advance(&mut self, segment: &Segment<'_>) {
         let (low, high) = segment.bounds();
-        let changes_nothing = match self.bottom {
-            None => high <= self.top.force && low > self.top.force - self.least,
-            Some(bottom) => low >= bottom.force && high < bottom.force + self.least,
+        let Zigzag { least, top, bottom } = &self.zigzag;
+        let changes_nothing = match bottom {
+            None => high <= top.force && low > top.force - least,
+            Some(bottom) => low >= bottom.force && high < bottom.force + least,
         };
         if changes_nothing {
             return;
@@ -77,40 +129,30 @@ impl DropDetector {
     /// Follows a force that does not turn in between.
     fn follow(&mut self, time: f64, force: f64) {
         self.drive.advance_to(time);
-        let now = Instant {
+        let driven = self.drive.motion(time).0;
+        let ended = self.zigzag.follow(Instant {
             time,
             force,
-            driven: self.drive.motion(time).0,
-        };
-        match &mut self.bottom {
-            None if now.force >= self.top.force => self.top = now,
-            None if now.force <= self.top.force - self.least => self.bottom = Some(now),
-            Some(bottom) if now.force <= bottom.force => *bottom = now,
-            Some(bottom) if now.force >= bottom.force + self.least => {
-                let bottom = *bottom;
-                self.drops.extend(self.drop_to(bottom));
-                (self.top, self.bottom) = (now, None);
-            }
-            _ => {}
-        }
+            driven,
+        });
+        self.add(ended);
     }
 
-    /// The drop from the top to a least force, if the fall is one.
-    fn drop_to(&self, bottom: Instant) -> Option<Drop> {
-        let by_drive = self.drive.stiffness * (self.top.driven - bottom.driven).max(0.0);
-        let size = self.top.force - bottom.force - by_drive;
-        (size >= self.least).then_some(Drop {
-            start: self.top.time,
-            end: bottom.time,
-            size,
-        })
+    /// Adds a fall, if it is a drop.
+    fn add(&mut self, fall: Option<Fall>) {
+        let drop = fall.map(|fall| Drop {
+            start: fall.top.time,
+            end: fall.bottom.time,
+            size: fall.size(self.drive.stiffness),
+        });
+        let least = self.zigzag.least;
+        self.drops.extend(drop.filter(|drop| drop.size >= least));
     }
 
     /// The drops of slips, given the first and last break of each in order of time. A fall that is under way at the end
     /// counts as far as it went.
     pub(super) fn of_slips(mut self, slips: &[(f64, f64)]) -> Vec<Drops> {
-        self.drops
-            .extend(self.bottom.and_then(|bottom| self.drop_to(bottom)));
+        self.add(self.zigzag.under_way());
         let largest = |drops: &[Drop]| drops.iter().map(|drop| drop.size).max_by(f64::total_cmp);
         let mut drops = &self.drops[..];
         let of_slip = |&(first_break, last_break): &(f64, f64)| {

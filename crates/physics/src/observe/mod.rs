@@ -8,6 +8,7 @@ mod measure;
 mod recording;
 mod records;
 mod rupture;
+mod sampled;
 mod slip;
 mod slip_observer;
 
@@ -17,5 +18,6 @@ pub use recording::{Recording, RecordingKey};
 pub use records::{
     AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow,
 };
+pub use sampled::{Count, Counts, Finder, Loading, Pass, SampledSlip, Samples, Survey};
 pub use slip::{Energies, Modulation, OVERSHOOT, Precursor, Slip, phase};
 pub use slip_observer::SlipObserver;

@@ -1,0 +1,59 @@
+//! What the drop size decides: the number of slips in a trace, and their mean interval, for many drop sizes.
+
+use super::axis::{Axis, bounds, logarithmic_bounds, widened};
+use super::frame;
+use super::legend::{Mark, entry};
+use super::panel::{self, Layer, Panel};
+use super::picture::{Picture, PictureFormat};
+use super::style::{BLUE, Look, Place, RED, REFERENCE, Stroke};
+use super::write_custom;
+use crate::measured::DropSizes;
+use crate::results::layout::Layout;
+use anyhow::Result;
+use std::path::PathBuf;
+
+/// Draws them into the figures of a directory; returns the files.
+pub fn draw_drop_size(layout: &Layout<'_>, sizes: &DropSizes) -> Result<Vec<PathBuf>> {
+    let look = Look::default();
+    layout.storage.ensure_folder(layout.root())?;
+    let picture = drop_size(sizes, &look);
+    let files =
+        picture.map(|picture| write_custom(layout, picture, &look, &PictureFormat::DEFAULT));
+    Ok(files.transpose()?.unwrap_or_default())
+}
+
+/// Draws both against the drop size, with the size that was chosen; `None` without slips.
+fn drop_size(sizes: &DropSizes, look: &Look) -> Option<Picture> {
+    let counts = || sizes.counts.iter().filter(|count| count.slips > 0);
+    let (low, high) = logarithmic_bounds(counts().map(|count| count.least))?;
+    let x = Axis::logarithmic(&format!("Drop size ({})", sizes.unit), low, high);
+    let panel = |label: &str, places: Vec<Place>| {
+        let (least, most) = widened(bounds(places.iter().map(|place| place.1))?);
+        let y = Axis::linear(label, least.max(0.0), most);
+        let chosen = sizes
+            .chosen
+            .map(|size| Layer::Upright(size, Stroke::solid(RED, 1.6)));
+        let noise = Layer::Upright(10.0 * sizes.noise, REFERENCE);
+        let curve = Layer::Curve(places, Stroke::solid(BLUE, 1.6));
+        let layers = [noise, curve].into_iter().chain(chosen);
+        Some(Panel::inside(200.0, x.clone(), y, layers))
+    };
+    let number = counts().map(|count| (count.least, count.slips as f64));
+    let mean = counts().filter(|count| count.intervals > 0);
+    let mean = mean.map(|count| (count.least, count.seconds / count.intervals as f64));
+    let panels = [
+        panel("Number of slips", number.collect())?,
+        panel("Mean interval (s)", mean.collect())?,
+    ];
+    let legend = [
+        entry(Mark::Line(Stroke::solid(RED, 1.6)), "the drop size"),
+        entry(Mark::Line(REFERENCE), "ten times the noise"),
+    ];
+    Some(panel::draw(
+        "drop-size",
+        look,
+        frame::Layout::column(480.0),
+        &legend,
+        panels.into(),
+    ))
+}
