@@ -173,7 +173,7 @@ impl DropSizes {
 }
 
 /// With three digits.
-fn short(number: f64) -> Shortest {
+pub fn short(number: f64) -> Shortest {
     Shortest(format!("{number:.2e}").parse().unwrap_or(number))
 }
 
