@@ -271,7 +271,7 @@ impl Reading {
         let mut rest = self.rest_of_sweep(&request.sources)?;
         if request.trace.is_some() && self.series.len() == 1 {
             let [columns, settings] = request.sources.flags();
-            rest = format!("trace_columns = {columns}\ntrace_set = {settings}\n{rest}");
+            rest = format!("trace = {columns}\nsettings = {settings}\n{rest}");
         }
         let text = format!(
             "name = \"{name}\"\n[measured]\nfiles = {names}\nbytes = {lengths}\nsha256 = {checksums}\n\
@@ -409,7 +409,7 @@ impl Reading {
                 0 => String::new(),
                 count => format!("; more than T/10 in {count} series, whose R and excess are null"),
             };
-            let most = Shortest(to_twelve_digits(most));
+            let most = trace::short(most);
             add(
                 "onsets",
                 format!("known to {most} s, the largest median of a series{lost}"),

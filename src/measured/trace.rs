@@ -21,7 +21,7 @@ use std::path::Path;
 const RANGE: f64 = 3.0;
 const STEP: f64 = 1.06;
 /// Least drop size without one that was asked for, by the range of the force; and slips that its plateau must have.
-const LEAST: f64 = 1e-3;
+const LEAST: f64 = 1e-2;
 const MIN_SLIPS: u64 = 5;
 /// Least drop size, by the noise.
 const MIN_SIZE: f64 = 10.0;
@@ -173,7 +173,7 @@ impl DropSizes {
 }
 
 /// With three digits.
-fn short(number: f64) -> Shortest {
+pub fn short(number: f64) -> Shortest {
     Shortest(format!("{number:.2e}").parse().unwrap_or(number))
 }
 

@@ -188,8 +188,14 @@ impl Units {
             mean.covariance(&mean)
         };
         let variance = component(|[_, x, _]| x)? + component(|[_, _, y]| y)?;
-        let independent = (1.0 - length * length) / variance;
-        Some(-independent.min(count) * length * length / LN_10)
+        let spread = 1.0 - length * length;
+        // Rounding leaves this of equal vectors.
+        let effective = if spread > ROUNDING {
+            (spread / variance).min(count)
+        } else {
+            count
+        };
+        Some(-effective * length * length / LN_10)
     }
 
     /// The interval of the length of their mean, with 0 in it where they may have no direction: chance alone makes the

@@ -4,7 +4,7 @@
 use crate::results::commit::Commit;
 use crate::results::destination::refuse_reserved;
 use crate::results::extension_file::{self, Record};
-use crate::results::layout::{Layout, RUN, RUN_FOLDERS, is_hidden, is_table_file};
+use crate::results::layout::{FIGURES, Layout, RUN, RUN_FOLDERS, is_hidden, is_table_file};
 use crate::results::tables::{OptionalTable, RecordedTable};
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Part, PartName, Plan, Round, Sweep};
@@ -450,16 +450,19 @@ impl<'a> Results<'a> {
     }
 }
 
-/// Whether a directory is empty, or holds only what a run leaves that was killed before its first extension.
+/// Whether a directory is empty, or holds only what a run leaves that was killed before its first extension, or the
+/// figure of a trace that was refused.
 pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
     let storage = layout.storage;
     let holds_only = |folder: &Path, known: &[&str]| -> Result<bool, StorageError> {
         let mut names = storage.list(folder)?.into_iter();
         Ok(names.all(|name| is_hidden(&name) || known.iter().any(|known| name == *known)))
     };
-    match holds_only(layout.root(), &[RUN]) {
+    match holds_only(layout.root(), &[RUN, FIGURES]) {
         // Another program's file stands in its place.
         Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(false),
-        is_fresh => Ok(is_fresh? && holds_only(&layout.run(), &RUN_FOLDERS)?),
+        is_fresh => Ok(is_fresh?
+            && holds_only(&layout.run(), &RUN_FOLDERS)?
+            && holds_only(&layout.figures(), &["drop-size.svg", "drop-size.png"])?),
     }
 }

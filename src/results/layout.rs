@@ -21,6 +21,8 @@ use tempfile::TempDir;
 
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
+/// Of pictures.
+pub const FIGURES: &str = "figures";
 const RESULTS: &str = "results";
 pub const RUN_FOLDERS: [&str; 6] = ["staging", "log", "workers", "claims", "spill", "batch"];
 const EXTENSION: &str = "extension-";
@@ -229,7 +231,7 @@ macro_rules! places {
 
 places! {
     tables = "tables";
-    figures = "figures";
+    figures = FIGURES;
     report = "report.html";
     run = RUN;
     claims = "run/claims";

@@ -45,16 +45,8 @@ const KNOWN: &[&str] = &[
 impl Measured {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, Refused> {
         section.only(&[
-            "files",
-            "bytes",
-            "sha256",
-            "rows",
-            "options",
-            "series",
-            "columns",
-            "pure",
-            "trace_columns",
-            "trace_set",
+            "files", "bytes", "sha256", "rows", "options", "series", "columns", "pure", "trace",
+            "settings",
         ])?;
         let required = |key| section.required(key, "`stickslip measured` writes this section");
         let text = |entry: &Entry<'_>| {
@@ -67,8 +59,8 @@ impl Measured {
         };
         let texts = |key| all(list(key)?.iter().map(text));
         let trace = section
-            .entry("trace_columns")
-            .map(|_| -> Result<_, Refused> { Ok([texts("trace_columns")?, texts("trace_set")?]) });
+            .entry("trace")
+            .map(|_| -> Result<_, Refused> { Ok([texts("trace")?, texts("settings")?]) });
         // Where each series begins is for readers alone.
         texts("series")?;
         let names = texts("files")?;

@@ -31,12 +31,15 @@ def tried(program, tmp_path_factory):
     """A folder in which the commands of the page were given."""
     folder = tmp_path_factory.mktemp("page")
     (folder / "docs").mkdir()
+    subprocess.run([sys.executable, ROOT / "python" / "examples" / "trace.py", folder / "trace.parquet"], check=True)
     (folder / "docs" / "experiment.csv").write_bytes((ROOT / "docs" / "experiment.csv").read_bytes())
     for block in re.findall(r"^```sh\n(.*?)^```", PAGE, re.M | re.S):
         for command in block.replace("\\\n", " ").splitlines():
             words = [program, *shlex.split(command)[1:]]
             done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=300)
             assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+            with (folder / "printed").open("a") as printed:
+                printed.write(done.stdout)
     return folder
 
 
@@ -50,6 +53,32 @@ def test_what_the_page_shows_is_what_is_printed(program, tried):
     shown = subprocess.run([program, "show", "results/experiment"], cwd=tried, capture_output=True, text=True).stdout
     for line in re.findall(r"^```text\n(Δ.*?)^```", PAGE, re.M | re.S)[0].splitlines():
         assert line in shown.splitlines(), line
+
+
+def test_the_page_shows_what_is_found_in_its_trace(tried):
+    printed = (tried / "printed").read_text().splitlines()
+    for line in re.findall(r"^```text\n(samples.*?)^```", PAGE, re.M | re.S)[0].splitlines():
+        assert line in printed, line
+    assert (tried / "results" / "trace" / "figures" / "drop-size.png").exists()
+    # Blocks that slip at random strengths know nothing of the modulation but what it does to the load.
+    sets = module.open(tried / "results" / "trace").sets().to_pandas()
+    sets = sets[sets["Delta"] > 0]
+    assert len(sets) == 6
+    assert ((sets["resultant_excess_low"] < 0.02) & (sets["resultant_excess_high"] > -0.02)).all()
+
+
+def test_a_trace_in_python_has_the_slips_of_the_file(tried, tmp_path):
+    trace = parquet.read_table(tried / "trace.parquet")
+    columns = {"time": "t", "force": ("F", "mN"), "Delta": ("amplitude", "um")}
+    for size in ("auto", 8.21, (8210, "mN")):
+        out = tmp_path / str(size)
+        mine = module.measured(trace, out, columns=columns, set={"V0": 1e-4}, drop_size=size)
+        expected = module.open(tried / "results" / "trace").slips(["onset", "drop"]).to_pandas()
+        assert mine.slips(["onset", "drop"]).to_pandas().equals(expected), size
+        assert (out / "figures" / "drop-size.svg").exists()
+    with pytest.raises(module.SweepError, match="no plateau"):
+        module.measured(trace, tmp_path / "none", columns=columns, set={"V0": 1e-4}, drop_size=30)
+    assert (tmp_path / "none" / "figures" / "drop-size.svg").exists()
 
 
 def test_the_experiment_of_the_page_is_what_its_script_makes(tmp_path):
