@@ -1,4 +1,4 @@
-"""Claims of the literature on other sliders, put to this one: each a sweep, criteria that can fail, and what is lacking."""
+"""Claims of the literature on other sliders, put to this one: each a sweep, and criteria that can fail."""
 
 import math
 from pathlib import Path
@@ -32,12 +32,14 @@ def rms(values: pandas.Series) -> float:
 
 def off_others(sets: pandas.DataFrame, column: str) -> pandas.Series:
     """R of each set less the mean of the others with the same value of a column."""
-    groups = sets.groupby(sets[column].round(12))["resultant_length"]
-    return (groups.transform("sum") - sets["resultant_length"]) / (groups.transform("size") - 1) - sets["resultant_length"]
+    own = sets["resultant_length"]
+    groups = own.groupby(sets[column].round(12))
+    return own - (groups.transform("sum") - own) / (groups.transform("size") - 1)
 
 
 def correlation(results: Path) -> Section:
-    section = Section("Correlation with the load: by frequency, or by amplitude", "`sweeps/correlation.toml`", ("correlation",))
+    title = "Correlation with the load: by frequency, or by amplitude"
+    section = Section(title, "`sweeps/correlation.toml`", ("correlation",))
     section.verdict = "by both, as η has it"
     section.why = "of amplitude alone, as a laboratory fault at high frequency, nothing is seen: contacts do not age"
     sets = Sweep(results / "correlation").sets()
@@ -110,9 +112,8 @@ def slope(jobs: pandas.DataFrame) -> float:
 
 
 def weakening(results: Path) -> Section:
-    section = Section(
-        "Weakening by vibration: by displacement, velocity or acceleration", "`sweeps/weakening.toml`", ("weakening", "weakening-velocity")
-    )
+    title = "Weakening by vibration: by displacement, velocity or acceleration"
+    section = Section(title, "`sweeps/weakening.toml`", ("weakening", "weakening-velocity"))
     section.verdict = "the force sets it, not the velocity"
     jobs = Sweep(results / "weakening").table("jobs")
     jobs = jobs.assign(frequency=(1 / jobs["T"]).fillna(0.0).round(6))
@@ -128,9 +129,11 @@ def weakening(results: Path) -> Section:
     for name, power in (("displacement Δ", 0), ("velocity 2π f Δ", 1), ("acceleration (2π f)² Δ", 2)):
         values = found * (2 * math.pi * found.index.to_numpy()) ** power
         relative = values / numpy.exp(numpy.log(values).mean())
-        of_each = {f"{frequency:.0f} Hz": f"{value:.2f}" for frequency, value in relative.items()}
-        section.rows.append({"threshold, over its geometric mean": name, **of_each, "factor": f"{max(values) / min(values):.1f}"})
-    microns = ", ".join(f"{1e6 * value:.2f} µm at {frequency:.0f} Hz" for frequency, value in found.items())
+        cells = {f"{frequency:.0f} Hz": f"{value:.2f}" for frequency, value in relative.items()}
+        spread = {"factor": f"{max(values) / min(values):.1f}"}
+        section.rows.append({"threshold, over its geometric mean": name, **cells, **spread})
+    each = {at: bootstrap(lambda frame, at=at: 1e6 * thresholds(frame)[at], jobs, "seed") for at in found.index}
+    microns = ", ".join(f"{one.text(2)} µm at {frequency:.0f} Hz" for frequency, one in each.items())
     section.remark(
         f"The amplitudes are {microns}.",
         "This slider is loaded at its edge: the force sets it, K_d Δ being nearly the same at all frequencies."
