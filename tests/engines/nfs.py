@@ -56,7 +56,7 @@ class Guest:
             text=True,
             env=os.environ | {"TMPDIR": str(folder)},
         )
-        wait_until(lambda: (folder / "mounts").exists() or self.process.poll() is not None, 60, "the guest is up")
+        wait_until(lambda: (folder / "mounts").exists() or self.process.poll() is not None, 240, "the guest is up")
         said = console.read_text(errors="replace")
         # Linux 6.1 as a guest has no room for the state of processors with AMX, and dies at its first program.
         if self.process.poll() is not None and "ptrace set fp regs failed" in said:
