@@ -174,11 +174,11 @@ fn trace(results: &Results<'_>, arguments: &Arguments) -> Result<Picture> {
         .next()
         .map(|job| job.parameters)
         .unwrap_or_default();
-    if measured.options.contains("maximum") {
+    if trace.has_maximum {
         // The modulation is drawn with a maximum at 0.
         parameters.modulation_period = None;
     }
-    Ok(measured_trace(&parameters, &trace, &onsets).map_err(refused)?)
+    Ok(measured_trace(&parameters, &trace.samples, &onsets).map_err(refused)?)
 }
 
 /// Where a picture goes, and the format that the name ends in.

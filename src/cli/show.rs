@@ -184,6 +184,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
     } else {
         chosen_columns(results, usual, &arguments.columns, &all, &rows)?
     };
+    let pulses = pulses(results)?;
     let mut edges: Vec<EdgeRow> = read_optional(results.layout())?;
     if arguments.condition.is_some() {
         edges.retain(|edge| rows.iter().any(|row| is_on_line(row, edge)));
@@ -194,10 +195,10 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
         }
         output::print(&table_of_edges(&edges, &rows))?;
         output::print(&table_of_pairs(&pairs_of_edges(results)?))?;
-        output::print(&table_of_pulses(results)?)?;
+        output::print(&table_of_pulses(results, &pulses)?)?;
     }
     let edges: Vec<Json> = edges.iter().map(json).collect();
-    let pulses: Vec<Json> = pulses(results)?.iter().map(json).collect();
+    let pulses: Vec<Json> = pulses.iter().map(json).collect();
     let found = serde_json::json!({ "edges": edges, "pulses": pulses });
     arguments.print(&columns, rows.len(), &rows, found)?;
     if arguments.is_text() {
@@ -214,7 +215,7 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     // A line that says how many more there are is as long as one of these.
     let first = FIRST + usize::from(count == FIRST as u64 + 1);
     let mut text = table_of_edges(&read_optional(results.layout())?, &rows);
-    text += &table_of_pulses(results)?;
+    text += &table_of_pulses(results, &pulses(results)?)?;
     text += &aligned(&columns, &rows, first);
     if let Some(more @ 1..) = count.checked_sub(first as u64) {
         let root = output::quoted_path(results.layout().root());
@@ -386,16 +387,15 @@ fn parameters_but(symbol: Symbol, rows: impl Iterator<Item = Parameters>) -> Tex
 }
 
 /// What pulses did, for people, and a blank line; empty if none says something.
-fn table_of_pulses(results: &Results<'_>) -> Result<String> {
-    let pulses = pulses(results)?;
+fn table_of_pulses(results: &Results<'_>, pulses: &[PulseRow]) -> Result<String> {
     if pulses.is_empty() {
         return Ok(String::new());
     }
     let parameters = pulses.iter().map(PulseRow::pulse);
     let mut columns = parameters_but(Symbol::PulseStart, parameters);
-    columns.numbers("pulses", &pulses, |row| row.jobs.to_string());
+    columns.numbers("pulses", pulses, |row| row.jobs.to_string());
     let mut add = |name: &str, of: fn(&PulseRow) -> (Option<f64>, Option<Interval>)| {
-        columns.numbers(name, &pulses, |row| match of(row) {
+        columns.numbers(name, pulses, |row| match of(row) {
             (Some(value), Some(Interval { low, high })) => with_interval(value, low, high),
             (Some(value), None) => Digits::THREE.number(value),
             (None, _) => "–".to_owned(),

@@ -53,7 +53,7 @@ impl Series {
     fn layers<'a>(self) -> [Layer<'a>; 3] {
         let means = || self.means.iter();
         let bars = means().filter_map(Mean::bar).collect();
-        // A curve through one point is none.
+        // One point makes no curve.
         let by_drive = if let [mean] = &self.means[..] {
             Layer::Level(mean.by_drive, drive_alone(self.ink))
         } else {

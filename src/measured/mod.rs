@@ -18,7 +18,7 @@ mod trace;
 
 pub use files::{Compared, compare_files};
 pub use keys::{Given, Sources};
-pub use trace::{DropSizes, NoPlateau, TraceRequest, stretch};
+pub use trace::{DropSizes, NoPlateau, Stretch, TraceRequest, stretch};
 
 use crate::model::Symbol;
 use crate::model::theory::to_twelve_digits;

@@ -104,7 +104,8 @@ impl DropSizes {
         plateau: [f64; 2],
         runs: impl Iterator<Item = &'a Run>,
     ) -> Vec<(String, String)> {
-        let (unit, step) = (self.unit, survey.seconds / survey.samples as f64);
+        let unit = self.unit;
+        let step = survey.seconds / survey.samples as f64;
         let [low, high] = plateau.map(short);
         let mut found = Vec::new();
         let mut add = |head: &str, text: String| found.push((head.to_owned(), text));
@@ -189,7 +190,7 @@ pub struct Traced {
     pub found: Vec<(String, String)>,
 }
 
-/// What stands for the force: its key, its unit, and whether that is none of a force.
+/// The key that gives the force, and its unit, which may be that of a displacement or of a pure number.
 #[derive(Clone, Copy, Debug)]
 struct Force {
     key: Key,
@@ -279,8 +280,17 @@ pub fn find(tables: &[(String, Table)], request: &Request, trace: &TraceRequest)
     })
 }
 
-/// Times in s and forces in N of a stretch of the trace that slips came from, read again from its file.
-pub fn stretch(measured: &Measured, range: RangeInclusive<f64>) -> Result<Vec<(f64, f64)>> {
+/// A part of a trace, read again from its file.
+#[derive(Debug)]
+pub struct Stretch {
+    /// Times in s and forces in N.
+    pub samples: Vec<(f64, f64)>,
+    /// Whether a maximum of the modulation was given: it is not at time 0.
+    pub has_maximum: bool,
+}
+
+/// A stretch of the trace that slips came from.
+pub fn stretch(measured: &Measured, range: RangeInclusive<f64>) -> Result<Stretch> {
     let Some([columns, settings]) = &measured.trace else {
         bail!("--from, --until: the slips did not come from a trace with one run");
     };
@@ -296,14 +306,18 @@ pub fn stretch(measured: &Measured, range: RangeInclusive<f64>) -> Result<Vec<(f
         force.unit == Key::Force.unit(),
         "--from, --until: the trace is of no force"
     );
-    let mut found = Vec::new();
+    let mut found = Stretch {
+        samples: Vec::new(),
+        has_maximum: sources.has(Key::Maximum),
+    };
     let has_commas = measured.options.contains("--decimal-comma");
     open(Path::new(name))?
         .0
         .read(&sources, has_commas, &mut |rows| {
             let of = |key| rows.of(key).unwrap_or_default().iter().copied();
             let samples = of(Key::Time).zip(of(Key::Force));
-            found.extend(samples.filter(|(time, _)| range.contains(time)));
+            let within = samples.filter(|(time, _)| range.contains(time));
+            found.samples.extend(within);
             rows.clear();
             Ok(())
         })?;
@@ -427,7 +441,8 @@ impl Runs<'_> {
     /// Takes the next samples of the table.
     fn take(&mut self, rows: &Rows) -> Result<()> {
         let of = |key| rows.of(key).unwrap_or_default();
-        let (times, forces) = (of(Key::Time), of(self.reader.force.key));
+        let times = of(Key::Time);
+        let forces = of(self.reader.force.key);
         let mut begin = 0;
         for row in 0..rows.count {
             let in_row = || rows.place(row);

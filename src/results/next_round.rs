@@ -61,7 +61,7 @@ impl Results<'_> {
     }
 
     /// The directory with its next round, once all its parts are done: a round that another worker has begun meanwhile,
-    /// or the one that `decide` chooses. The directory as it is while another decides. `None` if the rounds are over, or
+    /// or the one that `decide` chooses. While another worker decides, the directory as it is. `None` if the rounds are over, or
     /// if there are none.
     pub fn next_round(
         &self,

@@ -150,7 +150,7 @@ impl<'a> Work<'a> {
     }
 
     /// Lists the parts that no living worker has, at first with those that are done and may run again. Returns whether
-    /// there is none, and the owners of all other parts certainly live.
+    /// there is none, and the workers that have the others certainly live.
     fn look(&mut self, is_first: bool) -> Result<bool, ResultsError> {
         let pending = self.pending;
         // In this order: a worker that has ended committed or spilled before.

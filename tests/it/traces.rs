@@ -22,7 +22,7 @@ fn gaussian(state: &mut u64) -> f64 {
     (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
-/// Time in ms and force in mN of every so many samples, under noise in N.
+/// Every n-th sample as CSV: time in ms, and force in mN with noise of this standard deviation in N.
 fn with_noise(times: &[f64], forces: &[f64], every: usize, noise: f64) -> String {
     let mut state = 1;
     let mut text = "t,F\n".to_owned();

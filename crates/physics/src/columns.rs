@@ -40,7 +40,7 @@ pub enum Class {
     Share,
     /// A quantile, which jumps from value to value.
     Quantile,
-    /// What goes with a mean: its lower bound, its bias, or the mean of the control.
+    /// What goes with a statistic: a lower bound, a bias, the mean of the control, the p of a test.
     Auxiliary,
     /// A word, flag or count that distinguishes rows.
     Category,

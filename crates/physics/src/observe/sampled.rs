@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 
 /// Samples that are followed at once, by their largest and least, where they differ by less than the drop size.
 const CHUNK: usize = 32;
-/// Samples over which the slope of the force is taken: the first of these in which it rises by so many noises.
+/// Samples over which the slope of the force is taken: the fewest over which it rises by `RISE` times the noise.
 const SLOPES: [usize; 3] = [1, 4, 16];
 const RISE: f64 = 2.0;
 const LONGEST_SLOPE: usize = SLOPES[2];
@@ -178,7 +178,8 @@ impl Survey {
             return [0.0, 1.0, -2.0, 1.0, 0.0].map(|weight| weight / 6.0_f64.sqrt());
         }
         let twice = 2.0 * libm::cos(TAU * step / drive.period);
-        let (side, middle) = (-2.0 - twice, 2.0 + 2.0 * twice);
+        let side = -2.0 - twice;
+        let middle = 2.0 + 2.0 * twice;
         let weights = [1.0, side, middle, side, 1.0];
         let norm = weights.iter().map(|weight| weight * weight).sum::<f64>();
         weights.map(|weight| weight / norm.sqrt())
@@ -219,7 +220,8 @@ impl Pass for Survey {
         self.times.extend(samples.times);
         self.count_equal(samples.forces);
         self.samples += samples.times.len() as u64;
-        let (times, forces) = (&self.times, &self.forces);
+        let times = &self.times;
+        let forces = &self.forces;
         let last = times.len() - 1;
         self.seconds += times[last] - times[known.saturating_sub(1)];
         let step = (times[last] - times[0]) / (last.max(1)) as f64;
@@ -559,7 +561,9 @@ mod tests {
             onsets: Vec::new(),
             drops: Vec::new(),
         };
-        let (mut slid, mut next, mut drop) = (0.0, 0.15, 100.0);
+        let mut slid = 0.0;
+        let mut next = 0.15;
+        let mut drop = 100.0;
         for sample in 0..60_000 {
             let time = STEP * (f64::from(sample) + jitter * uniform(&mut state));
             let partly = ((time - next) / 0.002).clamp(0.0, 1.0);
@@ -684,7 +688,8 @@ mod tests {
         );
         // Steps of all sizes, one as often as another.
         let mut state = 5;
-        let (mut force, mut forces) = (0.0, Vec::new());
+        let mut force = 0.0;
+        let mut forces = Vec::new();
         for _ in 0..60_000 {
             force += 3.0 * gaussian(&mut state);
             forces.push(force);
