@@ -9,7 +9,7 @@ import numpy
 import pandas
 import pytest
 from conftest import ROOT
-from validation import beyond, document, friction, intervals, kinematics, phase, scaling
+from validation import beyond, claims, document, friction, intervals, kinematics, phase, scaling
 
 import stickslip as module
 from stickslip import statistics
@@ -168,6 +168,20 @@ def test_curves_are_below_a_level_from_their_last_crossing_on():
 def test_stretches_of_periods_leave_out_the_gaps(holds, expected):
     periods = numpy.arange(len(holds)) * 2e-3
     assert beyond.stretches(pandas.Series([held == "1" for held in holds], index=periods)) == expected
+
+
+@pytest.mark.parametrize("power", [0, -1, -2])
+def test_the_slope_of_weakening_is_that_of_what_sets_it(power):
+    """Of friction that falls with Δ, 2π f Δ or (2π f)² Δ."""
+    frequencies, amplitudes = [29.0, 58.0, 116.0], numpy.geomspace(1e-8, 1e-4, 81)
+    grid = pandas.MultiIndex.from_product([frequencies, amplitudes, [1, 2]], names=["frequency", "Delta", "seed"])
+    jobs = grid.to_frame(index=False)
+    strength = jobs["Delta"] / (2e-6 * (jobs["frequency"] / 58) ** power)
+    jobs["mean_friction"] = 286 * (1 - 0.2 * strength.clip(upper=4))
+    still = pandas.DataFrame({"frequency": 0.0, "Delta": 0.0, "seed": [1, 2], "mean_friction": 286.0})
+    jobs = pandas.concat([still, jobs]).assign(averaged_time=1.0)
+    assert claims.slope(jobs) == pytest.approx(power, abs=0.02)
+    assert claims.thresholds(jobs)[58.0] == pytest.approx(2e-6, rel=0.01)
 
 
 def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
