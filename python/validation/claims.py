@@ -5,8 +5,11 @@ from pathlib import Path
 
 import numpy
 import pandas
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 from scipy.optimize import isotonic_regression
 
+from stickslip import figures
 from stickslip.statistics import Estimate, bootstrap
 from stickslip.tables import Sweep
 
@@ -108,9 +111,37 @@ def slope(jobs: pandas.DataFrame) -> float:
     return float(numpy.polyfit(numpy.log(found.index), numpy.log(found), 1)[0])
 
 
+def draw_thresholds(amplitudes: dict[float, Estimate], picture: Path) -> list[float]:
+    """Draws amplitudes by frequency as displacement, velocity and acceleration, each over its geometric mean.
+
+    What sets the weakening would be a level line. Returns the factors that the three span.
+    """
+    factors = []
+    with rc_context(figures.STYLE):
+        drawn = Figure(figsize=figures.SIZE)
+        axes = drawn.subplots()
+        axes.axhline(1, color="0.6", linewidth=0.8)
+        kinds = ("displacement Δ", "velocity 2π f Δ", "acceleration (2π f)² Δ")
+        for power, (kind, colour, marker) in enumerate(zip(kinds, figures.COLOURS, "osD", strict=False)):
+            scaled = [amplitude.scaled(frequency**power) for frequency, amplitude in amplitudes.items()]
+            mean = numpy.exp(numpy.mean([math.log(one.value) for one in scaled]))
+            values, lows, highs = numpy.array([(one.value, one.low, one.high) for one in scaled]).T / mean
+            bars = [values - lows, highs - values]
+            axes.errorbar(list(amplitudes), values, bars, color=colour, marker=marker, markersize=4, capsize=3, label=kind)
+            factors.append(max(values) / min(values))
+        axes.set(xscale="log", yscale="log", xlabel="Modulation frequency $f$ (Hz)")
+        axes.set_ylabel("Threshold over its geometric mean")
+        axes.minorticks_off()
+        axes.set_xticks(list(amplitudes), [f"{frequency:g}" for frequency in amplitudes])
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.legend(loc="upper left", title=f"Where friction falls by {100 * (1 - WEAKENED):.0f} %, 95 %:")
+        drawn.savefig(picture, dpi=200)
+    return factors
+
+
 def weakening(results: Path) -> Section:
     title = "A displacement sets the weakening by vibration"
-    section = Section(title, "`sweeps/weakening.toml`", ("weakening", "weakening-velocity"))
+    section = Section(title, "`sweeps/weakening.toml`", ("weakening-threshold", "weakening", "weakening-velocity"))
     jobs = Sweep(results / "weakening").table("jobs")
     jobs = jobs.assign(frequency=(1 / jobs["T"]).fillna(0.0).round(6))
     found = thresholds(jobs)
@@ -122,16 +153,12 @@ def weakening(results: Path) -> Section:
         exponent.text(2),
         *(not exponent.low <= power <= exponent.high for power in (-1, -2)),
     )
-    for name, power in (("displacement Δ", 0), ("velocity 2π f Δ", 1), ("acceleration (2π f)² Δ", 2)):
-        values = found * (2 * math.pi * found.index.to_numpy()) ** power
-        relative = values / numpy.exp(numpy.log(values).mean())
-        cells = {f"{frequency:.0f} Hz": f"{value:.2f}" for frequency, value in relative.items()}
-        spread = {"factor": f"{max(values) / min(values):.1f}"}
-        section.rows.append({"threshold, over its geometric mean": name, **cells, **spread})
     each = {at: bootstrap(lambda frame, at=at: 1e6 * thresholds(frame)[at], jobs, "seed") for at in found.index}
+    spans = draw_thresholds(each, results / "weakening-threshold.png")
     microns = ", ".join(f"{one.text(2)} µm at {frequency:.0f} Hz" for frequency, one in each.items())
     section.remark(
-        f"The amplitudes are {microns}.",
+        f"The amplitudes are {microns}; they span a factor of {spans[0]:.1f}, as velocities {spans[1]:.1f}, as"
+        f" accelerations {spans[2]:.0f}.",
         "The model is loaded at its edge, by the force K_d Δ. It has no load along its length.",
     )
     return section

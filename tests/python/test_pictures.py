@@ -16,7 +16,7 @@ from conftest import ROOT
 #: Sweeps that take less than 15 s of CPU time.
 CHEAP = ("drag", "drag-strong", "locking-contacts", "sliding-velocity")
 #: Pictures of a single simulation, which test_redraw.py draws, and of timings, which differ each time.
-OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "predicted-cost.png", "speed-against-error.png"}
+OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "predicted-cost.png", "speed-against-error.png", "weakening-threshold.png"}
 #: Custom figures: the flags of `stickslip plot`, as in scripts/reproduce, a line for each.
 OWN = {
     "correlation": "--x eta --y resultant_length --colour frequency --log x",

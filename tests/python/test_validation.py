@@ -184,6 +184,12 @@ def test_the_slope_of_weakening_is_that_of_what_sets_it(power):
     assert claims.thresholds(jobs)[58.0] == pytest.approx(2e-6, rel=0.01)
 
 
+def test_a_threshold_that_only_a_velocity_sets_spans_nothing_as_a_velocity(tmp_path):
+    amplitudes = {f: statistics.Estimate(1 / f, 0.9 / f, 1.1 / f, units=16) for f in (29.0, 58.0, 116.0)}
+    assert claims.draw_thresholds(amplitudes, tmp_path / "drawn.png") == pytest.approx([4, 1, 4])
+    assert (tmp_path / "drawn.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
     command = [sys.executable, "-m", "validation", tmp_path, "--to", tmp_path / "validation.md"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
