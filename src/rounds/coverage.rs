@@ -188,10 +188,10 @@ const MANY: usize = 8;
 const MIN_COVERAGE: f64 = 89.5;
 /// The same from [`FEW`] jobs on.
 const MIN_COVERAGE_OF_FEW: f64 = 85.0;
-/// Cells that are listed of each kind.
-const WORST: usize = 12;
-/// Half-width over the ideal one of the cells that are listed.
+/// Half-width over the ideal one above which cells are listed.
 const MAX_WIDTH: f64 = 6.0;
+/// A multiple of `mean_friction`, with the same coverage.
+const NOT_LISTED: &str = "friction_coefficient";
 /// Jobs from which fewer are promised to do, in the same.
 const FEW: usize = 3;
 /// The pools that `scripts/coverage` makes, each with one of long jobs.
@@ -382,12 +382,15 @@ const SEEDS_OF_PULSES: [usize; 3] = [8, 16, 32];
 /// Parts of the cycle in which pulses begin, by name.
 const THIRDS: [(&str, f64); 3] = [("early", 0.0), ("middle", 1.0 / 3.0), ("late", 2.0 / 3.0)];
 
-/// A line for each pulse, third of the cycle and number of seeds: the share of slips that are triggered, and the
+/// Shares of triggered slips below this are left out.
+const MIN_TRIGGERED: f64 = 5e-4;
+
+/// A line for each pulse and third of the cycle: the share of slips that are triggered, and by numbers of seeds the
 /// coverage of its intervals and of those of its excess over the drive alone.
 fn of_pulses(rows: &[TriggerRow]) -> String {
     let mut lines = vec![
-        "| Δ (µm) | f (Hz) | cycle | seeds | share | coverage | excess | coverage |".to_owned(),
-        "|---|---|---|---|---|---|---|---|".to_owned(),
+        "| Δ (µm) | f (Hz) | third | share | coverage | excess | coverage |".to_owned(),
+        "|---|---|---|---|---|---|---|".to_owned(),
     ];
     let seeds: BTreeSet<u64> = rows.iter().map(|row| row.parameters.seed).collect();
     let seeds: Vec<u64> = seeds.into_iter().collect();
@@ -397,6 +400,10 @@ fn of_pulses(rows: &[TriggerRow]) -> String {
             let all = pulses.between(third);
             let truth = all.row(third).expect("pulses in each third");
             let [share, excess] = [truth.triggered_share, truth.triggered_excess];
+            if share < MIN_TRIGGERED {
+                continue;
+            }
+            let mut coverage = [Vec::new(), Vec::new()];
             for count in SEEDS_OF_PULSES {
                 let of = |repetition: u64| {
                     let some = of_repetition(&seeds, repetition, count);
@@ -412,18 +419,17 @@ fn of_pulses(rows: &[TriggerRow]) -> String {
                 };
                 let repetitions = (0..REPETITIONS).into_par_iter().filter_map(of);
                 let found: Vec<[bool; 2]> = repetitions.collect();
-                let held = |which: usize| {
+                for (which, coverage) in coverage.iter_mut().enumerate() {
                     let held = found.iter().filter(|held| held[which]).count();
-                    100.0 * held as f64 / found.len() as f64
-                };
-                lines.push(format!(
-                    "| {:.2} | {:.0} | {name} | {count} | {share:.3} | {:.1} | {excess:.3} | {:.1} |",
-                    1e6 * pulses.parameters.modulation_amplitude,
-                    pulses.parameters.frequency().unwrap_or_default(),
-                    held(0),
-                    held(1),
-                ));
+                    coverage.push(format!("{:.1}", 100.0 * held as f64 / found.len() as f64));
+                }
             }
+            let [of_share, of_excess] = coverage.map(|of| of.join(", "));
+            lines.push(format!(
+                "| {:.2} | {:.0} | {name} | {share:.3} | {of_share} | {excess:.3} | {of_excess} |",
+                1e6 * pulses.parameters.modulation_amplitude,
+                pulses.parameters.frequency().unwrap_or_default(),
+            ));
         }
     }
     lines.join("\n")
@@ -442,6 +448,23 @@ impl CellOfSet {
     /// Whether it has as many jobs as are promised to do.
     fn is_of_many(&self) -> bool {
         SIZES.get(self.column).is_none_or(|&(jobs, _)| jobs >= MANY)
+    }
+
+    /// Whether its coverage is below what is promised of many jobs.
+    fn is_low(&self) -> bool {
+        self.is_of_many() && self.cell.coverage < MIN_COVERAGE
+    }
+
+    /// The same of few jobs.
+    fn is_low_of_few(&self) -> bool {
+        let size = SIZES.get(self.column);
+        size.is_some_and(|(jobs, _)| (FEW..MANY).contains(jobs))
+            && self.cell.coverage < MIN_COVERAGE_OF_FEW
+    }
+
+    /// Whether its intervals are wider than is promised of many jobs.
+    fn is_wide(&self) -> bool {
+        self.is_of_many() && self.cell.width > MAX_WIDTH
     }
 
     /// Its jobs and slips of a job.
@@ -476,99 +499,105 @@ impl CellSummary {
     }
 }
 
-/// A line for each statistic: the coverage and half-width of its cells with many jobs, and with few.
+/// A line for each statistic: its cells below what is promised, the coverage of those with many jobs and their greatest
+/// half-width; and the least coverage of those with few jobs.
 fn by_statistic(cells: &[CellOfSet], statistics: &[Statistic]) -> String {
     let mut lines = vec![
-        "| statistic | cells | least | median | half-width | widest | few jobs: least | median | half-width |"
-            .to_owned(),
-        "|---|---|---|---|---|---|---|---|---|".to_owned(),
+        "| statistic | cells below | least | median | widest | fewer jobs: least |".to_owned(),
+        "|---|---|---|---|---|---|".to_owned(),
     ];
-    for statistic in statistics {
+    for statistic in statistics.iter().filter(|one| one.key != NOT_LISTED) {
         let own = || cells.iter().filter(|cell| cell.statistic == statistic.key);
         let many = CellSummary::of(own().filter(|cell| cell.is_of_many()));
         let few = CellSummary::of(own().filter(|cell| !cell.is_of_many()));
+        let low = own().filter(|cell| cell.is_low()).count();
         let [least, median, _] = many.coverage;
-        let [_, width, widest] = many.width;
-        let [few_least, few_median, _] = few.coverage;
-        let [_, few_width, _] = few.width;
+        let [_, _, widest] = many.width;
+        let [few_least, _, _] = few.coverage;
         lines.push(format!(
-            "| `{}` | {} | {least:.1} | {median:.1} | {width:.2} | {widest:.2} | {few_least:.1} | {few_median:.1} | {few_width:.2} |",
-            statistic.key, many.count,
+            "| `{}` | {low} | {least:.1} | {median:.1} | {widest:.2} | {few_least:.1} |",
+            statistic.key,
         ));
     }
     lines.join("\n")
 }
 
-/// A line for each set: what it is, how much it is locked, and the coverage of its cells with many jobs.
-fn by_set(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> String {
-    let mut lines = vec![
-        "| N | N_s | V0 (m/s) | Δ (µm) | f (Hz) | η | n | R | locking index | least | median |"
-            .to_owned(),
-        "|---|---|---|---|---|---|---|---|---|---|---|".to_owned(),
+/// What a set is, and how much it is locked: the first cells of a line, whose heads are [`SET`].
+fn of_set((parameters, row): &(Parameters, SetRow)) -> String {
+    let resultant = row
+        .number("resultant_length")
+        .map_or("–".into(), |number| format!("{number:.2}"));
+    format!(
+        "| {}×{} | {:e} | {:.2} | {:.1} | {:.2} | {resultant} |",
+        parameters.blocks,
+        parameters.contacts_per_block,
+        parameters.drive_velocity,
+        1e6 * parameters.modulation_amplitude,
+        parameters.frequency().unwrap_or_default(),
+        parameters.eta(),
+    )
+}
+
+const SET: &str = "| N×N_s | V0 (m/s) | Δ (µm) | f (Hz) | η | R |";
+
+/// The statistics of some cells of a set, each with the extreme value of its cells.
+fn extremes<'a>(
+    cells: impl Iterator<Item = &'a CellOfSet>,
+    value: fn(&CoverageCell) -> f64,
+    extreme: fn(f64, f64) -> f64,
+    digits: usize,
+) -> String {
+    let mut found: Vec<(&str, f64)> = Vec::new();
+    for measured in cells.filter(|cell| cell.statistic != NOT_LISTED) {
+        let value = value(&measured.cell);
+        match found.last_mut() {
+            Some((statistic, known)) if *statistic == measured.statistic => {
+                *known = extreme(*known, value);
+            }
+            _ => found.push((measured.statistic, value)),
+        }
+    }
+    let texts = found
+        .iter()
+        .map(|(statistic, value)| format!("`{statistic}` {value:.digits$}"));
+    texts.collect::<Vec<String>>().join(", ")
+}
+
+/// A line for each set with cells that are off what is promised: their statistics with the least coverage or the
+/// greatest half-width. And a line for each of the other sets, with its least coverage.
+fn by_set(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> [String; 2] {
+    let mut off = Vec::new();
+    let mut others = vec![
+        format!("{SET} least |"),
+        "|---|---|---|---|---|---|---|".to_owned(),
     ];
-    for (set, (parameters, row)) in sets.iter().enumerate() {
-        let number = |key: &str| {
-            row.number(key)
-                .map_or("–".into(), |number| format!("{number:.2}"))
-        };
-        let own = cells.iter().filter(|cell| cell.set == set);
-        let many = CellSummary::of(own.filter(|cell| cell.is_of_many()));
-        lines.push(format!(
-            "| {} | {} | {:e} | {:.2} | {:.1} | {:.2} | {} | {} | {} | {:.1} | {:.1} |",
-            parameters.blocks,
-            parameters.contacts_per_block,
-            parameters.drive_velocity,
-            1e6 * parameters.modulation_amplitude,
-            parameters.frequency().unwrap_or_default(),
-            parameters.eta(),
-            row.periods.unwrap_or_default(),
-            number("resultant_length"),
-            number("locking_index"),
-            many.coverage[0],
-            many.coverage[1],
-        ));
+    for (index, set) in sets.iter().enumerate() {
+        let own = || cells.iter().filter(move |cell| cell.set == index);
+        let many = CellSummary::of(own().filter(|cell| cell.is_of_many()));
+        let [least, _, _] = many.coverage;
+        let name = of_set(set);
+        let coverage = |cell: &CoverageCell| cell.coverage;
+        let low = extremes(own().filter(|cell| cell.is_low()), coverage, f64::min, 1);
+        let few = own().filter(|cell| cell.is_low_of_few());
+        let few = extremes(few, coverage, f64::min, 0);
+        let wide = own().filter(|cell| cell.is_wide());
+        let wide = extremes(wide, |cell| cell.width, f64::max, 2);
+        if [&low, &few, &wide].iter().all(|text| text.is_empty()) {
+            others.push(format!("{name} {least:.1} |"));
+        } else {
+            off.push((least, format!("{name} {low} | {few} | {wide} |")));
+        }
     }
-    lines.join("\n")
-}
-
-/// The cells that are furthest from what is promised: those with the least coverage, then those with the widest
-/// intervals.
-fn worst(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> String {
-    let jobs = |cell: &&CellOfSet| SIZES.get(cell.column).map_or(MANY, |&(jobs, _)| jobs);
-    let least = |cell: &&CellOfSet| match jobs(cell) {
-        ..FEW => 0.0,
-        FEW..MANY => MIN_COVERAGE_OF_FEW,
-        MANY.. => MIN_COVERAGE,
-    };
-    let is_wide = |cell: &&CellOfSet| cell.is_of_many() && cell.cell.width > MAX_WIDTH;
-    let low = cells.iter().filter(|cell| cell.cell.coverage < least(cell));
-    let mut low: Vec<&CellOfSet> = low.collect();
-    low.sort_by(|a, b| a.cell.coverage.total_cmp(&b.cell.coverage));
-    let mut wide: Vec<&CellOfSet> = cells.iter().filter(is_wide).collect();
-    wide.sort_by(|a, b| b.cell.width.total_cmp(&a.cell.width));
-    let mut lines = vec![
-        "| N | V0 (m/s) | Δ (µm) | f (Hz) | τ_r (ms) | statistic | jobs × slips | coverage | half-width |"
-            .to_owned(),
+    off.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    let mut worst = vec![
+        format!(
+            "{SET} below {MIN_COVERAGE} % from {MANY} jobs on | below {MIN_COVERAGE_OF_FEW} % with {FEW} to {} | half-width above {MAX_WIDTH} |",
+            MANY - 1
+        ),
         "|---|---|---|---|---|---|---|---|---|".to_owned(),
     ];
-    low.truncate(WORST);
-    wide.truncate(WORST);
-    for cell in low.into_iter().chain(wide) {
-        let parameters = &sets[cell.set].0;
-        let (jobs, slips) = cell.size();
-        lines.push(format!(
-            "| {} | {:e} | {:.2} | {:.1} | {:.1} | `{}` | {jobs} × {slips} | {:.1} | {:.2} |",
-            parameters.blocks,
-            parameters.drive_velocity,
-            1e6 * parameters.modulation_amplitude,
-            parameters.frequency().unwrap_or_default(),
-            1e3 * parameters.reattachment_time,
-            cell.statistic,
-            cell.cell.coverage,
-            cell.cell.width,
-        ));
-    }
-    lines.join("\n")
+    worst.extend(off.into_iter().map(|(_, line)| line));
+    [worst, others].map(|lines| lines.join("\n"))
 }
 
 /// Every cell, for `docs/coverage.csv`.
@@ -637,31 +666,36 @@ fn coverage_is_measured() {
     }
     let many = CellSummary::of(all.iter().filter(|cell| cell.is_of_many()));
     let few = CellSummary::of(all.iter().filter(|cell| !cell.is_of_many()));
-    let is_low = |cell: &&CellOfSet| cell.is_of_many() && cell.cell.coverage < MIN_COVERAGE;
-    let low = all.iter().filter(is_low).count();
+    let low = all.iter().filter(|cell| cell.is_low()).count();
     let is_narrow = |cell: &&CellOfSet| cell.is_of_many() && cell.cell.width <= 3.0;
     let narrow = 100.0 * all.iter().filter(is_narrow).count() as f64 / many.count as f64;
     let [slips, means] = of_backbone(&read_pool(folder, "dense"));
     let pulses = folder.join("coverage-pulses");
     let triggers: Vec<TriggerRow> = read_optional(&Layout::new(&Disk, &pulses)).unwrap();
+    let seeds = SEEDS_OF_PULSES.map(|count| count.to_string()).join(", ");
+    let [worst, others] = by_set(&all, &sets);
     let text = format!(
-        "{}\n\n\
-         From {MANY} jobs on there are {} cells: {low} lie below {MIN_COVERAGE} %, the least at {:.1} %, the median at\n\
-         {:.1} %; the half-width is {:.2} in the median, {:.2} at most, and at most 3 in {narrow:.1} %.\n\
+        "{}\n\
+         From {MANY} jobs on, {low} of {} cells lie below {MIN_COVERAGE} %, the least at {:.1} %; the median is {:.1} %.\n\
+         The half-width is {:.2} in the median, {:.2} at most, and at most 3 in {narrow:.1} %.\n\
          With fewer jobs the median is {:.1} %, and the half-width {:.2} in the median, {:.2} at most.\n\n\
+         {}\n\
          ## Worst cells\n\n\
-         The first {WORST} below {MIN_COVERAGE} % from {MANY} jobs on or below {MIN_COVERAGE_OF_FEW} % from {FEW} on, then the widest of those\n\
-         wider than {MAX_WIDTH} from {MANY} on:\n\n{}\n\n\
-         ## By statistic\n\n{}\n\n\
-         ## By set, from {MANY} jobs on\n\n{}\n\n\
-         ## The back-bone\n\n\
-         Twelve sets with η from 2 to 2.2 and Δ = 0.6 µm in one bin, with two seeds in common of 15 slips; 100\n\
-         repetitions. The interval of the mean phase of all slips holds the true value in {slips:.1} %, that of the mean\n\
-         of the sets that have a phase in {means:.1} %.\n\n\
+         Sets with cells outside these limits, each statistic with its least coverage or greatest half-width.\n\
+         τ_r is 5 ms, and 50 ms without modulation.\n\n{worst}\n\n\
+         ## By statistic\n\n\
+         From {MANY} jobs on, cells below {MIN_COVERAGE} %, coverage and the greatest half-width; and coverage with fewer.\n\
+         `{NOT_LISTED}` has the coverage of `mean_friction`.\n\n{}\n\n\
+         ## Other sets, from {MANY} jobs on\n\n{others}\n\n\
+         ## The backbone\n\n\
+         Twelve sets with η from 2 to 2.2 and Δ = 0.6 µm fall into one bin. They have two seeds of 15 slips in common.\n\
+         In 100 repetitions the interval of the mean phase of all slips holds the true value in {slips:.1} %,\n\
+         that of the mean of the sets that have a phase in {means:.1} %.\n\n\
          ## Triggered slips\n\n\
-         Shares of slips that pulses trigger, for repetitions of some of 640 seeds, by the third of the cycle in which\n\
-         pulses begin:\n\n{}\n",
-        include_str!("coverage.md").trim_end(),
+         Shares of slips that pulses trigger, by the third of the cycle in which pulses begin, and coverage with {seeds}\n\
+         of 640 seeds. Shares that round to 0.000 are left out.\n\n{}\n\n\
+         {}",
+        include_str!("coverage.md"),
         many.count,
         many.coverage[0],
         many.coverage[1],
@@ -670,10 +704,10 @@ fn coverage_is_measured() {
         few.coverage[1],
         few.width[1],
         few.width[2],
-        worst(&all, &sets),
+        include_str!("coverage_findings.md"),
         by_statistic(&all, &statistics),
-        by_set(&all, &sets),
         of_pulses(&triggers),
+        include_str!("coverage_measured.md"),
     );
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     std::fs::write(docs.join("coverage.md"), text).unwrap();
