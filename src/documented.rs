@@ -168,11 +168,11 @@ const INTERVAL: &str = "lower end of its 95 % confidence interval";
 const TABLES: &str = "\
 # Tables
 
-For readers of the data: the columns of every file, in order.
-[results.md](results.md) has the files and how to read them; units and meanings are also in the metadata of each.
+The columns of every file, in order; [results.md](results.md) says how to read them.
+Units and meanings are also in the metadata of each file.
 Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.
-A `?` marks columns that may be null, and ± columns with a 95 % confidence interval in two columns more, whose names end
-in `_low` and `_high`.
+A `?` marks columns that may be null, and ± those with a 95 % confidence interval in two more columns, which end in
+`_low` and `_high`.
 
 ";
 

@@ -3,8 +3,8 @@
 use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
-    Beside, CustomFigure, Dots, Drawn, Limits, Look, Picture, PictureFormat, Size, Style, draw_all,
-    draw_custom, measured_trace, remarks, write_custom,
+    AxisLimits, Beside, CustomFigure, Dots, Drawn, Look, Picture, PictureFormat, Size, Style,
+    draw_all, draw_custom, measured_trace, remarks, write_custom,
 };
 use crate::measured::stretch;
 use crate::reduce::{SetRow, SlipOfSet, read_sets, renew, sample_of_slips};
@@ -244,10 +244,10 @@ struct CustomFlags {
     log: Option<String>,
     /// Ends of the x axis, in SI; either may be left out
     #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true)]
-    xlim: Option<Limits>,
+    xlim: Option<AxisLimits>,
     /// Ends of the y axis, in SI
     #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true)]
-    ylim: Option<Limits>,
+    ylim: Option<AxisLimits>,
     /// Label of the x axis [default: meaning, name and unit of the column]
     #[arg(long, value_name = "TEXT", requires = "x")]
     xlabel: Option<String>,
@@ -276,7 +276,7 @@ impl CustomFlags {
     }
 }
 
-fn limits(text: &str) -> Result<Limits, &'static str> {
+fn limits(text: &str) -> Result<AxisLimits, &'static str> {
     const WANTED: &str = "must be LOW:HIGH with finite numbers, such as 1e-6:1e-3, 0: or :5";
     let end = |text: &str| match text.trim() {
         "" => Ok(None),

@@ -1,7 +1,7 @@
 //! Directories in one figure: the dots of the first, and others as hollow marks; their names, and what differs between
 //! them.
 
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::style::{HOLLOW, Look};
 use super::{ADVICE, BadOption, check_text, common, read, sets_with_results};
 use crate::model::{Parameters, Symbol};
@@ -73,7 +73,7 @@ impl Beside {
         &self,
         first: Option<Mark>,
         has_marks: impl Fn(usize) -> bool,
-    ) -> Vec<Entry> {
+    ) -> Vec<LegendEntry> {
         let hollow = |other| has_marks(other).then_some(Mark::Hollow(other));
         let others = (0..self.others.len()).map(hollow);
         let marks = std::iter::once(first).chain(others);

@@ -4,7 +4,7 @@
 use super::axis::Axis;
 use super::frame::{Ends, LEFT, Layout};
 use super::hues::Hues;
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Quantity, belongs_to_all, distinct, shows_angle, without_value};
@@ -45,7 +45,7 @@ const ALONE: Dot = Dot::solid(GREY, SMALL_RADIUS);
 const HOLE: f64 = 1.6;
 
 /// The sets of a chart, if each has a dot, and of which directories they are.
-pub(super) struct Rows<'a> {
+pub(super) struct ChartRows<'a> {
     pub(super) sets: &'a [SetRow],
     /// The swept parameters of the first directory, by which its sets are joined and told apart.
     pub(super) swept: &'a [Values],
@@ -58,7 +58,7 @@ pub(super) struct Rows<'a> {
 pub(super) struct Chart<'a> {
     /// What has a dot each, in the plural.
     pub(super) of: &'static str,
-    pub(super) rows: Rows<'a>,
+    pub(super) rows: ChartRows<'a>,
     pub(super) x: Quantity<'a>,
     pub(super) ys: Vec<Quantity<'a>>,
     pub(super) colour: Option<Quantity<'a>>,
@@ -66,7 +66,7 @@ pub(super) struct Chart<'a> {
 }
 
 /// How the sets of a chart are drawn.
-struct Dots {
+struct Marks {
     x_axis: Axis,
     hues: Option<Hues>,
     radius: f64,
@@ -117,7 +117,7 @@ impl<'a> Chart<'a> {
         let axes = ys.iter().zip(&y_axes).chain([(x, &x_axis)]);
         let bars_cut = axes.map(cut).sum();
         let has_many = inside.len() > FEW_SETS;
-        let dots = Dots {
+        let dots = Marks {
             hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
             radius: if has_many { SMALL_RADIUS } else { RADIUS },
             lines: self.lines(&sets),
@@ -216,7 +216,7 @@ impl<'a> Chart<'a> {
         }
     }
 
-    fn ink(&self, dots: &Dots, set: usize) -> Ink {
+    fn ink(&self, dots: &Marks, set: usize) -> Ink {
         let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) else {
             // As in the legend.
             return self.other(set).map_or(INKS[0], |_| BLACK);
@@ -225,7 +225,7 @@ impl<'a> Chart<'a> {
     }
 
     /// Sets as dots, joined, with their intervals along both axes, over those without modulation and the drive's part.
-    fn layers(&self, y: &Quantity<'_>, dots: &Dots, members: &[usize]) -> Vec<Layer<'a>> {
+    fn layers(&self, y: &Quantity<'_>, dots: &Marks, members: &[usize]) -> Vec<Layer<'a>> {
         let level = |set: &usize| {
             let hues = dots.hues.as_ref();
             let ink = hues.map_or(GREY, |_| self.ink(dots, *set));
@@ -280,7 +280,7 @@ impl<'a> Chart<'a> {
     }
 
     /// Whether what the drive alone explains of a set is a dot, and not on a line.
-    fn is_dotted(&self, dots: &Dots, set: usize) -> bool {
+    fn is_dotted(&self, dots: &Marks, set: usize) -> bool {
         dots.lines.is_empty() || self.other(set).is_some()
     }
 
@@ -290,7 +290,13 @@ impl<'a> Chart<'a> {
     }
 
     /// Joins sets, those of one colour, and what the drive alone explains of them.
-    fn add_line(&self, layers: &mut Vec<Layer<'a>>, y: &Quantity<'_>, dots: &Dots, line: &[usize]) {
+    fn add_line(
+        &self,
+        layers: &mut Vec<Layer<'a>>,
+        y: &Quantity<'_>,
+        dots: &Marks,
+        line: &[usize],
+    ) {
         let Some(first) = line.first() else {
             return;
         };
@@ -308,7 +314,7 @@ impl<'a> Chart<'a> {
     }
 
     /// The intervals of a set along both axes.
-    fn add_bars(&self, layers: &mut Vec<Layer<'a>>, y: &Quantity<'_>, dots: &Dots, set: usize) {
+    fn add_bars(&self, layers: &mut Vec<Layer<'a>>, y: &Quantity<'_>, dots: &Marks, set: usize) {
         let Some((at_x, at_y)) = self.place(y, set) else {
             return;
         };
@@ -353,7 +359,7 @@ impl<'a> Chart<'a> {
 /// What the marks mean: the legend and the small print.
 impl Chart<'_> {
     /// The meaning of each mark that is drawn.
-    fn legend(&self, inside: &[usize], dots: &Dots) -> Vec<Entry> {
+    fn legend(&self, inside: &[usize], dots: &Marks) -> Vec<LegendEntry> {
         let mut entries = Vec::new();
         if let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) {
             let shown = [inside, &dots.free].concat();
@@ -534,7 +540,7 @@ mod tests {
             let sets: Vec<usize> = (0..rows.len()).collect();
             Chart {
                 of: "sets",
-                rows: Rows {
+                rows: ChartRows {
                     sets: rows,
                     swept: &swept,
                     beside: &Beside::default(),

@@ -1,7 +1,7 @@
 //! Custom figures: any column of the table of sets, or of slips, or a formula of columns, against any other.
 
-use super::chart::{Chart, Rows};
-use super::quantity::{Limits, Quantity};
+use super::chart::{Chart, ChartRows};
+use super::quantity::{AxisLimits, Quantity};
 use super::{BadOption, Look, Picture, check_text};
 use crate::model::Symbol;
 use crate::reduce::{Condition, Values};
@@ -36,8 +36,8 @@ pub struct CustomFigure {
     pub condition: Option<String>,
     /// The letters of the logarithmic axes; else those that were swept so, or whose values lie decades apart.
     pub log: Option<String>,
-    pub xlim: Limits,
-    pub ylim: Limits,
+    pub xlim: AxisLimits,
+    pub ylim: AxisLimits,
     pub xlabel: Option<String>,
     pub ylabel: Option<String>,
 }
@@ -73,7 +73,7 @@ impl CustomFigure {
 /// rows are `sets`, those that differ in one parameter of the x axis alone are joined; if they are slips, there are none.
 pub(super) fn custom<'a>(
     quantity: &dyn Fn(&'static str, &str) -> Result<Quantity<'a>>,
-    rows: Rows<'a>,
+    rows: ChartRows<'a>,
     figure: &'a CustomFigure,
     look: &Look,
 ) -> Result<Picture> {
@@ -107,7 +107,7 @@ pub(super) fn custom<'a>(
     let name = format!("{}-{}", y.name(), x.name()).replace(|letter| !is_plain(letter), "-");
     let chart = Chart {
         of: figure.of.word(),
-        rows: Rows {
+        rows: ChartRows {
             swept: if rows.sets.is_empty() { &[] } else { swept },
             ..rows
         },
@@ -164,7 +164,7 @@ pub(super) mod tests {
 
     fn drawn_of(rows: &[SetRow], figure: &CustomFigure, look: &Look) -> Result<Picture> {
         let quantity = |option, name: &str| Ok(Quantity::of(rows, option, name)?);
-        let rows = Rows {
+        let rows = ChartRows {
             sets: rows,
             swept: &swept(rows),
             beside: &Beside::default(),

@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::frame::{Ends, Layout};
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Anchor, Picture};
 use super::quantity::axis_of;
@@ -82,7 +82,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let x = Axis::linear(&x_label, low, high);
     let medians = STAGES.map(|(_, name, ink)| entry(Mark::Bar(Dot::solid(ink, 4.5)), name));
     let lines = entry(Mark::Line(GRID), "τ = nT");
-    let entries: Vec<Entry> = medians.into_iter().chain([lines]).collect();
+    let entries: Vec<LegendEntry> = medians.into_iter().chain([lines]).collect();
     // τ = nT is a curve in T, and level in Δ.
     let period = ramped().find_map(|point| point.period)?;
     let period_at = |at: f64| if is_period { at / x_factor } else { period };

@@ -2,7 +2,7 @@
 //! the small print under them.
 
 use super::axis::Axis;
-use super::legend::{self, Entry, draw_legend, legend_rows};
+use super::legend::{self, LegendEntry, draw_legend, legend_rows};
 use super::picture::{Anchor, Picture, snapped};
 use super::style::{
     AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Place, Style, TICK_TEXT, text_width,
@@ -84,7 +84,7 @@ impl Layout {
         self,
         name: &str,
         look: &Look,
-        legend: &[Entry],
+        legend: &[LegendEntry],
         natural_heights: &[f64],
     ) -> (Page, Picture) {
         let count = natural_heights.len();

@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::frame::{Frame, Layout, OVERLAP};
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer};
 use super::picture::{Anchor, Picture};
 use super::style::{
@@ -167,7 +167,7 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<HistogramPanel<'
         .collect()
 }
 
-fn legend(panels: &[HistogramPanel<'_>]) -> Vec<Entry> {
+fn legend(panels: &[HistogramPanel<'_>]) -> Vec<LegendEntry> {
     let has_overlay = panels.iter().any(|panel| panel.overlay.is_some());
     let overlay = has_overlay.then(|| entry(Mark::Line(OVERLAY), "identical contacts, Δfₛ = 0"));
     let multiples = panels.iter().any(|panel| panel.period.is_some());

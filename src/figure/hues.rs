@@ -3,7 +3,7 @@
 
 use super::axis::Axis;
 use super::frame::{Frame, OVERLAP, fitting, outline};
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::picture::{Anchor, Picture};
 use super::style::{AXIS, BLACK, Dot, INKS, Ink, LEGEND_TEXT, NOTE_TEXT, SCALE, TICK_TEXT, shade};
 use crate::reduce::{ascending, is_same};
@@ -59,7 +59,7 @@ impl Hues {
     }
 
     /// Entries of the legend, with dots of this radius, of values that are shown.
-    pub(super) fn entries(&self, radius: f64, is_shown: impl Fn(f64) -> bool) -> Vec<Entry> {
+    pub(super) fn entries(&self, radius: f64, is_shown: impl Fn(f64) -> bool) -> Vec<LegendEntry> {
         let Self::Inks(values) = self else {
             return Vec::new();
         };

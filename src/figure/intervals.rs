@@ -5,7 +5,7 @@ use super::axis::{Axis, logarithmic_bounds};
 use super::beside::Other;
 use super::frame::Layout;
 use super::hues::Hues;
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
@@ -78,7 +78,7 @@ pub(super) fn intervals(points: &[Point], beside: &Beside, look: &Look) -> Optio
         colour.setting(value / to_unit, digits)
     });
     let is_shown = |shown| phased.iter().any(|slip| is_same(value(slip.0), shown));
-    let mut entries: Vec<Entry> = hues.entries(3.0, is_shown);
+    let mut entries: Vec<LegendEntry> = hues.entries(3.0, is_shown);
     if hues.bar().is_some() {
         let dot = Dot::solid(hues.ink(f64::INFINITY), RADIUS);
         entries.push(entry(Mark::Dot(dot), "slips of sets with a phase"));

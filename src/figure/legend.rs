@@ -31,13 +31,13 @@ pub(super) enum Mark {
 }
 
 /// An entry of a legend: a mark and a text.
-pub(super) type Entry = (Mark, String);
+pub(super) type LegendEntry = (Mark, String);
 
-pub(super) fn entry(mark: Mark, text: impl Into<String>) -> Entry {
+pub(super) fn entry(mark: Mark, text: impl Into<String>) -> LegendEntry {
     (mark, text.into())
 }
 
-fn width((mark, text): &Entry) -> f64 {
+fn width((mark, text): &LegendEntry) -> f64 {
     mark_width(*mark) + GAP + text_width(text, LEGEND_TEXT)
 }
 
@@ -49,8 +49,8 @@ const fn mark_width(mark: Mark) -> f64 {
 }
 
 /// Entries in rows that fit a width.
-pub(super) fn legend_rows(entries: &[Entry], room: f64) -> Vec<Vec<&Entry>> {
-    let mut rows: Vec<Vec<&Entry>> = Vec::new();
+pub(super) fn legend_rows(entries: &[LegendEntry], room: f64) -> Vec<Vec<&LegendEntry>> {
+    let mut rows: Vec<Vec<&LegendEntry>> = Vec::new();
     let mut taken = 0.0;
     for entry in entries {
         let needed = width(entry) + ENTRY_GAP;
@@ -69,7 +69,7 @@ pub(super) fn legend_rows(entries: &[Entry], room: f64) -> Vec<Vec<&Entry>> {
 }
 
 /// Draws entries at the top of a sheet, between two edges.
-pub(super) fn draw_legend(sheet: &mut Picture, entries: &[Entry], left: f64, right: f64) {
+pub(super) fn draw_legend(sheet: &mut Picture, entries: &[LegendEntry], left: f64, right: f64) {
     for (row, entries) in legend_rows(entries, right - left).into_iter().enumerate() {
         let middle = TOP + (row as f64 + 0.5) * ROW;
         let mut start = left;
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn a_legend_takes_as_many_rows_as_it_needs() {
-        let entries: Vec<Entry> = ["short", "a longer text", "another"]
+        let entries: Vec<LegendEntry> = ["short", "a longer text", "another"]
             .map(|text| entry(Mark::Line(GRID), text))
             .to_vec();
         let rows = |room: f64| {

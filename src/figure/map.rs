@@ -4,10 +4,10 @@
 use super::axis::{Axis, bounds, is_wide};
 use super::frame::{Cell, Layout, OVERLAP};
 use super::hues::ColourBar;
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
-use super::quantity::{Grid, Quantity};
+use super::quantity::{CellGrid, Quantity};
 use super::style::{BLACK, Dot, Fill, Ink, Look, Place, Stroke, WHITE, cell_shade, diverging};
 use crate::model::Symbol;
 use crate::observe::Regime;
@@ -188,7 +188,7 @@ fn mark_periods(bar: &mut ColourBar, scale: &Axis, (first, last): (f64, f64)) {
         .collect();
 }
 
-fn legend(is_locking: bool, sets: &[SetRow]) -> Vec<Entry> {
+fn legend(is_locking: bool, sets: &[SetRow]) -> Vec<LegendEntry> {
     if is_locking {
         let free = Fill {
             ink: FREE,
@@ -215,8 +215,8 @@ fn legend(is_locking: bool, sets: &[SetRow]) -> Vec<Entry> {
 }
 
 struct Map {
-    columns: Grid,
-    rows: Grid,
+    columns: CellGrid,
+    rows: CellGrid,
     /// Those that lie on the grid, by their number.
     sets: Vec<(usize, Position)>,
 }
@@ -231,7 +231,7 @@ impl Map {
         let counts = [x, y].map(|asked| asked.column.distinct.len());
         let is_grid = counts.iter().all(|count| *count >= min_values)
             && 2 * sets.len() >= counts[0] * counts[1];
-        let grid = |asked: &Quantity<'_>| Grid::of(asked.distinct().collect());
+        let grid = |asked: &Quantity<'_>| CellGrid::of(asked.distinct().collect());
         is_grid.then(|| Self {
             columns: grid(x),
             rows: grid(y),

@@ -38,12 +38,12 @@ pub use beside::Beside;
 pub use custom::{CustomFigure, Dots};
 pub use drop_size::draw_drop_size;
 pub use picture::{Picture, PictureFormat};
-pub use quantity::Limits;
+pub use quantity::AxisLimits;
 pub use simulation::{measured_trace, simulation};
 pub use style::{INKS, Ink, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
-use self::chart::Rows;
+use self::chart::ChartRows;
 use self::quantity::{Quantity, distinct};
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
@@ -247,7 +247,7 @@ fn draw_sets(
             Ok(Quantity::of_values(option, mean))
         })
     };
-    let rows = Rows {
+    let rows = ChartRows {
         sets: &sets,
         swept: &swept,
         beside: &beside,
@@ -285,7 +285,7 @@ fn draw_slips(
             None => Ok(quantity),
         }
     };
-    let rows = Rows {
+    let rows = ChartRows {
         sets: &[],
         swept: &swept(sets),
         beside: &Beside::default(),

@@ -1,6 +1,6 @@
 //! The overview of a sweep: what was found of the sets, over what was swept.
 
-use super::chart::{Chart, MAX_COLUMNS, Rows};
+use super::chart::{Chart, ChartRows, MAX_COLUMNS};
 use super::quantity::{Quantity, belongs_to_all};
 use super::{Beside, Look, Picture};
 use crate::observe::Regime;
@@ -57,7 +57,7 @@ pub(super) fn overview(own: &[SetRow], beside: &Beside, look: &Look) -> Option<P
     let panels = panels.map(|place| swept[place].clone());
     Chart {
         of: "sets",
-        rows: Rows {
+        rows: ChartRows {
             sets: rows,
             swept: &swept,
             beside,

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::frame::{Cell, Ends, Frame, HEADING, Layout};
 use super::hues::{COLOUR_BAR, ColourBar};
-use super::legend::{Entry, Mark};
+use super::legend::{LegendEntry, Mark};
 use super::picture::Picture;
 use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, Look, Place, Stroke, WHITE, hollow};
 
@@ -157,11 +157,12 @@ pub(super) fn draw(
     name: &str,
     look: &Look,
     mut layout: Layout,
-    legend: &[Entry],
+    legend: &[LegendEntry],
     panels: Vec<Panel<'_>>,
 ) -> Picture {
-    let is_absent = |(mark, _): &Entry| matches!(mark, Mark::Absent);
-    let (absent, legend): (Vec<Entry>, Vec<Entry>) = legend.iter().cloned().partition(is_absent);
+    let is_absent = |(mark, _): &LegendEntry| matches!(mark, Mark::Absent);
+    let (absent, legend): (Vec<LegendEntry>, Vec<LegendEntry>) =
+        legend.iter().cloned().partition(is_absent);
     if panels.iter().any(|panel| panel.bar.is_some()) {
         layout.right = COLOUR_BAR;
     }

@@ -5,7 +5,7 @@ use super::axis::{Axis, angle_bounds, bounds};
 use super::beside::Other;
 use super::frame::{Cell, Ends, Layout, OVERLAP};
 use super::hues::ColourBar;
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::style::{
@@ -79,7 +79,7 @@ pub(super) fn phase_eta(
         (x.contains(1.0), Mark::Line(REFERENCE), "η = 1"),
     ];
     let shown = entries.into_iter().filter(|(is_shown, ..)| *is_shown);
-    let mut entries: Vec<Entry> = shown.map(|(_, mark, text)| entry(mark, text)).collect();
+    let mut entries: Vec<LegendEntry> = shown.map(|(_, mark, text)| entry(mark, text)).collect();
     let angles = of_others.iter().flatten().map(|mean| mean.1);
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1).chain(angles));
     let curve = |phase: fn(f64) -> Option<f64>| {

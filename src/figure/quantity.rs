@@ -19,7 +19,7 @@ const FEW_VALUES: usize = 8;
 const FAR_LONGER: f64 = 3.0;
 
 /// The ends of an axis, in SI.
-pub type Limits = (Option<f64>, Option<f64>);
+pub type AxisLimits = (Option<f64>, Option<f64>);
 
 pub(super) struct Quantity<'a> {
     /// The option that named it.
@@ -33,7 +33,7 @@ pub(super) struct Quantity<'a> {
     pub(super) factor: f64,
     pub(super) unit: Cow<'static, str>,
     pub(super) is_log: bool,
-    pub(super) limits: Limits,
+    pub(super) limits: AxisLimits,
     pub(super) label: Option<&'a str>,
 }
 
@@ -301,13 +301,13 @@ pub(super) fn axis_of(column: &str, values: impl Iterator<Item = f64>) -> (Strin
 }
 
 /// At least two values of a swept quantity, and how they are spaced.
-pub(super) struct Grid {
+pub(super) struct CellGrid {
     /// Ascending.
     values: Vec<f64>,
     is_linear: bool,
 }
 
-impl Grid {
+impl CellGrid {
     /// Linear if the steps are even, or a value is not > 0, or all are close, else logarithmic. `values` ascend.
     pub(super) fn of(values: Vec<f64>) -> Self {
         let is_linear = has_even_steps(&values) || !is_spread(&values);
@@ -445,7 +445,7 @@ pub(super) mod tests {
             vec![0.1, 0.2, 0.4, 3.0],
             vec![0.0, 1.0, 5.0],
         ] {
-            let grid = Grid::of(values.clone());
+            let grid = CellGrid::of(values.clone());
             for index in 0..values.len() {
                 let (low, high) = grid.cell(index);
                 assert!(low < values[index] && values[index] < high, "{values:?}");

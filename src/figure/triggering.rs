@@ -3,7 +3,7 @@
 
 use super::axis::{Axis, bounds, widened};
 use super::frame::{Ends, LEFT, Layout};
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
@@ -36,12 +36,12 @@ impl Mean {
     }
 }
 
-struct Series {
+struct DelayCurve {
     ink: Ink,
     means: Vec<Mean>,
 }
 
-impl Series {
+impl DelayCurve {
     fn values(&self) -> impl Iterator<Item = f64> + '_ {
         let bars = self.means.iter().filter_map(Mean::bar);
         let bars = bars.flat_map(|(_, (low, high))| [low, high]);
@@ -102,17 +102,19 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
                 })
             });
             let means = means.collect();
-            Series { ink, means }
+            DelayCurve { ink, means }
         });
         series.collect::<Vec<_>>()
     };
-    let responses: Vec<Vec<Series>> = amplitudes.iter().map(|&each| responses(each)).collect();
-    let (low, high) = widened(bounds(responses.iter().flatten().flat_map(Series::values))?);
+    let responses: Vec<Vec<DelayCurve>> = amplitudes.iter().map(|&each| responses(each)).collect();
+    let (low, high) = widened(bounds(
+        responses.iter().flatten().flat_map(DelayCurve::values),
+    )?);
     let advance = Axis::linear("Advance / ⟨τ⟩", low, high);
     let place = Axis::linear("Place in the cycle p", 0.0, 1.0);
     let amplitude = label(Symbol::Delta.key());
-    let panel = |(series, value): (Vec<Series>, &f64)| {
-        let layers = series.into_iter().flat_map(Series::layers);
+    let panel = |(series, value): (Vec<DelayCurve>, &f64)| {
+        let layers = series.into_iter().flat_map(DelayCurve::layers);
         let layers = [Layer::Level(0.0, REFERENCE)].into_iter().chain(layers);
         let mut panel = Panel::inside(HEIGHT, place.clone(), advance.clone(), layers);
         panel.heading = Some(amplitude.setting(*value, Digits::THREE));
@@ -132,13 +134,21 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
             })
         });
         let means = shares.collect();
-        Series { ink, means }
+        DelayCurve { ink, means }
     });
-    let shares: Vec<Series> = shares.collect();
-    let most = shares.iter().flat_map(Series::values).fold(0.0, f64::max);
+    let shares: Vec<DelayCurve> = shares.collect();
+    let most = shares
+        .iter()
+        .flat_map(DelayCurve::values)
+        .fold(0.0, f64::max);
     let x = Axis::of_data(&x_label, amplitudes.iter().map(|value| factor * value))?;
     let y = Axis::linear("Share of triggered slips", 0.0, 1.05 * most.max(0.01));
-    let mut last = Panel::inside(HEIGHT, x, y, shares.into_iter().flat_map(Series::layers));
+    let mut last = Panel::inside(
+        HEIGHT,
+        x,
+        y,
+        shares.into_iter().flat_map(DelayCurve::layers),
+    );
     last.heading = Some("within the pulse, later without it".to_owned());
     panels.push(last);
     let frequency = label("frequency");
@@ -147,7 +157,7 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
         entry(Mark::Bar(Dot::solid(ink, RADIUS)), text)
     });
     let drive = entry(Mark::Line(drive_alone(BLACK)), "by the drive alone");
-    let legend: Vec<Entry> = legend.chain([drive]).collect();
+    let legend: Vec<LegendEntry> = legend.chain([drive]).collect();
     let layout = Layout {
         columns: COLUMNS.min(panels.len()),
         column_gap: LEFT + GAP,
@@ -170,7 +180,7 @@ mod tests {
                 interval: None,
                 by_drive: 0.1,
             };
-            let series = Series {
+            let series = DelayCurve {
                 ink: INKS[0],
                 means: (0..amplitudes).map(mean).collect(),
             };

@@ -3,7 +3,7 @@
 
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Ends, Layout};
-use super::legend::{Entry, Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::distinct;
@@ -18,7 +18,7 @@ const HEIGHT: f64 = 340.0;
 const UNCERTAINTY: f64 = 1.0;
 
 /// The line of a method under a drive.
-struct Line<'a> {
+struct MethodLine<'a> {
     method: &'a str,
     drive: &'a str,
     ink: Ink,
@@ -28,7 +28,7 @@ struct Line<'a> {
     hole: f64,
 }
 
-impl<'a> Line<'a> {
+impl<'a> MethodLine<'a> {
     /// No two of twelve drives look the same.
     fn new(method: &'a str, ink: Ink, drive: &'a str, number: usize) -> Self {
         let radius = RADIUS * [1.0, 1.5, 2.0, 0.7][number / 3 % 4];
@@ -46,7 +46,7 @@ impl<'a> Line<'a> {
         point.method == self.method && point.drive == self.drive
     }
 
-    fn entry(&self) -> Entry {
+    fn entry(&self) -> LegendEntry {
         let mark = if self.hole > 0.0 {
             Mark::Ring(self.ink, WHITE, self.radius, self.hole)
         } else {
@@ -86,8 +86,8 @@ impl ErrorPanel {
     }
 
     /// A line on an axis of errors that begins at `least`: dots are joined unless errors are chance.
-    fn layer<'a>(&self, line: &Line<'_>, least: f64) -> Layer<'a> {
-        let Line { ink, dashes, .. } = *line;
+    fn layer<'a>(&self, line: &MethodLine<'_>, least: f64) -> Layer<'a> {
+        let MethodLine { ink, dashes, .. } = *line;
         let points = || self.usable().filter(|point| line.has(point));
         let places = || points().map(|point| (point.error, point.work)).collect();
         let mut layers = Vec::new();
@@ -123,11 +123,11 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
     let drives = distinct(all().map(|point| &*point.drive));
     let mut lines = Vec::new();
     for (&method, ink) in methods.iter().zip(INKS.into_iter().cycle()) {
-        let of_drive = |(number, &drive): (usize, &_)| Line::new(method, ink, drive, number);
+        let of_drive = |(number, &drive): (usize, &_)| MethodLine::new(method, ink, drive, number);
         lines.extend(drives.iter().enumerate().map(of_drive));
     }
     lines.retain(|line| all().any(|point| line.has(point)));
-    let mut legend: Vec<Entry> = lines.iter().map(Line::entry).collect();
+    let mut legend: Vec<LegendEntry> = lines.iter().map(MethodLine::entry).collect();
     if panels.iter().any(|panel| panel.by_chance.is_some()) {
         let text = "what chance alone gives in 95 of 100 cases";
         legend.push(entry(Mark::Patch(STRIPE), text));
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn twelve_drives_look_different() {
         let looks: Vec<(f64, f64)> = (0..12)
-            .map(|number| Line::new("", INKS[0], "", number))
+            .map(|number| MethodLine::new("", INKS[0], "", number))
             .map(|line| (line.radius, line.hole))
             .collect();
         assert!(

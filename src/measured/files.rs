@@ -21,6 +21,8 @@ use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::mpsc::sync_channel;
+use std::thread;
 
 /// A file as it is known again, but for its name: reads to the end, in pieces.
 fn identified(mut from: impl Read) -> io::Result<SourceFile> {
@@ -93,7 +95,7 @@ fn is_stream(path: &Path) -> bool {
 
 /// A table that can be read more than once.
 #[derive(Debug)]
-pub enum Table {
+pub enum SourceTable {
     File(File),
     /// Of a pipe.
     Bytes(Bytes),
@@ -105,22 +107,22 @@ pub enum Table {
 const PIECE: usize = 1 << 16;
 
 /// Opens a table, and says how its file is known again, but for its name; a pipe, which is gone, has no checksum.
-pub fn open(path: &Path) -> Result<(Table, SourceFile)> {
+pub fn open(path: &Path) -> Result<(SourceTable, SourceFile)> {
     if is_stream(path) {
         let mut bytes = Vec::new();
         File::open(path)?.read_to_end(&mut bytes)?;
-        return Ok((Table::Bytes(bytes.into()), SourceFile::default()));
+        return Ok((SourceTable::Bytes(bytes.into()), SourceFile::default()));
     }
     let file = open_regular(path)?;
     let file = file.context("is no file; save the table to one, or give it through /dev/stdin")?;
     let known = identified(file.get_read(0)?)?;
-    Ok((Table::File(file), known))
+    Ok((SourceTable::File(file), known))
 }
 
 /// Takes rows and forgets them.
 pub type Take<'a> = &'a mut dyn FnMut(&mut Rows) -> Result<()>;
 
-impl Table {
+impl SourceTable {
     /// Reads all rows.
     pub fn rows(&self, sources: &Sources, decimal_comma: bool) -> Result<Rows> {
         self.read(sources, decimal_comma, &mut |_| Ok(()))
@@ -172,11 +174,23 @@ fn read_parquet(
     let mut rows = Rows::new(&names_of(builder.schema()), sources)?;
     let mask = ProjectionMask::roots(builder.parquet_schema(), rows.places());
     let builder = builder.with_projection(mask).with_batch_size(PIECE);
-    for batch in builder.build()? {
-        rows.push_batch(&batch?)?;
-        take(&mut rows)?;
-    }
-    Ok(rows)
+    let batches = builder.build()?;
+    // One thread decodes while another takes what was decoded.
+    let (decoded, ready) = sync_channel(1);
+    thread::scope(|scope| {
+        // If the rows are refused, nobody takes the rest.
+        scope.spawn(move || {
+            batches
+                .map(|batch| decoded.send(batch))
+                .take_while(Result::is_ok)
+                .for_each(drop);
+        });
+        for batch in ready {
+            rows.push_batch(&batch?)?;
+            take(&mut rows)?;
+        }
+        Ok(rows)
+    })
 }
 
 fn read_stream(bytes: &[u8], sources: &Sources, take: Take<'_>) -> Result<Rows> {

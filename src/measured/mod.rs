@@ -18,7 +18,7 @@ mod trace;
 
 pub use files::{Compared, compare_files};
 pub use keys::{Given, Sources};
-pub use trace::{DropSizes, NoPlateau, Stretch, TraceRequest, stretch};
+pub use trace::{DropSizes, Excerpt, NoPlateau, TraceRequest, stretch};
 
 use crate::model::Symbol;
 use crate::model::theory::to_twelve_digits;
@@ -29,7 +29,7 @@ use crate::table::checksum::hexadecimal;
 use crate::table::shown::shown;
 use crate::table::value::Shortest;
 use anyhow::{Context, Result, bail};
-use files::Table;
+use files::SourceTable;
 use keys::Key;
 use rows::Rows;
 use series::{PARAMETERS, Series, series_of};
@@ -127,12 +127,12 @@ impl Experiment {
 
     /// Reads a table that a program has at hand, as a stream in Arrow's own format.
     pub fn read_stream(stream: Vec<u8>, request: &Request) -> Result<Self> {
-        let table = ("table".to_owned(), Table::Stream(stream));
+        let table = ("table".to_owned(), SourceTable::Stream(stream));
         Self::of_tables(&[table], &[], "measured", request)
     }
 
     fn of_tables(
-        tables: &[(String, Table)],
+        tables: &[(String, SourceTable)],
         files: &[SourceFile],
         name: &str,
         request: &Request,

@@ -12,7 +12,7 @@ use arrow_array::types::{
 };
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{DataType, TimeUnit};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt::Display;
 
 /// The rows of a table.
@@ -149,13 +149,16 @@ impl Rows {
         self.columns.iter().map(number).collect()
     }
 
-    /// Whether a row is of the run of that above it, with the same parameters.
-    pub fn is_as_above(&self, row: usize) -> bool {
-        let is_same =
-            |column: &KeyColumn| column.numbers[row].to_bits() == column.numbers[row - 1].to_bits();
+    /// The first row, and those of another run than that above them, or with other parameters; ascending.
+    pub fn begins(&self) -> BTreeSet<usize> {
         let can_vary =
             |column: &&KeyColumn| column.place.is_some() && column.given.key.is_parameter();
-        self.run(row) == self.run(row - 1) && self.columns.iter().filter(can_vary).all(is_same)
+        let columns = self.columns.iter().filter(can_vary);
+        let columns = columns.map(|column| &*column.numbers);
+        let of_numbers = columns.flat_map(|numbers| changes(numbers, |number| number.to_bits()));
+        let of_runs = changes(&self.runs, |run| *run);
+        let first = (0..self.count).take(1);
+        first.chain(of_runs).chain(of_numbers).collect()
     }
 
     pub fn run_name(&self, row: usize) -> Option<String> {
@@ -306,6 +309,13 @@ impl Rows {
         }
         Ok(())
     }
+}
+
+/// Places of values that differ from those before them.
+fn changes<V, K: PartialEq>(values: &[V], key: impl Fn(&V) -> K) -> impl Iterator<Item = usize> {
+    let pairs = values.windows(2).enumerate();
+    let changed = pairs.filter(move |(_, pair)| key(&pair[0]) != key(&pair[1]));
+    changed.map(|(before, _)| before + 1)
 }
 
 /// Whether a text says that there is no value: empty, or as pandas, R and people write it.

@@ -80,9 +80,10 @@ pub fn series_of(rows: &Rows) -> Result<Vec<Series>> {
     let ends = rows.of(Key::End);
     let mut all: Vec<Series> = Vec::new();
     let mut seen = HashSet::new();
+    let begins = rows.begins();
     for row in 0..rows.count {
         let in_row = || rows.place(row);
-        if row == 0 || !rows.is_as_above(row) {
+        if begins.contains(&row) {
             let run = rows.run(row);
             let parameters = parameters(rows, row).with_context(in_row)?;
             let is_of_last =

@@ -5,12 +5,12 @@
 //! sizes. A row that is not understood is refused with its place.
 
 use super::Request;
-use super::files::{Compared, Table, compare_files, open};
+use super::files::{Compared, SourceTable, compare_files, open};
 use super::keys::{Given, Key, PURE, Sources, factor};
 use super::rows::{Rows, RunOfSlips};
 use super::series::parameters;
 use crate::model::{Drive, Parameters};
-use crate::observe::{Count, Counts, Finder, Loading, Pass, Samples, Survey};
+use crate::observe::{Count, Counts, Finder, Pass, Samples, Survey, TraceDrive};
 use crate::sweep::Measured;
 use crate::table::value::{Shortest, floored};
 use anyhow::{Context as _, Result, bail, ensure};
@@ -215,9 +215,13 @@ impl Force {
 }
 
 /// Finds the slips of tables, each with its name.
-pub fn find(tables: &[(String, Table)], request: &Request, trace: &TraceRequest) -> Result<Traced> {
+pub fn find(
+    tables: &[(String, SourceTable)],
+    request: &Request,
+    trace: &TraceRequest,
+) -> Result<Traced> {
     let force = Force::of(&request.sources);
-    let reader = Reader {
+    let reader = TraceReader {
         tables,
         request,
         smooth: trace.smooth,
@@ -243,12 +247,16 @@ pub fn find(tables: &[(String, Table)], request: &Request, trace: &TraceRequest)
         plateau,
         read.iter().flat_map(|(runs, _)| runs),
     );
-    let runs = read.iter().flat_map(|(runs, _)| runs);
-    let times = runs.map(|run| [run.first, run.last]);
-    let times = times.reduce(|all, own| [all[0].min(own[0]), all[1].max(own[1])]);
+    let all_runs = || read.iter().flat_map(|(runs, _)| runs);
     let columns = vec![
-        (request.sources.given(Key::Time)?, times.unwrap_or_default()),
-        (request.sources.given(force.key)?, [survey.low, survey.high]),
+        (
+            request.sources.given(Key::Time)?,
+            range(all_runs().map(|run| [run.first, run.last])),
+        ),
+        (
+            request.sources.given(force.key)?,
+            range(all_runs().map(|run| run.forces)),
+        ),
     ];
     let mut slips = finder.runs.into_iter();
     let rows = read.into_iter().map(|(runs, samples)| {
@@ -282,7 +290,7 @@ pub fn find(tables: &[(String, Table)], request: &Request, trace: &TraceRequest)
 
 /// A part of a trace, read again from its file.
 #[derive(Debug)]
-pub struct Stretch {
+pub struct Excerpt {
     /// Times in s and forces in N.
     pub samples: Vec<(f64, f64)>,
     /// Whether a maximum of the modulation was given: it is not at time 0.
@@ -290,7 +298,7 @@ pub struct Stretch {
 }
 
 /// A stretch of the trace that slips came from.
-pub fn stretch(measured: &Measured, range: RangeInclusive<f64>) -> Result<Stretch> {
+pub fn stretch(measured: &Measured, range: RangeInclusive<f64>) -> Result<Excerpt> {
     let Some([columns, settings]) = &measured.trace else {
         bail!("--from, --until: the slips did not come from a trace with one run");
     };
@@ -306,7 +314,7 @@ pub fn stretch(measured: &Measured, range: RangeInclusive<f64>) -> Result<Stretc
         force.unit == Key::Force.unit(),
         "--from, --until: the trace is of no force"
     );
-    let mut found = Stretch {
+    let mut found = Excerpt {
         samples: Vec::new(),
         has_maximum: sources.has(Key::Maximum),
     };
@@ -339,14 +347,14 @@ fn sizes(size: Option<f64>, noise: f64, range: f64) -> Result<impl Iterator<Item
     Ok((0..=steps).map(move |step| low * (high / low).powf(step as f64 / steps as f64)))
 }
 
-struct Reader<'a> {
-    tables: &'a [(String, Table)],
+struct TraceReader<'a> {
+    tables: &'a [(String, SourceTable)],
     request: &'a Request,
     smooth: usize,
     force: Force,
 }
 
-impl Reader<'_> {
+impl TraceReader<'_> {
     /// The number of slips for many drop sizes, the plateau of that which is asked for, or the widest, and the size.
     fn choose(&self, size: Option<f64>, survey: &Survey) -> Result<(DropSizes, [f64; 2], f64)> {
         let noise = survey.noise();
@@ -384,7 +392,7 @@ impl Reader<'_> {
                 stiffness,
                 begun: Vec::new(),
                 loading: None,
-                mean: Mean::default(),
+                mean: Smoothing::default(),
             };
             let Request {
                 sources,
@@ -412,6 +420,8 @@ struct Run {
     values: Vec<f64>,
     first: f64,
     last: f64,
+    /// Least and largest, as they were read.
+    forces: [f64; 2],
     samples: u64,
     period: Option<f64>,
     /// As it was given.
@@ -420,7 +430,7 @@ struct Run {
 
 /// The samples of which one is made.
 #[derive(Debug, Default)]
-struct Mean {
+struct Smoothing {
     count: usize,
     time: f64,
     force: f64,
@@ -428,13 +438,13 @@ struct Mean {
 
 /// The runs of a table, as they are read.
 struct Runs<'a> {
-    reader: &'a Reader<'a>,
+    reader: &'a TraceReader<'a>,
     pass: &'a mut dyn Pass,
     /// Where none is given.
     stiffness: f64,
     begun: Vec<Run>,
-    loading: Option<Loading>,
-    mean: Mean,
+    loading: Option<TraceDrive>,
+    mean: Smoothing,
 }
 
 impl Runs<'_> {
@@ -442,30 +452,25 @@ impl Runs<'_> {
     fn take(&mut self, rows: &Rows) -> Result<()> {
         let of = |key| rows.of(key).unwrap_or_default();
         let times = of(Key::Time);
-        let forces = of(self.reader.force.key);
-        let mut begin = 0;
-        for row in 0..rows.count {
-            let in_row = || rows.place(row);
-            let is_of_run = if row > 0 {
-                rows.is_as_above(row)
-            } else {
-                self.begun.last().is_some_and(|run| {
-                    run.name == rows.run_name(0) && is_same(&run.values, &rows.values(0))
-                })
+        let force = self.reader.force.key;
+        let forces = of(force);
+        let begins = rows.begins();
+        let ends = begins.iter().copied().skip(1).chain([rows.count]);
+        for (&begin, end) in begins.iter().zip(ends) {
+            let is_of_last = |last: &Run| {
+                last.name == rows.run_name(0) && is_same(&last.values, &rows.values(0))
             };
-            if !is_of_run {
-                self.push(&times[begin..row], &forces[begin..row]);
-                begin = row;
-                self.begin(rows, row).with_context(in_row)?;
+            if begin > 0 || !self.begun.last().is_some_and(is_of_last) {
+                self.begin(rows, begin).with_context(|| rows.place(begin))?;
             }
-            let word = self.reader.force.key.word();
-            ensure!(!times[row].is_nan(), "{}: time is missing", in_row());
-            ensure!(!forces[row].is_nan(), "{}: {word} is missing", in_row());
             if let Some(run) = self.begun.last_mut() {
-                run.follow(times[row]).with_context(in_row)?;
+                for row in begin..end {
+                    let followed = run.follow(times[row], forces[row], force);
+                    followed.with_context(|| rows.place(row))?;
+                }
             }
+            self.push(&times[begin..end], &forces[begin..end]);
         }
-        self.push(&times[begin..], &forces[begin..]);
         Ok(())
     }
 
@@ -492,12 +497,12 @@ impl Runs<'_> {
         };
         let maximum = rows.of(Key::Maximum).map_or(0.0, |maxima| maxima[row]);
         let maximum = if maximum.is_nan() { 0.0 } else { maximum };
-        let loading = Loading {
+        let loading = TraceDrive {
             drive: Drive::new(&parameters),
             maximum,
         };
         self.loading = Some(loading);
-        self.mean = Mean::default();
+        self.mean = Smoothing::default();
         self.pass.begin(loading);
         let first = rows.of(Key::Time).map_or(f64::NAN, |times| times[row]);
         self.begun.push(Run {
@@ -505,6 +510,7 @@ impl Runs<'_> {
             values: rows.values(row),
             first,
             last: f64::NEG_INFINITY,
+            forces: [f64::INFINITY, f64::NEG_INFINITY],
             samples: 0,
             period,
             stiffness,
@@ -531,7 +537,7 @@ impl Runs<'_> {
             if self.mean.count == smooth {
                 mean_times.push(self.mean.time / smooth as f64);
                 mean_forces.push(self.mean.force / smooth as f64);
-                self.mean = Mean::default();
+                self.mean = Smoothing::default();
             }
         }
         self.pass_on(&mean_times, &mean_forces);
@@ -545,25 +551,35 @@ impl Runs<'_> {
 }
 
 impl Run {
-    /// Refuses a time that does not follow the one before it, or only after a gap.
-    fn follow(&mut self, time: f64) -> Result<()> {
+    /// Takes a sample: its time must follow the one before it, and not after a gap.
+    fn follow(&mut self, time: f64, force: f64, key: Key) -> Result<()> {
         const BEGIN: &str = "where runs begin, a column must say so: --column run=NAME";
+        ensure!(!time.is_nan(), "time is missing");
+        ensure!(!force.is_nan(), "{} is missing", key.word());
         let before = self.last;
         ensure!(
             time > before,
             "time {time} s is not after {before} s above it; {BEGIN}"
         );
-        let mean = (before - self.first) / (self.samples.max(2) - 1) as f64;
-        let is_gap = self.samples > 1 && time - before > GAP * mean;
+        let steps = (self.samples.max(2) - 1) as f64;
+        let seconds = before - self.first;
+        let is_gap = self.samples > 1 && (time - before) * steps > GAP * seconds;
         ensure!(
             !is_gap,
             "time {time} s comes after {before} s, a gap for steps of {} s; {BEGIN}",
-            short(mean)
+            short(seconds / steps)
         );
         self.samples += 1;
         self.last = time;
+        self.forces = [self.forces[0].min(force), self.forces[1].max(force)];
         Ok(())
     }
+}
+
+/// Of all numbers in these ranges.
+fn range(all: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
+    all.reduce(|all, own| [all[0].min(own[0]), all[1].max(own[1])])
+        .unwrap_or_default()
 }
 
 /// To the bit.

@@ -53,19 +53,19 @@ words! {
 columns! {
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct EdgeRow {
-        set_id: String = "", "set at bracket_low, of which the parameters are";
+        set_id: String = "", "set at bracket_low, whose parameters follow";
         parameters: Selected<AllButSeed>;
-        axis: String = "", "the refined axis; its values follow in the unit of that parameter";
+        axis: String = "", "the refined axis, whose unit its values have";
         statistic: String = "", "what crosses the threshold, such as `resultant_length`, or `periods = 4`: the share of intervals nearest 4 T";
-        threshold: f64 = "", "the threshold, in the unit of the statistic";
-        edge: Option<f64> = "", "where it is crossed; null if it is not";
+        threshold: f64 = "", "in the unit of the statistic";
+        edge: Option<f64> = "", "where it is crossed, if it is";
         edge_interval as "edge": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        rises: Option<bool> = "", "whether the statistic is above the threshold above the edge";
-        jobs: u64 = "", "jobs of the sets that say where the edge is, or of those that are unclear; of all of the row if nothing crosses";
-        bracket_low: f64 = "", "the nearest value that is clearly on one side, or the end of the row";
-        bracket_high: f64 = "", "the nearest above it that is clearly on the other side, or on the same if `ended` is `unclear`, or the end of the row";
+        rises: Option<bool> = "", "whether the statistic is higher above the edge";
+        jobs: u64 = "", "jobs of the sets that place the edge or are unclear; of the whole row if nothing crosses";
+        bracket_low: f64 = "", "nearest value that is clearly on one side, or the end of the row";
+        bracket_high: f64 = "", "nearest value above it that is clearly on the other side (the same if `ended` is `unclear`), or the end of the row";
         ended: Ended = "",
-            "`width`: the interval is as narrow as is wanted; `seeds`: its sets have the most; `jobs`: no more may run; `open`: the rounds go on; `unclear end`: with all seeds or jobs, the interval of the set at an end of the row still has the threshold within it, so it may be crossed there or beyond; `unclear`: the same of a set between two on the same side; `no value`: no set of the row has one, as where too few of its slips say a phase; `no crossing`: all that have one are clearly on one side";
+            "`width`: the interval is narrow enough; `seeds`: its sets have the most seeds; `jobs`: no more may run; `open`: the rounds go on; `unclear end`: with all seeds or jobs, the interval of the set at an end of the row still holds the threshold; `unclear`: the same of a set between two on one side; `no value`: no set has a value; `no crossing`: all values are clearly on one side";
     }
 }
 

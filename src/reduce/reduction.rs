@@ -181,7 +181,7 @@ columns! {
         last_round: Option<u64> = "", "round that gave it its last seeds";
         seeds: Option<u64> = "", "seeds that the rounds have given it";
         target_met: Option<bool> = "",
-            "whether all statistics that are to be precise are so; null without any value of them";
+            "whether every statistic with a target meets it; null without any value";
     }
 }
 

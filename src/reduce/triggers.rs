@@ -40,19 +40,19 @@ columns! {
     /// A job with a pulse, beside its control.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct TriggerRow {
-        set_id: String = "", "hash of all that defines the job but the seed";
+        set_id: String = "", "hash of all that defines a job but the seed";
         parameters: Selected<All>;
-        tau_control: Option<f64> = "s", "mean interval of the control";
+        tau_control: Option<f64> = "s", "mean interval of the control; null without a control";
         cycle: Option<f64> = "s", "interval of the control in which the pulse begins";
-        place: Option<f64> = "", "share of it that is over then";
-        advance: Option<f64> = "s", "how much earlier the next slip comes, by its onset";
+        place: Option<f64> = "", "elapsed share of it at that time";
+        advance: Option<f64> = "s", "how much earlier the onset of the next slip comes";
         advance_drive: Option<f64> = "s", "the same by the drive alone";
-        next_advance: Option<f64> = "s", "how much earlier the one after it comes";
+        next_advance: Option<f64> = "s", "the same of the slip after it";
         triggered: Option<bool> = "", "whether the next onset comes by the end of the pulse, and without it after";
         triggered_drive: Option<bool> = "", "the same by the drive alone";
         noise: Option<f64> = "s", "largest advance, of either sign, by pulses up to 1e-12 m of the same slider and drive";
         excluded: Option<Excluded> = "",
-            "why these are null: `no control`, or the pulse begins `before the first slip`, `within a slip` or `after the last slip`";
+            "why these are null: `no control`, or a pulse that begins `before the first slip`, `within a slip` or `after the last slip`";
     }
 }
 
@@ -64,18 +64,18 @@ columns! {
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct PulseRow {
         parameters: Selected<AllButSeed>;
-        place_low: f64 = "", "share of the cycle at which the first of them may begin";
-        place_high: f64 = "", "share of it before which they begin; 0 and 1 are the whole cycle";
+        place_low: f64 = "", "elapsed share of the cycle from which on they begin";
+        place_high: f64 = "", "the share before which they begin; 0 and 1: the whole cycle";
         jobs: u64 = "", "jobs with such a pulse and a slip to compare";
         advance_mean: Option<f64> = "", "mean advance over the mean interval of the control";
         advance_interval as "advance_mean": Option<Interval> = "", "lower end of its 95 % confidence interval; null with fewer than 8 seeds";
         advance_drive: Option<f64> = "", "the same by the drive alone";
-        advance_excess: Option<f64> = "", "the mean advance less that by the drive alone";
+        advance_excess: Option<f64> = "", "advance_mean less advance_drive";
         advance_excess_interval as "advance_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         triggered_share: f64 = "", "share of slips that the pulse triggers";
         triggered_interval as "triggered_share": Option<Interval> = "", "lower end of its 95 % confidence interval; null with fewer than 8 seeds";
         triggered_drive: f64 = "", "the same by the drive alone";
-        triggered_excess: f64 = "", "the share less that by the drive alone";
+        triggered_excess: f64 = "", "triggered_share less triggered_drive";
         triggered_excess_interval as "triggered_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
     }
 }

@@ -296,3 +296,80 @@ fn a_stretch_of_a_trace_is_drawn_from_its_file_as_long_as_that_is_the_same() {
     folder.ends(0, &format!("measured slips.csv -o slips {UNMODULATED}"));
     assert!(problem("plot slips --until 3").contains("did not come from a trace"));
 }
+
+#[test]
+fn a_displacement_is_the_force_over_the_stiffness() {
+    let folder = Folder::new();
+    let samples = sawtooth(3000);
+    folder.write("force.csv", &csv(&samples));
+    let mut text = "t,x\n".to_owned();
+    for (time, force) in &samples {
+        // The slider lags the drive of 100 µm/s by the force over 10 N/µm.
+        writeln!(text, "{time},{}", 100.0 * time - 0.1 * force).unwrap();
+    }
+    folder.write("displacement.csv", &text);
+    let drive = "--set V0=1e-4 --set Delta=1e-9 --set frequency=10";
+    folder.ends(
+        0,
+        &format!("measured force.csv -o force {drive} --set Kd=1e7 --drop-size 30"),
+    );
+    let columns = "--column time=t:s --column displacement=x:um";
+    let found = folder.ends(
+        0,
+        &format!("measured displacement.csv -o displacement {drive} {columns} --drop-size 3:um"),
+    );
+    for expected in ["to 2.89", "3e-6 m, on a plateau"] {
+        assert!(found.stdout.contains(expected), "{}", found.stdout);
+    }
+    let [force, displacement] =
+        ["force", "displacement"].map(|name| folder.table(name, "slips").reals("onset"));
+    assert_eq!(force.len(), 29);
+    assert_eq!(displacement, force);
+    let refused = format!("measured displacement.csv -o out {drive} {columns} --drop-size 3:mN");
+    assert!(
+        folder
+            .ends(2, &refused)
+            .stderr
+            .contains("its unit must be m")
+    );
+}
+
+#[test]
+fn the_mean_of_some_samples_makes_a_plateau_of_a_noisy_trace() {
+    let folder = Folder::new();
+    let mut state = 1;
+    let noisy = sawtooth(30_000).into_iter();
+    let noisy: Vec<(f64, f64)> = noisy
+        .map(|(time, force)| (time, force + 8.0 * gaussian(&mut state)))
+        .collect();
+    folder.write("trace.csv", &csv(&noisy));
+    let command = format!("measured trace.csv -o out {UNMODULATED} --drop-size 50");
+    let refused = folder.ends(2, &command).stderr;
+    assert!(refused.contains("--smooth by some samples"), "{refused}");
+    let said = folder.ends(0, &format!("{command} --smooth 8")).stdout;
+    assert!(said.contains("3750, every 0.008 s"), "{said}");
+    assert_eq!(folder.table("out", "slips").reals("onset").len(), 299);
+}
+
+#[test]
+fn an_overshoot_and_a_slip_in_two_parts_are_one_slip_each() {
+    let folder = Folder::new();
+    let mut samples = sawtooth(3000);
+    for slip in 1..29 {
+        let fall = 100 * slip;
+        // The force falls below the level that it then takes, or halts within the fall and rises a little.
+        samples[fall].1 -= if slip % 2 == 0 { 25.0 } else { -50.0 };
+        samples[fall + 1].1 += if slip % 2 == 0 { 0.0 } else { 55.0 };
+    }
+    folder.write("trace.csv", &csv(&samples));
+    folder.ends(
+        0,
+        &format!("measured trace.csv -o out {UNMODULATED} --drop-size 35"),
+    );
+    let onsets = folder.table("out", "slips").reals("onset");
+    assert_eq!(onsets.len(), 29);
+    for (slip, onset) in onsets.iter().enumerate() {
+        let expected = 0.1 * (slip + 1) as f64 - 1e-3;
+        assert!((onset - expected).abs() < 1e-9, "{slip}: {onset}");
+    }
+}

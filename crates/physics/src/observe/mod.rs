@@ -18,6 +18,6 @@ pub use recording::{Recording, RecordingKey};
 pub use records::{
     AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow,
 };
-pub use sampled::{Count, Counts, Finder, Loading, Pass, SampledSlip, Samples, Survey};
+pub use sampled::{Count, Counts, Finder, Pass, SampledSlip, Samples, Survey, TraceDrive};
 pub use slip::{Energies, Modulation, OVERSHOOT, Precursor, Slip, phase};
 pub use slip_observer::SlipObserver;

@@ -113,7 +113,7 @@ columns! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MapRow {
         time: f64 = "s", "time";
-        block: u64 = "", "block, counted from 1 at the trailing edge";
+        block: u64 = "", "from 1 at the trailing edge";
         attached_fraction: f64 = "", "attached contacts over the contacts of the block";
     }
 }
@@ -165,7 +165,7 @@ columns! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ProfileRow {
         time: f64 = "s", "time of the end";
-        block: u64 = "", "block, counted from 1 at the trailing edge";
+        block: u64 = "", "from 1 at the trailing edge";
         position: f64 = "m", "position j L/N of the block";
         displacement: f64 = "m", "displacement of the block since the start";
     }
@@ -205,8 +205,8 @@ columns! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ContactRow {
         time: f64 = "s", "time of the event";
-        block: u64 = "", "block, counted from 1 at the trailing edge";
-        contact: u64 = "", "contact within its block, counted from 1";
+        block: u64 = "", "from 1 at the trailing edge";
+        contact: u64 = "", "number within its block, from 1";
         generation: u64 = "", "life of the contact, 0 is the initial attachment";
         change as "event": Change = "", "attach or break";
         displacement: f64 = "m", "displacement of the block";

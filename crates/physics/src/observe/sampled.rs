@@ -65,13 +65,13 @@ impl Default for Histogram {
 
 /// The drive of a trace.
 #[derive(Clone, Copy, Debug)]
-pub struct Loading {
+pub struct TraceDrive {
     pub drive: Drive,
     /// A time at which the modulation has a maximum, in s.
     pub maximum: f64,
 }
 
-impl Loading {
+impl TraceDrive {
     /// The displacement of the driven end at a time, in m.
     pub fn driven(&self, time: f64) -> f64 {
         self.drive.motion(time - self.maximum).0
@@ -119,7 +119,7 @@ pub struct Samples<'a> {
 /// What goes over the runs of a trace, piece by piece.
 pub trait Pass {
     /// The next run begins.
-    fn begin(&mut self, loading: Loading);
+    fn begin(&mut self, loading: TraceDrive);
     /// The next samples, at least one.
     fn push(&mut self, samples: Samples<'_>);
     /// The run has ended: a fall under way counts as far as it went.
@@ -129,7 +129,7 @@ pub trait Pass {
 /// The noise of a trace and the stiffness of its loading.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
-    loading: Option<Loading>,
+    loading: Option<TraceDrive>,
     noise: Histogram,
     stiffness: [Histogram; 3],
     pub low: f64,
@@ -138,6 +138,7 @@ pub struct Survey {
     pub seconds: f64,
     /// The last samples of the piece before.
     times: Vec<f64>,
+    driven: Vec<f64>,
     forces: Vec<f64>,
     /// Equal samples in succession: now, and at most at the largest force and at others.
     equal: u64,
@@ -205,12 +206,13 @@ impl Survey {
 }
 
 impl Pass for Survey {
-    fn begin(&mut self, loading: Loading) {
+    fn begin(&mut self, loading: TraceDrive) {
         if self.samples == 0 {
             [self.low, self.high] = [f64::INFINITY, f64::NEG_INFINITY];
         }
         self.loading = Some(loading);
         self.times.clear();
+        self.driven.clear();
         self.forces.clear();
     }
 
@@ -218,6 +220,8 @@ impl Pass for Survey {
         let Some(loading) = self.loading else { return };
         let known = self.times.len();
         self.times.extend(samples.times);
+        let driven = samples.times.iter().map(|time| loading.driven(*time));
+        self.driven.extend(driven);
         self.count_equal(samples.forces);
         self.samples += samples.times.len() as u64;
         let times = &self.times;
@@ -235,14 +239,16 @@ impl Pass for Survey {
             let even = loading.drive.velocity * step * length as f64;
             for end in (known.max(length)..=last).step_by(length) {
                 let begin = end - length;
-                let driven = loading.driven(times[end]) - loading.driven(times[begin]);
+                let driven = self.driven[end] - self.driven[begin];
                 if driven >= 0.999 * even {
                     slopes.push((forces[end] - forces[begin]) / driven);
                 }
             }
         }
-        self.times.drain(..last.saturating_sub(LONGEST_SLOPE));
-        self.forces.drain(..last.saturating_sub(LONGEST_SLOPE));
+        let old = last.saturating_sub(LONGEST_SLOPE);
+        self.times.drain(..old);
+        self.driven.drain(..old);
+        self.forces.drain(..old);
     }
 }
 
@@ -274,7 +280,7 @@ impl Count {
 /// How many slips there are for each of many drop sizes.
 #[derive(Clone, Debug)]
 pub struct Counts {
-    loading: Option<Loading>,
+    loading: Option<TraceDrive>,
     /// Rising.
     pub of_sizes: Vec<Count>,
 }
@@ -329,7 +335,7 @@ impl Count {
 }
 
 impl Pass for Counts {
-    fn begin(&mut self, loading: Loading) {
+    fn begin(&mut self, loading: TraceDrive) {
         self.loading = Some(loading);
     }
 
@@ -372,7 +378,7 @@ pub struct SampledSlip {
 pub struct Finder {
     least: f64,
     noise: f64,
-    loading: Option<Loading>,
+    loading: Option<TraceDrive>,
     zigzag: Option<Zigzag>,
     /// When the fall before was at its least.
     before: f64,
@@ -397,7 +403,7 @@ impl Finder {
     }
 
     /// Adds a fall that a rise has ended at a time, if it is a slip.
-    fn add(&mut self, fall: Fall, ended: f64, loading: &Loading) {
+    fn add(&mut self, fall: Fall, ended: f64, loading: &TraceDrive) {
         let before = std::mem::replace(&mut self.before, fall.bottom.time);
         if fall.size(loading.drive.stiffness) < self.least {
             return;
@@ -467,7 +473,7 @@ impl Finder {
 }
 
 impl Pass for Finder {
-    fn begin(&mut self, loading: Loading) {
+    fn begin(&mut self, loading: TraceDrive) {
         self.loading = Some(loading);
         self.times.clear();
         self.forces.clear();
@@ -517,7 +523,7 @@ mod tests {
     const STIFFNESS: f64 = 1e7;
 
     /// A drive that loads by 1 N a millisecond, and swings by this many newtons with a period of 20 ms.
-    fn loading(swing: f64) -> Loading {
+    fn loading(swing: f64) -> TraceDrive {
         let drive = Drive::new(&Parameters {
             drive_velocity: 1e-4,
             drive_stiffness: STIFFNESS,
@@ -525,7 +531,7 @@ mod tests {
             modulation_period: (swing > 0.0).then_some(0.02),
             ..Parameters::default()
         });
-        Loading {
+        TraceDrive {
             drive,
             maximum: 0.0,
         }

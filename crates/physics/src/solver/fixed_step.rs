@@ -105,7 +105,7 @@ pub(super) fn check(time_step: f64, parameters: &Parameters) -> Result<(), Simul
 
 /// A run with a stable time step, in s; see [`super::simulate`]. The method of a struct is compiled for the features of
 /// the processor; a closure is not, and takes 1.2 times as long.
-pub(super) struct Run<'a> {
+pub(super) struct FixedStepRun<'a> {
     pub parameters: &'a Parameters,
     pub time_step: f64,
     pub limits: Limits<'a>,
@@ -113,7 +113,7 @@ pub(super) struct Run<'a> {
     pub audit: Option<&'a Audit>,
 }
 
-impl WithSimd for Run<'_> {
+impl WithSimd for FixedStepRun<'_> {
     type Output = Result<Summary, SimulationError>;
 
     #[inline(always)]
@@ -329,7 +329,7 @@ mod tests {
                 };
                 let mut reported = Reported::default();
                 let audited = ledger::audited(&parameters, &mut reported, |observer, audit| {
-                    features.dispatch(Run {
+                    features.dispatch(FixedStepRun {
                         parameters: &parameters,
                         time_step: 2e-6,
                         limits,

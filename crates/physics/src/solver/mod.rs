@@ -209,7 +209,7 @@ fn run(
     solver.check(parameters)?;
     match solver.method {
         Method::EventDriven => event_driven::run(solver, parameters, limits, observer, audit),
-        Method::FixedStep => Arch::new().dispatch(fixed_step::Run {
+        Method::FixedStep => Arch::new().dispatch(fixed_step::FixedStepRun {
             parameters,
             time_step: solver.setting(),
             limits,
