@@ -55,7 +55,7 @@ columns! {
     pub struct EdgeRow {
         set_id: String = "", "set at bracket_low, whose parameters follow";
         parameters: Selected<AllButSeed>;
-        axis: String = "", "the refined axis, whose unit its values have";
+        axis: String = "", "the refined axis; edge and brackets have its unit";
         statistic: String = "", "what crosses the threshold, such as `resultant_length`, or `periods = 4`: the share of intervals nearest 4 T";
         threshold: f64 = "", "in the unit of the statistic";
         edge: Option<f64> = "", "where it is crossed, if it is";

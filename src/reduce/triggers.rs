@@ -44,7 +44,7 @@ columns! {
         parameters: Selected<All>;
         tau_control: Option<f64> = "s", "mean interval of the control; null without a control";
         cycle: Option<f64> = "s", "interval of the control in which the pulse begins";
-        place: Option<f64> = "", "elapsed share of it at that time";
+        place: Option<f64> = "", "share of it elapsed by then";
         advance: Option<f64> = "s", "how much earlier the onset of the next slip comes";
         advance_drive: Option<f64> = "s", "the same by the drive alone";
         next_advance: Option<f64> = "s", "the same of the slip after it";
@@ -52,7 +52,7 @@ columns! {
         triggered_drive: Option<bool> = "", "the same by the drive alone";
         noise: Option<f64> = "s", "largest advance, of either sign, by pulses up to 1e-12 m of the same slider and drive";
         excluded: Option<Excluded> = "",
-            "why these are null: `no control`, or a pulse that begins `before the first slip`, `within a slip` or `after the last slip`";
+            "why these are null: `no control`, or the pulse begins `before the first slip`, `within a slip` or `after the last slip`";
     }
 }
 
@@ -64,7 +64,7 @@ columns! {
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct PulseRow {
         parameters: Selected<AllButSeed>;
-        place_low: f64 = "", "elapsed share of the cycle from which on they begin";
+        place_low: f64 = "", "share of the cycle from which on they begin";
         place_high: f64 = "", "the share before which they begin; 0 and 1: the whole cycle";
         jobs: u64 = "", "jobs with such a pulse and a slip to compare";
         advance_mean: Option<f64> = "", "mean advance over the mean interval of the control";
