@@ -100,8 +100,8 @@ impl Sweep {
         if let Some(axis) = self.seed_axis() {
             spacing[axis] = self.axes[axis].len();
         }
-        let counts = self.axes.iter().zip(&spacing);
-        let counts: Vec<u64> = counts
+        let spaced_axes = self.axes.iter().zip(&spacing);
+        let counts: Vec<u64> = spaced_axes
             .map(|(axis, spacing)| axis.len().div_ceil(*spacing))
             .collect();
         let mut rows = vec![0; counts.len()];
@@ -130,11 +130,11 @@ impl Sweep {
         let predicted_cost =
             costs.iter().sum::<f64>() * seeds as f64 + (jobs - known * seeds) as f64 * largest;
         let controls = self.controls.as_ref();
-        let controls = controls.map_or(0, |controls| controls.point_count().min(jobs));
+        let control_jobs = controls.map_or(0, |controls| controls.point_count().min(jobs));
         Some(Bounds {
             sets,
-            jobs: jobs + controls,
-            predicted_cost: predicted_cost + controls as f64 * largest,
+            jobs: jobs + control_jobs,
+            predicted_cost: predicted_cost + control_jobs as f64 * largest,
         })
     }
 

@@ -59,8 +59,8 @@ impl Axis {
         let period = columns.iter().find(|column| column.quantity.is_period());
         let ranks = |row: u32| {
             let others = but_seed(&columns).chain(columns.iter().filter(|column| column.is_seed()));
-            let others: Vec<Value> = others.map(|column| column.values[row as usize]).collect();
-            (others, period.map(|period| period.rank(row)), row)
+            let values: Vec<Value> = others.map(|column| column.values[row as usize]).collect();
+            (values, period.map(|period| period.rank(row)), row)
         };
         let mut ranked: Vec<_> = (0..).take(columns[0].values.len()).map(ranks).collect();
         ranked.sort_unstable_by(|left, right| left.partial_cmp(right).unwrap_or(Ordering::Equal));
@@ -142,13 +142,14 @@ impl Axis {
         let seeds = table.columns.iter().find(|column| column.is_seed())?;
         let order = |row: &u32| table.compare_but_seed(*row, wanted);
         let begin = table.sorted.partition_point(|row| order(row).is_lt());
-        let found = table.sorted[begin..].iter();
-        let found = found.take_while(|row| order(row).is_eq());
+        let rest = table.sorted[begin..].iter();
+        let found = rest.take_while(|row| order(row).is_eq());
         let mut columns = table.columns.iter();
         let period = columns.find(|column| column.quantity.is_period());
-        let found = found.filter(|row| period.is_none_or(|of| of.compare(**row, wanted).is_eq()));
+        let of_period =
+            found.filter(|row| period.is_none_or(|of| of.compare(**row, wanted).is_eq()));
         let seed = |row: &u32| u64::from_value(seeds.values[*row as usize]);
-        Some(found.filter_map(seed).take(most).collect())
+        Some(of_period.filter_map(seed).take(most).collect())
     }
 
     /// The only row that can lead to these parameters; without modulation the first of those that differ in the period
@@ -162,8 +163,8 @@ impl Axis {
             Self::ListedRows(table) => {
                 let order = |row: &u32| table.compare(*row, wanted);
                 let begin = table.sorted.partition_point(|row| order(row).is_lt());
-                let found = table.sorted[begin..].iter();
-                let mut found = found.take_while(|row| order(row).is_eq());
+                let rest = table.sorted[begin..].iter();
+                let mut found = rest.take_while(|row| order(row).is_eq());
                 let is_modulated = wanted.modulation_period.is_some();
                 let row = found.find(|row| is_modulated || table.is_first[**row as usize]);
                 row.map(|&row| u64::from(row))
@@ -174,8 +175,9 @@ impl Axis {
 
 /// The columns that fix neither the seed nor the period.
 fn but_seed(columns: &[AxisColumn]) -> impl Iterator<Item = &AxisColumn> {
-    let columns = columns.iter();
-    columns.filter(|column| !column.is_seed() && !column.quantity.is_period())
+    columns
+        .iter()
+        .filter(|column| !column.is_seed() && !column.quantity.is_period())
 }
 
 impl ListedRows {

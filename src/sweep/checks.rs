@@ -73,8 +73,8 @@ impl<'a> Places<'a> {
             Quantity::Parameter(Symbol::Ns) => Quantity::Parameter(Symbol::N),
             other => other,
         };
-        let place = |quantity| self.set.iter().find(|place| place.quantity == quantity);
-        let place = place(quantity).or_else(|| place(bound));
+        let set_at = |quantity| self.set.iter().find(|place| place.quantity == quantity);
+        let place = set_at(quantity).or_else(|| set_at(bound));
         self.source
             .refuse(place.map_or(0, |place| place.at), problem)
     }
@@ -199,17 +199,18 @@ impl Sweep {
         let points: Vec<GridPoint> = self.points_of_one_seed().take(MAX_LOOKED_AT).collect();
         let values = |quantity| points.iter().map(move |point| point.number(quantity));
         let fast = values(Quantity::Parameter(Symbol::V0)).find(|velocity| *velocity >= FAST);
-        let fast = fast.map(|velocity| {
+        let fast_warning = fast.map(|velocity| {
             format!(
                 "V0 = {} m/s is far too fast for stick-slip; 100 micrometres per second are V0 = 1e-4",
                 Shortest(velocity)
             )
         });
         let etas = points.iter().zip(values(Quantity::Eta));
-        let unusual = etas.filter(|(point, _)| point.parameters.pulse_start.is_none());
-        let mut unusual = unusual.map(|(_, eta)| eta);
-        let unusual = unusual.find(|eta| *eta != 0.0 && !USUAL_ETA.contains(eta));
-        let unusual = unusual.map(|eta| {
+        let without_pulse = etas.filter(|(point, _)| point.parameters.pulse_start.is_none());
+        let unusual = without_pulse
+            .map(|(_, eta)| eta)
+            .find(|eta| *eta != 0.0 && !USUAL_ETA.contains(eta));
+        let unusual_warning = unusual.map(|eta| {
             let low = USUAL_ETA.start();
             let high = USUAL_ETA.end();
             format!(
@@ -218,13 +219,14 @@ impl Sweep {
         });
         let rounds = self.rounds.iter();
         let few = rounds.filter(|rounds| rounds.asked < *rounds.seeds.start());
-        let few = few.map(|Rounds { asked, seeds, .. }| {
+        let few_warning = few.map(|Rounds { asked, seeds, .. }| {
             format!(
                 "seeds: from = {asked} is raised to {}: intervals of fewer seeds are not trusted",
                 seeds.start()
             )
         });
-        fast.into_iter().chain(unusual).chain(few).collect()
+        let of_points = fast_warning.into_iter().chain(unusual_warning);
+        of_points.chain(few_warning).collect()
     }
 }
 
@@ -394,9 +396,11 @@ impl Sweep {
             (None, Quantity::Parameter(symbol)) => vec![self.base.get(symbol)],
             (None, _) => Vec::new(),
         };
-        let reals = values.into_iter();
-        let reals = reals.filter(|value| matches!(value, Value::Real(_)));
-        let mut reals: Vec<f64> = reals.filter_map(Value::number).collect();
+        let mut reals: Vec<f64> = values
+            .into_iter()
+            .filter(|value| matches!(value, Value::Real(_)))
+            .filter_map(Value::number)
+            .collect();
         reals.sort_unstable_by(f64::total_cmp);
         reals.dedup();
         reals

@@ -65,8 +65,7 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
     let of_motion = match solver.method {
         Method::EventDriven if solver.resolve.takes_grid(setting) => {
             let step = step_length(parameters) * fourth_root(setting / 1e-3);
-            let steps = motion.resolved / step + motion.steps_of_periods;
-            let steps = steps.min(motion.time / step);
+            let steps = (motion.resolved / step + motion.steps_of_periods).min(motion.time / step);
             let of_a_step = GRID_STEP_OVERHEAD + GRID_STEP_OF_A_BLOCK * blocks;
             let with_ledger = if recording.energies {
                 GRID_WITH_LEDGER
@@ -174,8 +173,8 @@ impl ExpectedMotion {
         let periods = time / period;
         let breaks = contacts * slips * breaks_of_a_slip;
         if swing > SHAKEN {
-            let breaks = breaks + contacts * periods * BREAKS_OF_A_PERIOD;
-            return Self::resolved(time, time, breaks);
+            let breaks_of_periods = contacts * periods * BREAKS_OF_A_PERIOD;
+            return Self::resolved(time, time, breaks + breaks_of_periods);
         }
         let resolved = time * (about_a_slip / interval).min(1.0);
         Self {

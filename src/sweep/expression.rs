@@ -142,13 +142,14 @@ impl<N> Expression<N> {
             Self::Root(number) => Some(number.exponents(of)?.map(|exponent| 0.5 * exponent)),
             Self::Combined(combined) => {
                 let (left, operator, right) = &**combined;
-                let left = left.exponents(of)?;
-                let right = right.exponents(of)?;
-                let product = |sign: f64| array::from_fn(|unit| left[unit] + sign * right[unit]);
+                let of_left = left.exponents(of)?;
+                let of_right = right.exponents(of)?;
+                let product =
+                    |sign: f64| array::from_fn(|unit| of_left[unit] + sign * of_right[unit]);
                 match operator.sign {
                     "*" => Some(product(1.0)),
                     "/" => Some(product(-1.0)),
-                    _ => (left == right).then_some(left),
+                    _ => (of_left == of_right).then_some(of_left),
                 }
             }
         }
@@ -273,8 +274,9 @@ impl<'a, N> Reader<'a, N> {
             let demanded = left.demanded(joins_conditions, start)?;
             self.advance();
             let position = self.position();
-            let right = self.expression(operator.precedence + 1)?;
-            let right = right.demanded(joins_conditions, position)?;
+            let right = self
+                .expression(operator.precedence + 1)?
+                .demanded(joins_conditions, position)?;
             left = Expression::Combined(Box::new((demanded, operator, right)));
             let next = self.operator().map(|next| next.precedence);
             if operator.precedence == COMPARISON && next == Some(COMPARISON) {

@@ -93,8 +93,8 @@ impl Sweep {
     /// Numbers of the points of the grid, and of the controls after them.
     pub(super) fn points(&self) -> Range<u64> {
         let controls = self.controls.as_ref();
-        let controls = controls.map_or(0, |controls| controls.point_count());
-        0..self.point_count() + controls
+        let control_points = controls.map_or(0, |controls| controls.point_count());
+        0..self.point_count() + control_points
     }
 
     /// The jobs in grid order, then their controls.
@@ -113,10 +113,10 @@ impl Sweep {
         let of_grid = self.admitted(points.start.min(count)..points.end.min(count));
         let others = points.start.max(count) - count..points.end.max(count) - count;
         let controls = self.controls.iter();
-        let controls = controls.flat_map(move |controls| controls.admitted(others.clone()));
-        let controls = controls.map(move |(number, point)| (count + number, point));
+        let admitted = controls.flat_map(move |controls| controls.admitted(others.clone()));
+        let of_controls = admitted.map(move |(number, point)| (count + number, point));
         let is_own = |(_, point): &(u64, GridPoint)| self.find_in_grid(&point.parameters).is_none();
-        let points = of_grid.chain(controls.filter(is_own));
+        let points = of_grid.chain(of_controls.filter(is_own));
         points.map(|(point, GridPoint { parameters, .. })| Job {
             point,
             // To look slips up takes no time.
@@ -137,8 +137,8 @@ impl Sweep {
     }
 
     fn find_in_grid(&self, parameters: &Parameters) -> Option<u64> {
-        let rows = self.axes.iter().map(|axis| axis.find(parameters));
-        let rows: Vec<u64> = rows.collect::<Option<_>>()?;
+        let found = self.axes.iter().map(|axis| axis.find(parameters));
+        let rows: Vec<u64> = found.collect::<Option<_>>()?;
         let point = self.point(&rows).canonical();
         if point.parameters != *parameters || !self.admits(&point) {
             return None;
@@ -153,8 +153,8 @@ impl Sweep {
         // Where no condition reads the seed, all seeds are jobs or none is.
         let tried = if self.reads_seed() { usize::MAX } else { 1 };
         let mut axes = self.axes.iter();
-        let seeds = axes.find_map(|axis| axis.seeds(parameters, tried));
-        let seeds = seeds.unwrap_or_else(|| vec![self.base.seed]);
+        let on_axis = axes.find_map(|axis| axis.seeds(parameters, tried));
+        let seeds = on_axis.unwrap_or_else(|| vec![self.base.seed]);
         let mut jobs = seeds.into_iter().map(|seed| parameters.with_seed(seed));
         jobs.find_map(|job| self.find_in_grid(&job))
     }

@@ -47,8 +47,8 @@ pub(super) fn settings(
         control: default.control,
         ..*recording
     };
-    let solver = solver_settings(solver).into_iter();
-    let solver = solver.map(|(key, value)| (format!("solver.{key}"), value));
+    let settings = solver_settings(solver).into_iter();
+    let solver = settings.map(|(key, value)| (format!("solver.{key}"), value));
     let record = RecordingKey::ALL.map(|key| {
         let value = recording.get(key).to_string();
         (format!("record.{}", key.key()), value)

@@ -132,8 +132,8 @@ impl Extension {
         };
         let points = &round.points;
         let from = points.partition_point(|range| *range.end() < among.start);
-        let ranges = points[from..].iter();
-        let ranges = ranges.take_while(|range| *range.start() < among.end);
+        let rest = points[from..].iter();
+        let ranges = rest.take_while(|range| *range.start() < among.end);
         ranges
             .map(|range| among.start.max(*range.start())..among.end.min(range.end() + 1))
             .collect()

@@ -51,8 +51,8 @@ impl Quantity {
             None => {
                 let numbers = Self::all().filter(|quantity| *quantity != Self::BREAK_ON);
                 let keys: Vec<&str> = numbers.map(Self::key).collect();
-                let hint = hint(name, &keys);
-                Err(format!("\"{name}\" is not a known quantity; {hint}"))
+                let suggestion = hint(name, &keys);
+                Err(format!("\"{name}\" is not a known quantity; {suggestion}"))
             }
         }
     }
@@ -196,14 +196,14 @@ fn distance(word: &str, candidate: &str) -> usize {
 pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
     // Half of a short word, two letters of a long one.
     let max = (word.chars().count() / 2).min(2);
-    let near = known.iter().copied();
-    let near = near.filter(|candidate| distance(word, candidate) <= max);
+    let candidates = known.iter().copied();
+    let near = candidates.filter(|candidate| distance(word, candidate) <= max);
     synonym(word, known).or_else(|| near.min_by_key(|candidate| distance(word, candidate)))
 }
 
 /// The known word that means the same.
 pub fn synonym<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
-    let word = word.replace('_', " ");
-    let meant = |candidate: &&str| SYNONYMS.contains(&(&word, *candidate));
+    let spaced = word.replace('_', " ");
+    let meant = |candidate: &&str| SYNONYMS.contains(&(&spaced, *candidate));
     known.iter().copied().find(meant)
 }

@@ -32,8 +32,7 @@ impl Sweep {
             path: path.to_owned(),
             source: error.source,
         })?;
-        let text = String::from_utf8(bytes);
-        let text = text.map_err(|_| SweepError::NotUtf8(path.to_owned()))?;
+        let text = String::from_utf8(bytes).map_err(|_| SweepError::NotUtf8(path.to_owned()))?;
         Self::parse(&text, path)
     }
 
@@ -72,13 +71,17 @@ fn read(source: &Source<'_>, is_new: bool) -> Result<Sweep, Refused> {
     let mut places = Places::new(source);
     let name = read_name(&file);
     let model = read_section(&file, "[model]", |model| read_model(model, &mut places));
-    let axes = read_section(&file, "[axes]", |axes| read_axes::read(axes, &mut places));
+    let listed = read_section(&file, "[axes]", |axes| read_axes::read(axes, &mut places));
     let recording = read_section(&file, "[record]", read_recording);
     let solver = read_section(&file, "[solver]", read_solver);
     let measured = read_section(&file, "[measured]", Measured::read);
     let (base, period) = model.ok().flatten().unwrap_or_default();
-    let axes = axes.map(|axes| axes.into_iter().flatten());
-    let mut axes = axes.map(|axes| period.into_iter().chain(axes).collect::<Vec<Axis>>());
+    let mut axes = listed.map(|axes| {
+        period
+            .into_iter()
+            .chain(axes.into_iter().flatten())
+            .collect::<Vec<Axis>>()
+    });
     let rounds = read_rounds(&file, &mut axes, &mut places);
     let title = rounds_title(&file).filter(|_| is_new);
     let conditions = file
@@ -162,8 +165,9 @@ fn read_section<'a, T>(
     let Some(entry) = file.entry(key_of(title)) else {
         return Ok(None);
     };
-    let section = entry.section(title);
-    let section = section.ok_or_else(|| entry.must_be(&format!("a table {title}")))?;
+    let section = entry
+        .section(title)
+        .ok_or_else(|| entry.must_be(&format!("a table {title}")))?;
     read(&section).map(Some)
 }
 

@@ -21,8 +21,8 @@ pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec
             "sobol" => ("[axes.sobol]", read_sample),
             _ => return Ok(vec![read_single(entry, places)?]),
         };
-        let tables = tables(entry, title)?;
-        all(tables.iter().map(|table| read(table, places)))
+        let sections = tables(entry, title)?;
+        all(sections.iter().map(|table| read(table, places)))
     }));
     Ok(axes?.into_iter().flatten().collect())
 }
@@ -105,8 +105,7 @@ pub(super) fn read_spaced(
     entry: &Entry<'_>,
     quantity: Quantity,
 ) -> Result<(AxisRange, u64), Refused> {
-    let table = entry.section("an axis");
-    let table = table.ok_or_else(|| {
+    let table = entry.section("an axis").ok_or_else(|| {
         entry.must_be(&format!("{AXIS_FORMS}; a single value belongs in [model]"))
     })?;
     let range = read_range(&table, quantity)?.ok_or_else(|| entry.must_be(AXIS_FORMS))?;
@@ -118,8 +117,8 @@ pub(super) fn read_spaced(
 
 /// The axis of a range with this many values; `None` if two of these are one.
 pub(super) fn spaced(range: &AxisRange, points: u64, quantity: Quantity) -> Option<Axis> {
-    let values = range.spaced(points).map(|value| ranged(quantity, value));
-    let values = values.collect();
+    let spaced = range.spaced(points);
+    let values = spaced.map(|value| ranged(quantity, value)).collect();
     Axis::table(vec![AxisColumn { quantity, values }]).ok()
 }
 
@@ -143,8 +142,9 @@ fn read_count(
     // Far above any seed: the last value is checked below.
     let max = 1 << 53;
     let count = count.count(1, max)?;
-    let first = table.entry("first");
-    let first = first.map_or(Ok(0), |first| first.count(0, max))?;
+    let first = table
+        .entry("first")
+        .map_or(Ok(0), |first| first.count(0, max))?;
     for value in [first, first + count - 1] {
         if quantity.checked(Value::Count(value)).is_none() {
             let problem = format!(
@@ -248,10 +248,12 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
 
 fn read_sample(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
     const SETTINGS: [&str; 2] = ["points", "seed"];
-    let points = table.required("points", "the number of points of the sample");
-    let points = points.and_then(|points| points.count(1, MAX_SAMPLE));
-    let seed = table.entry("seed");
-    let seed = seed.map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)));
+    let points = table
+        .required("points", "the number of points of the sample")
+        .and_then(|points| points.count(1, MAX_SAMPLE));
+    let seed = table
+        .entry("seed")
+        .map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)));
     let mut entries = table.entries();
     entries.retain(|entry| !SETTINGS.contains(&entry.key));
     let ranges = all(entries.iter().map(|entry| {

@@ -46,8 +46,9 @@ pub(super) fn read_seeds(
     if max < asked {
         return Err(to.must_be(&format!("at least from, which is {asked}")));
     }
-    let first = table.entry("first");
-    let first = first.map_or(Ok(0), |first| first.count(0, u64::from(u32::MAX)))?;
+    let first = table
+        .entry("first")
+        .map_or(Ok(0), |first| first.count(0, u64::from(u32::MAX)))?;
     if let Ok(axes) = axes {
         axes.push(Axis::Counted {
             symbol: Symbol::Seed,
@@ -138,8 +139,9 @@ pub(super) fn read_refinement(
     let axis = section.required("axis", need);
     let quantity = axis.and_then(|entry| read_refinable(&entry));
     let need = "what crosses the threshold, such as by = \"resultant_length\"";
-    let by = section.required("by", need);
-    let by = by.and_then(|entry| read_by(section, &entry));
+    let by = section
+        .required("by", need)
+        .and_then(|entry| read_by(section, &entry));
     let need = "the largest width of the interval of an edge, such as to = 0.03";
     let to = section.required("to", need);
     let width = to.and_then(|entry| entry.number("a finite number > 0", |width| width > 0.0));
@@ -190,13 +192,15 @@ fn read_refinable(entry: &Entry<'_>) -> Result<Quantity, Refused> {
 
 /// Reads the statistics, the number of periods if their share is asked for, and the threshold.
 fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<Refinement, Refused> {
-    let threshold = section.entry("threshold");
-    let threshold = threshold.map(|entry| entry.number("a finite number", |_| true));
-    let threshold = threshold.transpose();
+    let threshold = section
+        .entry("threshold")
+        .map(|entry| entry.number("a finite number", |_| true))
+        .transpose();
     if entry.word() == Some("periods") {
         let need = "the n of tau = n T, of which the share of intervals is taken";
-        let value = section.required("value", need);
-        let value = value.and_then(|value| value.count(0, MAX_ROWS));
+        let value = section
+            .required("value", need)
+            .and_then(|value| value.count(0, MAX_ROWS));
         return Ok(Refinement {
             by: Statistic::from_key("periods").into_iter().collect(),
             periods: Some(value?),

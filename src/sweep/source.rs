@@ -119,8 +119,8 @@ impl<'a> Source<'a> {
         if let Some(of) = self.made_of {
             let between = if mistakes.len() > 1 { "\n  " } else { " " };
             let problems = mistakes.into_iter().map(|(_, problem)| problem);
-            let problems = problems.collect::<Vec<_>>().join(between);
-            return SweepError::Made(format!("in the {of}:{between}{problems}"));
+            let joined = problems.collect::<Vec<_>>().join(between);
+            return SweepError::Made(format!("in the {of}:{between}{joined}"));
         }
         let placed = |(at, problem)| Mistake {
             line: self.line(at),
@@ -198,13 +198,13 @@ pub(super) struct Section<'a> {
 impl<'a> Section<'a> {
     /// The entries in the order of the file.
     pub fn entries(&self) -> Vec<Entry<'a>> {
-        let entries = self.table.iter().map(|(key, node)| Entry {
+        let unsorted = self.table.iter().map(|(key, node)| Entry {
             source: self.source,
             key: key.get_ref(),
             at: key.span().start,
             node,
         });
-        let mut entries: Vec<_> = entries.collect();
+        let mut entries: Vec<_> = unsorted.collect();
         entries.sort_by_key(|entry| entry.at);
         entries
     }
@@ -233,8 +233,10 @@ impl<'a> Section<'a> {
     pub fn only(&self, allowed: &[&str]) -> Result<(), Refused> {
         let mut unknown = self.entries();
         unknown.retain(|entry| !allowed.contains(&entry.key));
-        let unknown = unknown.iter();
-        all(unknown.map(|entry| Err(entry.unknown(self.title, allowed)))).map(|_: Vec<()>| ())
+        let refused = unknown
+            .iter()
+            .map(|entry| Err(entry.unknown(self.title, allowed)));
+        all(refused).map(|_: Vec<()>| ())
     }
 }
 
@@ -250,13 +252,13 @@ pub(super) struct Entry<'a> {
 
 impl<'a> Entry<'a> {
     pub fn refuse(&self, problem: impl AsRef<str>) -> Refused {
-        let problem = problem.as_ref();
+        let reason = problem.as_ref();
         let value = match self.node.get_ref() {
             DeValue::Table(_) => String::new(),
             _ => format!(" = {}", self.source.excerpt(self.node.span())),
         };
         self.source
-            .refuse(self.at, format!("{}{value}: {problem}", self.key))
+            .refuse(self.at, format!("{}{value}: {reason}", self.key))
     }
 
     pub fn must_be(&self, allowed: &str) -> Refused {
@@ -321,8 +323,8 @@ impl<'a> Entry<'a> {
     /// A finite number that `fits`, as the words `allowed` say.
     pub fn number(&self, allowed: &str, fits: impl Fn(f64) -> bool) -> Result<f64, Refused> {
         let number = self.value().and_then(Value::number);
-        let number = number.filter(|number| number.is_finite() && fits(*number));
-        number.ok_or_else(|| self.must_be(allowed))
+        let fitting = number.filter(|number| number.is_finite() && fits(*number));
+        fitting.ok_or_else(|| self.must_be(allowed))
     }
 
     pub fn count(&self, min: u64, max: u64) -> Result<u64, Refused> {

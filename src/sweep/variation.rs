@@ -32,8 +32,8 @@ impl KeyChange {
     pub fn setting(key: &str, value: &str) -> Self {
         let recording = RecordingKey::ALL.map(RecordingKey::key);
         let solver = SolverKey::ALL.map(SolverKey::key);
-        let known = Quantity::all().map(Quantity::key);
-        let known: Vec<&str> = known.chain(recording).chain(solver).collect();
+        let quantities = Quantity::all().map(Quantity::key);
+        let known: Vec<&str> = quantities.chain(recording).chain(solver).collect();
         let section = match nearest(key, &known) {
             _ if matches!(key, "of" | "relative" | "absolute" | "seeds") => "precision",
             _ if matches!(key, "axis" | "by" | "value" | "threshold" | "to" | "jobs") => "refine",
