@@ -83,8 +83,8 @@ impl<'a> Claims<'a> {
         if owner == self.member.name() {
             return Ok(ClaimState::Own);
         }
-        let living = living.get_key_value(&owner).map(|(name, _)| name.as_str());
-        Ok(living.map_or(ClaimState::Free(generation + 1), ClaimState::Taken))
+        let living_owner = living.get_key_value(&owner).map(|(name, _)| name.as_str());
+        Ok(living_owner.map_or(ClaimState::Free(generation + 1), ClaimState::Taken))
     }
 
     /// Claims what no living worker has; whether this worker has it.

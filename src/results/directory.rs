@@ -72,8 +72,8 @@ impl<'a> Results<'a> {
                 return ended;
             }
             // A directory that was moved, or taken over by others, explains any other error.
-            let moved = opened.ok().and_then(|results| results.check_place().err());
-            let moved = moved.filter(|moved| moved.kind == ErrorKind::Refused);
+            let place_error = opened.ok().and_then(|results| results.check_place().err());
+            let moved = place_error.filter(|error| error.kind == ErrorKind::Refused);
             match moved.or_else(|| member.burial()) {
                 Some(reason) => Err(reason.into()),
                 None => ended,
@@ -127,7 +127,7 @@ impl<'a> Results<'a> {
     /// Looks into a directory that a sweep is to be run in; one without extensions is fresh.
     fn look(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         // In this order: another run may begin in between.
-        let is_fresh = is_fresh(layout)?;
+        let was_fresh = is_fresh(layout)?;
         let found = Self::new(layout, extension_file::read(layout)?.records)?;
         if found.records.is_empty() {
             if layout.root().is_symlink() && !layout.root().exists() {
@@ -135,7 +135,7 @@ impl<'a> Results<'a> {
                     "is a link that leads nowhere; remove it, or choose another with --out";
                 return Err(ResultsError::refused(layout.root(), problem));
             }
-            if is_fresh {
+            if was_fresh {
                 refuse_reserved(layout.root())?;
                 return Ok(found);
             }
@@ -193,9 +193,8 @@ impl<'a> Results<'a> {
         if differences.is_empty() {
             return Ok(());
         }
-        let differences = differences.join("\n  ");
-        let problem =
-            format!("holds other results, nothing was changed:\n  {differences}\n{way_out}");
+        let lines = differences.join("\n  ");
+        let problem = format!("holds other results, nothing was changed:\n  {lines}\n{way_out}");
         Err(ResultsError::refused(self.layout.root(), problem))
     }
 

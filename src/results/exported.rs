@@ -132,8 +132,9 @@ impl Results<'_> {
     fn exported_columns(&self, table: RecordedTable) -> Vec<FieldRef> {
         let own = table.schema(self.sweep());
         let extensions = self.extensions().iter();
-        let swept = extensions.flat_map(|extension| extension.sweep.swept());
-        let swept: HashSet<&str> = swept.collect();
+        let swept: HashSet<&str> = extensions
+            .flat_map(|extension| extension.sweep.swept())
+            .collect();
         let mut columns = JoinedTable::columns(self, table);
         columns.retain(|field| {
             let name = field.name();
@@ -171,12 +172,12 @@ impl<'a> JoinedTable<'a> {
     /// All columns that a table can have: its own, those of the jobs, and `control`.
     pub fn columns(results: &Results<'_>, table: RecordedTable) -> Vec<FieldRef> {
         let own = table.schema(results.sweep());
-        let others = [
+        let joined = [
             RecordedTable::Jobs.schema(results.sweep()),
             schema::<OfSet>(),
         ];
-        let others = others.iter().flat_map(|schema| schema.fields());
-        let others = others.filter(|field| own.field_with_name(field.name()).is_err());
+        let fields = joined.iter().flat_map(|schema| schema.fields());
+        let others = fields.filter(|field| own.field_with_name(field.name()).is_err());
         own.fields().iter().chain(others).cloned().collect()
     }
 
@@ -267,13 +268,13 @@ impl<'a> JoinedTable<'a> {
 
     fn join(&self, rows: &RecordBatch, jobs: Option<&JobRows>) -> Result<RecordBatch, ArrowError> {
         let places = jobs.map(|jobs| jobs.places(rows)).transpose()?;
-        let jobs = jobs.zip(places.as_ref());
+        let placed_jobs = jobs.zip(places.as_ref());
         with_columns(rows, &self.schema, |name| {
             if name == CONTROL && !self.has_controls {
                 let controls = BooleanArray::from(vec![false; rows.num_rows()]);
                 return Some(Ok(Arc::new(controls)));
             }
-            let (jobs, places) = jobs?;
+            let (jobs, places) = placed_jobs?;
             if name == CONTROL {
                 return Some(take(&jobs.controls, places, None));
             }
@@ -314,9 +315,10 @@ struct JobRows {
 
 impl JobRows {
     fn new(columns: RecordBatch, controls: BooleanArray) -> Result<Self, ArrowError> {
-        let ids = ids(&columns)?.iter().zip(0..);
-        let by_id = ids.filter_map(|(id, place)| Some((id?.to_owned(), place)));
-        let by_id = by_id.collect();
+        let numbered = ids(&columns)?.iter().zip(0..);
+        let by_id = numbered
+            .filter_map(|(id, place)| Some((id?.to_owned(), place)))
+            .collect();
         Ok(Self {
             columns,
             controls,

@@ -252,8 +252,8 @@ pub(super) fn extensions(
             Some(Extension { sweep, .. }) if sweep.text() == record.sweep => sweep.clone(),
             _ => {
                 let path = layout.extension(number);
-                let sweep = Sweep::parse_stored(&record.sweep, &path);
-                let sweep = sweep.map_err(|error| ResultsError::damaged(&path, error))?;
+                let sweep = Sweep::parse_stored(&record.sweep, &path)
+                    .map_err(|error| ResultsError::damaged(&path, error))?;
                 sweep.with_ids_of(record.model_version, &record.rng_scheme)
             }
         };

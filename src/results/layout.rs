@@ -201,8 +201,8 @@ pub(super) fn is_table_file(name: &OsStr) -> bool {
 
 /// What is claimed by a file of this name, and the generation; `None` if it is not a claim.
 pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
-    let (what, generation) = name.to_str()?.rsplit_once('.')?;
-    let generation = generation.parse().ok()?;
+    let (what, digits) = name.to_str()?.rsplit_once('.')?;
+    let generation = digits.parse().ok()?;
     (!is_hidden(name)).then_some((what, generation))
 }
 

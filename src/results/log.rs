@@ -141,11 +141,13 @@ impl Log {
         ) {
             return Ok(());
         }
-        let time = now();
-        let event = event.clone();
+        let line = LogLine {
+            time: now(),
+            event: event.clone(),
+        };
         // Texts and numbers always have a form as JSON.
-        let line = serde_json::to_string(&LogLine { time, event }).unwrap_or_default();
-        self.0.write(format!("{line}\n").as_bytes())
+        let json = serde_json::to_string(&line).unwrap_or_default();
+        self.0.write(format!("{json}\n").as_bytes())
     }
 }
 

@@ -35,8 +35,8 @@ impl Results<'_> {
 
     /// All points that these have chosen.
     pub fn chosen(&self) -> Round {
-        let rounds = self.rounds().iter();
-        let rounds = rounds.filter_map(|extension| extension.round.as_ref());
+        let extensions = self.rounds().iter();
+        let rounds = extensions.filter_map(|extension| extension.round.as_ref());
         let points = rounds.flat_map(|round| round.points.iter().cloned());
         Round {
             points: merged(points.collect()),

@@ -169,8 +169,9 @@ fn encoded<'j, R: Table, Rows: IntoIterator<Item = R>>(
     for (job, outcome) in jobs {
         match outcome {
             Some(outcome) => {
-                let mut rows = rows(job, outcome).into_iter();
-                rows.try_for_each(|row| writer.push(&row))?;
+                rows(job, outcome)
+                    .into_iter()
+                    .try_for_each(|row| writer.push(&row))?;
             }
             None => kept.copy(&mut writer, &job.0.job_id)?,
         }

@@ -106,8 +106,7 @@ fn move_away(layout: &Layout<'_>, path: &Path) -> Result<(), StorageError> {
         free = target.with_added_extension(number.to_string());
     }
     storage.rename(path, &free)?;
-    let folders = [Some(folder), path.parent()];
-    let mut folders = folders.into_iter().flatten();
+    let mut folders = [Some(folder), path.parent()].into_iter().flatten();
     folders.try_for_each(|folder| storage.sync_folder(folder))
 }
 
@@ -265,8 +264,8 @@ fn damage_of(
 fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
     let path = results.part_file(RecordedTable::Jobs, part);
     let damaged = |problem: String| Err(ResultsError::damaged(&path, problem));
-    let jobs = results.dataset_of(RecordedTable::Jobs, part.name).rows();
-    let jobs: Vec<RowsOfJob> = jobs.collect::<Result<_, _>>()?;
+    let rows = results.dataset_of(RecordedTable::Jobs, part.name).rows();
+    let jobs: Vec<RowsOfJob> = rows.collect::<Result<_, _>>()?;
     for (expected, job) in ids(results, part).zip(&jobs) {
         if job.job_id != expected {
             let found = &job.job_id;

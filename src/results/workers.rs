@@ -180,11 +180,10 @@ pub(super) fn join<'a, T, E: From<ResultsError>>(
     threads: usize,
     body: impl FnOnce(&Member<'a>) -> Result<T, E>,
 ) -> Result<T, E> {
-    let member = Member::join(layout, Worker::here(sweep, threads))?;
+    let member = &Member::join(layout, Worker::here(sweep, threads))?;
     member.check_peace()?;
     std::thread::scope(|scope| {
         let (end, ended) = channel::<()>();
-        let member = &member;
         let beats = move || {
             while matches!(ended.recv_timeout(BEAT), Err(RecvTimeoutError::Timeout)) {
                 // A beat that cannot be written costs double work at worst.
