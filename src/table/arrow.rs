@@ -58,8 +58,9 @@ pub fn schema_of(fields: impl Into<Fields>) -> SchemaRef {
 /// What the metadata of fields hold under a key, by the names of the fields.
 pub(super) fn by_name(fields: &Fields, key: &str) -> Json {
     let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default();
-    let fields = fields.iter();
-    let texts = fields.map(|field| (field.name().clone(), Json::from(text(field))));
+    let texts = fields
+        .iter()
+        .map(|field| (field.name().clone(), Json::from(text(field))));
     texts.collect::<Map<_, _>>().into()
 }
 
@@ -121,7 +122,7 @@ enum Cells {
 
 impl RowBuffer {
     pub fn new<R: Row>() -> Self {
-        let cells = R::columns().into_iter().map(|column| {
+        let builders = R::columns().into_iter().map(|column| {
             Some(match column.kind {
                 Kind::Real => Cells::Real(Float64Builder::new()),
                 Kind::Count => Cells::Count(Int64Builder::new()),
@@ -129,7 +130,7 @@ impl RowBuffer {
                 Kind::Text => Cells::Text(StringBuilder::new()),
             })
         });
-        let cells: Vec<Option<Cells>> = cells.collect();
+        let cells: Vec<Option<Cells>> = builders.collect();
         Self {
             schema: schema::<R>(),
             is_unknown: vec![false; cells.len()],
@@ -176,8 +177,8 @@ impl RowBuffer {
     pub fn copy(&mut self, batch: &RecordBatch, rows: Range<usize>) -> Result<(), ArrowError> {
         let fields = self.schema.fields().iter();
         for (field, cells) in fields.zip(self.cells.iter_mut().flatten()) {
-            let array = column(batch, field.name(), field.data_type());
-            let array = array.map_err(ArrowError::SchemaError)?;
+            let array =
+                column(batch, field.name(), field.data_type()).map_err(ArrowError::SchemaError)?;
             rows.clone().for_each(|row| cells.push(cell(array, row)));
         }
         self.rows += rows.len();
@@ -222,8 +223,9 @@ fn column<'a>(
     name: &str,
     expected: &DataType,
 ) -> Result<&'a ArrayRef, String> {
-    let array = batch.column_by_name(name);
-    let array = array.ok_or_else(|| format!("there is no column {name}"))?;
+    let array = batch
+        .column_by_name(name)
+        .ok_or_else(|| format!("there is no column {name}"))?;
     match array.data_type() {
         found if found == expected => Ok(array),
         found => Err(format!("column {name} is {found}, not {expected}")),
@@ -245,13 +247,13 @@ fn cell(array: &ArrayRef, row: usize) -> Value<'_> {
 /// The rows of a batch. Columns that the row does not have are passed over; those that may be null may be missing.
 pub fn rows<R: Row>(batch: &RecordBatch) -> Result<Vec<R>, String> {
     let columns = R::columns();
-    let arrays = columns.iter().map(|described| {
+    let found = columns.iter().map(|described| {
         if described.nullable && batch.column_by_name(&described.name).is_none() {
             return Ok(None);
         }
         column(batch, &described.name, &data_type(described.kind)).map(Some)
     });
-    let arrays = arrays.collect::<Result<Vec<Option<&ArrayRef>>, String>>()?;
+    let arrays = found.collect::<Result<Vec<Option<&ArrayRef>>, String>>()?;
     let row = |row: usize| {
         let mut columns = arrays.iter().copied();
         R::from_cells("", &mut || {

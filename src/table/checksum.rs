@@ -36,10 +36,10 @@ fn place(end: &[u8]) -> Option<usize> {
 /// Puts the checksum into a footer, which comes last in a file: `hasher` has seen all bytes before it.
 /// `None` if it has no place for it.
 pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<()> {
-    let place = place(footer)?;
+    let begin = place(footer)?;
     hasher.update(&*footer);
     let checksum = hexadecimal(&hasher.finalize());
-    footer[place..place + PLACEHOLDER.len()].copy_from_slice(checksum.as_bytes());
+    footer[begin..begin + PLACEHOLDER.len()].copy_from_slice(checksum.as_bytes());
     Some(())
 }
 
@@ -49,10 +49,10 @@ pub fn check(bytes: &[u8]) -> Result<(), &'static str> {
     let (Some(rest), true) = (bytes.len().checked_sub(END), bytes.ends_with(MAGIC)) else {
         return Err(CUT);
     };
-    let length = bytes[rest..].first_chunk();
-    let length = length.map_or(0, |length| u32::from_le_bytes(*length));
-    let footer = rest.checked_sub(length as usize);
-    let footer = footer.filter(|begin| *begin >= MAGIC.len()).ok_or(CUT)?;
+    let encoded = bytes[rest..].first_chunk();
+    let length = encoded.map_or(0, |length| u32::from_le_bytes(*length));
+    let begin = rest.checked_sub(length as usize);
+    let footer = begin.filter(|begin| *begin >= MAGIC.len()).ok_or(CUT)?;
     let place = footer + place(&bytes[footer..]).ok_or("it has no checksum")?;
     let (before, rest) = bytes.split_at(place);
     let (written, after) = rest.split_at(PLACEHOLDER.len());

@@ -56,8 +56,8 @@ impl Default for Footer {
 const PLACE: &str = "file";
 
 fn place(path: &Path) -> String {
-    let names = [path.parent().and_then(Path::file_name), path.file_name()];
-    let names = names.map(|name| name.unwrap_or_default().to_string_lossy());
+    let parts = [path.parent().and_then(Path::file_name), path.file_name()];
+    let names = parts.map(|name| name.unwrap_or_default().to_string_lossy());
     names.join("/")
 }
 
@@ -86,18 +86,19 @@ impl Footer {
 
     pub(super) fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
         let by_name = |key| arrow::by_name(schema.fields(), key).to_string();
-        let footer = self.clone();
-        let footer = footer.with("units", &by_name(UNIT));
-        let footer = footer.with("meaning", &by_name(DESCRIPTION));
-        let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
+        let footer = self
+            .clone()
+            .with("units", &by_name(UNIT))
+            .with("meaning", &by_name(DESCRIPTION))
+            .with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
         let texts = footer.0.into_iter();
-        let texts = texts.map(|(key, text)| KeyValue::new(key, text));
+        let entries = texts.map(|(key, text)| KeyValue::new(key, text));
         let mut properties = WriterProperties::builder()
             .set_created_by(concat!("stickslip version ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_max_row_group_row_count(Some(GROUP_ROWS))
-            .set_key_value_metadata(Some(texts.collect()));
+            .set_key_value_metadata(Some(entries.collect()));
         for field in schema.fields() {
             if field.data_type() == &DataType::Float64 {
                 let column = ColumnPath::from(field.name().as_str());
@@ -180,14 +181,14 @@ impl<R: Row, S: Sink> TableWriter<R, S> {
         if self.buffer.rows > 0 {
             self.flush()?;
         }
-        let footer = || -> Result<Vec<u8>, ParquetError> {
+        let close = || -> Result<Vec<u8>, ParquetError> {
             let mut footer = self.writer.into_inner()?;
             let no_place = "the footer has no place for a checksum";
             checksum::close(self.hasher, &mut footer)
                 .ok_or_else(|| ParquetError::General(no_place.to_owned()))?;
             Ok(footer)
         };
-        let footer = footer().map_err(ResultsError::unwritten(&self.path))?;
+        let footer = close().map_err(ResultsError::unwritten(&self.path))?;
         let mut file = self.file;
         let written = file.write_all(&footer).and_then(|()| file.sync());
         written.map_err(StorageError::at("write", &self.path))?;
@@ -349,8 +350,8 @@ fn open(
     let bytes = storage.read(path).map_err(ResultsError::of_reading)?;
     checksum::check(&bytes).map_err(ResultsError::damage_at(path))?;
     let reader = || {
-        let builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes))?;
-        let mut builder = builder.with_batch_size(BATCH_ROWS);
+        let mut builder = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes))?
+            .with_batch_size(BATCH_ROWS);
         let metadata = builder.metadata();
         check_footer(path, metadata, &file.footer).map_err(ParquetError::General)?;
         let rows = metadata.file_metadata().num_rows().cast_unsigned();

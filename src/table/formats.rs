@@ -61,7 +61,7 @@ impl RowWriter {
         schema: &SchemaRef,
         footer: &Footer,
     ) -> Result<Self, ResultsError> {
-        let encoder = || -> Result<Encoder, ParquetError> {
+        let begin = || -> Result<Encoder, ParquetError> {
             Ok(match format {
                 Format::Parquet => {
                     let properties = Some(footer.properties(schema)?);
@@ -77,7 +77,7 @@ impl RowWriter {
                 Format::Arrow => Encoder::Arrow(FileWriter::try_new(file, schema)?),
             })
         };
-        let encoder = encoder().map_err(ResultsError::unwritten(&path))?;
+        let encoder = begin().map_err(ResultsError::unwritten(&path))?;
         Ok(Self { path, encoder })
     }
 

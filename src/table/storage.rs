@@ -283,8 +283,8 @@ impl Storage for Disk {
         };
         match names() {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
-            names => {
-                let mut names = names.map_err(StorageError::at("list", folder))?;
+            listed => {
+                let mut names = listed.map_err(StorageError::at("list", folder))?;
                 names.sort();
                 Ok(names)
             }
