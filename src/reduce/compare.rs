@@ -140,8 +140,8 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsEr
     let sets: Vec<(&FinishedSet, &FinishedSet)> = pairs.iter().map(of_pair).collect();
 
     let column = |name: &str, (side, words): (&str, &str), kind, found: Vec<_>| {
-        let label = label(name).with(words);
-        Values::computed(&format!("{name}_{side}"), label, kind, found)
+        let of_side = label(name).with(words);
+        Values::computed(&format!("{name}_{side}"), of_side, kind, found)
     };
     let seeds = |side, count: fn(&Pair<'_>) -> usize| {
         let counts = pairs.iter().map(|pair| (Some(count(pair) as f64), None));
@@ -155,8 +155,8 @@ pub fn compare(a: &Results<'_>, b: &Results<'_>) -> Result<Comparison, ResultsEr
         let of = |set: &FinishedSet| set.estimates.get(name).cloned();
         let difference = |(a, b): &(&FinishedSet, &FinishedSet)| {
             let in_a = of(a).map(|a| if have_common_seeds { a } else { a.apart() });
-            let difference = of(b).zip(in_a);
-            let difference = difference.map(|(b, a)| Estimate::function([&b, &a], |[b, a]| b - a));
+            let both = of(b).zip(in_a);
+            let difference = both.map(|(b, a)| Estimate::function([&b, &a], |[b, a]| b - a));
             Estimate::both(difference.as_ref())
         };
         let number = |set: &FinishedSet| (of(set).map(|found| found.value), None);

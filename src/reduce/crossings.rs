@@ -240,8 +240,9 @@ impl<'a> Edge<'a> {
             };
             place = line.crossing.clamp(ends[0], ends[1]);
         }
-        let above = all.partition_point(|set| set.row as f64 <= place);
-        let above = above.clamp(1, all.len() - 1);
+        let above = all
+            .partition_point(|set| set.row as f64 <= place)
+            .clamp(1, all.len() - 1);
         let low = all[above - 1].row;
         let high = all[above].row;
         let nearest = floored(place.round()) as u64;
@@ -314,8 +315,8 @@ fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
     let moment: f64 = moments.sum();
     // Of the line at the origin, and of its slope.
     let sum = |weight: &dyn Fn(f64, f64) -> f64| {
-        let terms = sets.iter().zip(points());
-        let terms = terms.map(|(set, (x, of_set))| set.excess.times(weight(x, of_set)));
+        let pairs = sets.iter().zip(points());
+        let terms = pairs.map(|(set, (x, of_set))| set.excess.times(weight(x, of_set)));
         terms.reduce(|sum, term| Estimate::function([&sum, &term], |[sum, term]| sum + term))
     };
     let of_slope = |x: f64, weight: f64| weight * (x - mean) / moment;
@@ -529,7 +530,6 @@ pub fn pairs_of_edges(results: &Results<'_>) -> Result<Vec<EdgePair>, ResultsErr
             });
             // As wide as that of an edge, for the same reason.
             let half = difference.half_width().map(|half| LOOKS * half);
-            let difference = difference.value;
             let row = |key, edge: &Edge<'_>| EdgeRow {
                 edge: Some(scale.value(edge.place)),
                 ..row_between(
@@ -545,8 +545,8 @@ pub fn pairs_of_edges(results: &Results<'_>) -> Result<Vec<EdgePair>, ResultsErr
                     row(of_row[0].statistic.key, edge),
                     row(line.statistic.key, other),
                 ],
-                difference,
-                interval: half.map(|half| Interval::around(difference, half)),
+                difference: difference.value,
+                interval: half.map(|half| Interval::around(difference.value, half)),
             });
         }
     }

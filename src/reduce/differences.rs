@@ -62,8 +62,8 @@ impl Held {
             |set: &Parameters| symbol.is_of_modulation() && set.modulation_amplitude == 0.0;
         let all_are_controls = sets.iter().all(|set| is_control(set));
         let known = sets.iter().filter(|set| !set.unknown.contains(&symbol));
-        let known = known.filter(|set| all_are_controls || !is_control(set));
-        let mut values = known.map(|set| set.get(symbol));
+        let decisive = known.filter(|set| all_are_controls || !is_control(set));
+        let mut values = decisive.map(|set| set.get(symbol));
         let first = values.next()?;
         let is_constant = values.all(|value| is_same_value(first, value));
         Some(Self(is_constant.then_some(first)))

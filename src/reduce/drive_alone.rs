@@ -95,8 +95,8 @@ impl Explained {
         let Some(passages) = &self.passages else {
             return;
         };
-        let jobs = passages.iter();
-        let jobs = jobs.map(|(&seed, job)| (seed, &*job.phases)).collect();
+        let by_seed = passages.iter();
+        let jobs = by_seed.map(|(&seed, job)| (seed, &*job.phases)).collect();
         let jobs = match set.cycles {
             None => jobs,
             Some(cycles) => cycles.within(jobs, |(time, _)| *time),
@@ -155,8 +155,8 @@ impl Passage {
         let mut last = before.map(|onset| passage(onset).0);
         for slip in slips {
             let (time, cycle) = passage(slip.onset);
-            let phase = phase(time - cycle.cycle_start, cycle.period, cycle.eta);
-            phases.push((time, unit(phase)));
+            let vector = unit(phase(time - cycle.cycle_start, cycle.period, cycle.eta));
+            phases.push((time, vector));
             periods.extend(last.map(|last| unit(TAU * ((time - last) / cycle.period).fract())));
             last = Some(time);
         }

@@ -72,8 +72,8 @@ pub(crate) struct Units {
 impl Units {
     /// Of the values of jobs in order, by their seeds.
     pub(crate) fn of(jobs: impl IntoIterator<Item = (u64, Vec<Sums>)>) -> Self {
-        let jobs = jobs.into_iter().filter(|(_, values)| !values.is_empty());
-        let jobs: Vec<(u64, Vec<Sums>)> = jobs.collect();
+        let with_values = jobs.into_iter().filter(|(_, values)| !values.is_empty());
+        let jobs: Vec<(u64, Vec<Sums>)> = with_values.collect();
         let parts = MIN_UNITS.div_ceil(jobs.len().max(1));
         let mut units = Self::default();
         for (seed, values) in &jobs {
@@ -251,7 +251,7 @@ impl Numbers {
     pub(crate) fn of(jobs: &[(u64, Vec<f64>)], size: f64) -> Self {
         let all = || jobs.iter().flat_map(|(_, numbers)| numbers);
         let mean = all().sum::<f64>() / all().count() as f64;
-        let deviation = |number: &f64| {
+        let from_mean = |number: &f64| {
             let deviation = number - mean;
             if deviation.abs() <= ROUNDING * size {
                 0.0
@@ -260,7 +260,7 @@ impl Numbers {
             }
         };
         let sums = |number: &f64| {
-            let deviation = deviation(number);
+            let deviation = from_mean(number);
             [1.0, deviation, deviation * deviation]
         };
         let of_jobs = jobs
@@ -278,16 +278,18 @@ impl Numbers {
         let [count, ..] = self.deviations.total;
         let unbiased = (count / (count - 1.0)).sqrt();
         let seen = spread(self.deviations.total).unwrap_or_default();
-        let off = off.max(seen);
-        let wider = (seen * seen + MAX_UNSEEN * off * off / count).sqrt();
+        let most_off = off.max(seen);
+        let wider = (seen * seen + MAX_UNSEEN * most_off * most_off / count).sqrt();
         let mean = self
             .deviations
             .estimate(mean)
             .map(|mean| mean.plus(self.mean));
-        let deviation = self.deviations.estimate(spread);
-        let deviation = deviation.map(|deviation| deviation.times(unbiased));
+        let deviation = self
+            .deviations
+            .estimate(spread)
+            .map(|deviation| deviation.times(unbiased));
         [
-            mean.map(|mean| mean.allowing_for(MAX_UNSEEN * off / count)),
+            mean.map(|mean| mean.allowing_for(MAX_UNSEEN * most_off / count)),
             deviation.map(|deviation| deviation.allowing_for(unbiased * (wider - seen))),
         ]
     }
@@ -333,10 +335,10 @@ impl Estimate {
 
     /// The same of any number of them. Where jobs of one are cut otherwise than those of another, units are whole jobs.
     pub(super) fn of_all(of: &[&Self], function: impl Fn(&[f64]) -> f64) -> Self {
-        let units = of
+        let units: BTreeSet<Unit> = of
             .iter()
-            .flat_map(|one| one.without.iter().map(|(unit, _)| *unit));
-        let units: BTreeSet<Unit> = units.collect();
+            .flat_map(|one| one.without.iter().map(|(unit, _)| *unit))
+            .collect();
         let is_cut_otherwise = |one: &&Self| {
             let of_seeds: BTreeSet<u64> = one.without.iter().map(|((seed, _), _)| *seed).collect();
             let of_others = units.iter().filter(|(seed, _)| of_seeds.contains(seed));

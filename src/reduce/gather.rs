@@ -114,7 +114,7 @@ impl<'a> Gathering<'a> {
     fn slips_of(&self, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Gathered>, ResultsError> {
         let ids = sets.iter().map(|set| set.set_id.clone());
         let index: HashMap<String, usize> = ids.zip(0..).collect();
-        let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
+        let mut gathered: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
         // The job of the last slip, and its set if the job is wanted.
         let mut last = None;
         let mut found = None;
@@ -123,7 +123,7 @@ impl<'a> Gathering<'a> {
             let (job, slip) = row?;
             if last.as_ref() != Some(&job) {
                 let is_wanted = |&index: &usize| {
-                    (self.is_wanted)(&sets[index].jobs.parameters.with_seed(job.seed))
+                    (self.is_wanted)(&gathered[index].jobs.parameters.with_seed(job.seed))
                 };
                 found = index.get(&job.set_id).copied().filter(is_wanted);
                 last = Some(job);
@@ -131,14 +131,14 @@ impl<'a> Gathering<'a> {
             let (Some(index), Some(job)) = (found, &last) else {
                 continue;
             };
-            let set = &mut sets[index];
+            let set = &mut gathered[index];
             if place % spacing == 0 {
                 let point = Point::of(&set.jobs.parameters, &slip);
                 set.points.push((place, point));
             }
             set.slips.push(job.seed, &slip);
         }
-        Ok(sets)
+        Ok(gathered)
     }
 }
 
@@ -162,10 +162,10 @@ pub(super) fn sets_of(
         let set = sets.entry(job.set_id.clone()).or_insert_with_key(new);
         set.push(seed, &job);
     }
-    let mut sets: Vec<SetJobs> = sets.into_values().collect();
+    let mut sorted: Vec<SetJobs> = sets.into_values().collect();
     // From a map: sets that agree in all parameters stay in the order of their ids.
-    sets.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
-    Ok(sets)
+    sorted.sort_by(|left, right| by_parameters(&left.parameters, &right.parameters));
+    Ok(sorted)
 }
 
 /// The order of sets in every table.

@@ -36,8 +36,8 @@ pub(super) struct SlipStats {
 impl SlipStats {
     fn of(slip: &Slip) -> Self {
         let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
-        let periods = slip.interval.zip(slip.modulation.period);
-        let periods = periods.map(|(interval, period)| interval / period);
+        let both = slip.interval.zip(slip.modulation.period);
+        let periods = both.map(|(interval, period)| interval / period);
         Self {
             onset: slip.onset,
             interval: or_missing(slip.interval),
@@ -355,8 +355,8 @@ impl FinishedSet {
             self.row.tau_bound = Some(total / (ranked.sorted.len() + jobs.running.len()) as f64);
         }
         if jobs.cut > 0 {
-            let relative = self.row.tau_deviation.zip(self.row.tau_mean);
-            let relative = relative.map(|(deviation, mean)| deviation / mean);
+            let both = self.row.tau_deviation.zip(self.row.tau_mean);
+            let relative = both.map(|(deviation, mean)| deviation / mean);
             let cut_share = jobs.cut as f64 / ranked.sorted.len() as f64;
             self.row.tau_off = relative.map(|relative| -relative * relative * cut_share);
         }
@@ -368,8 +368,8 @@ impl FinishedSet {
         let drops = slips.each(|slip| non_nan(slip.drop));
         let drops = Numbers::of(&drops, slips.largest(|slip| slip.peak_force.max(slip.drop)));
         // A longer interval ends at a force that is higher by the additional drop.
-        let off = off * drops.mean;
-        let [mean, deviation] = drops.estimates(off);
+        let drop_off = off * drops.mean;
+        let [mean, deviation] = drops.estimates(drop_off);
         let both = deviation.as_ref().zip(mean.as_ref());
         let variation = both.map(|(deviation, mean)| {
             Estimate::function([deviation, mean], |[deviation, mean]| deviation / mean)
@@ -379,7 +379,7 @@ impl FinishedSet {
             self.note("drop_sd", deviation, POSITIVE);
         (self.row.drop_variation, _) = self.note("drop_cv", variation, POSITIVE);
         let forces = slips.each(|slip| non_nan(slip.peak_force));
-        let [force, _] = Numbers::of(&forces, 0.0).estimates(off);
+        let [force, _] = Numbers::of(&forces, 0.0).estimates(drop_off);
         (self.row.peak_force_mean, self.row.peak_force_interval) =
             self.note("peak_force_mean", force, ANY);
     }

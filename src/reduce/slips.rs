@@ -116,8 +116,10 @@ pub fn add_intervals(
             let Some(&place) = places.get(&set.jobs.set_id) else {
                 return Ok(());
             };
-            let set = set.finish_with(explained).0;
-            let of = names.iter().map(|column| set.estimate(&columns[*column]));
+            let finished = set.finish_with(explained).0;
+            let of = names
+                .iter()
+                .map(|column| finished.estimate(&columns[*column]));
             let found = of.collect::<Option<Vec<_>>>().map(|of| {
                 let value = |values: &[f64]| {
                     let known: HashMap<usize, f64> =
@@ -155,8 +157,8 @@ pub fn means_of_slips(
         }
     })?;
     let found = jobs.into_iter().map(|jobs| {
-        let jobs: Vec<(u64, Vec<f64>)> = jobs.into_iter().collect();
-        let [mean, _] = Numbers::of(&jobs, 0.0).estimates(0.0);
+        let by_seed: Vec<(u64, Vec<f64>)> = jobs.into_iter().collect();
+        let [mean, _] = Numbers::of(&by_seed, 0.0).estimates(0.0);
         Estimate::both(mean.as_ref())
     });
     Ok(Some(Values::of_numbers(name, &formula, &columns, found)))

@@ -119,8 +119,8 @@ impl Cycle {
         let [start, _] = pulse;
         let number = control.partition_point(|slip| slip.onset <= start);
         let free = control.get(number).ok_or(Excluded::AfterLast)?;
-        let last = number.checked_sub(1).map(|before| control[before]);
-        let last = last.ok_or(Excluded::BeforeFirst)?;
+        let before = number.checked_sub(1).ok_or(Excluded::BeforeFirst)?;
+        let last = control[before];
         if start < last.nucleation + last.duration || free.nucleation <= start {
             return Err(Excluded::WithinSlip);
         }
@@ -161,8 +161,8 @@ pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<Trigger
         return Vec::new();
     }
     let row = |&seed: &u64| {
-        let onsets = slips.of_job(seed).iter().map(|slip| slip.onset);
-        let onsets = onsets.collect::<Vec<_>>();
+        let of_job = slips.of_job(seed).iter();
+        let onsets = of_job.map(|slip| slip.onset).collect::<Vec<_>>();
         let control = explained.control.get(&seed).ok_or(Excluded::NoControl);
         let cycle = control.and_then(|control| Cycle::of(&jobs.parameters, control));
         let row = cycle.and_then(|cycle| cycle.row(&onsets));
@@ -179,17 +179,17 @@ pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<Trigger
 
 /// Notes how large advances by no pulse at all are, for each slider and drive.
 pub(super) fn note_noise(rows: &mut [TriggerRow]) {
-    let control = |row: &TriggerRow| row.parameters.without_modulation().with_seed(0);
+    let control_of = |row: &TriggerRow| row.parameters.without_modulation().with_seed(0);
     let nothing = rows.iter().filter(|row| row.is_nothing());
     let noise = |pulses: Pulses<'_>| {
         let advances = pulses.rows.iter().filter_map(|row| row.advance);
         let noise = advances.map(f64::abs).reduce(f64::max);
         (pulses.parameters, noise)
     };
-    let noises = Pulses::grouped(nothing, control).into_iter().map(noise);
-    let noises: Vec<(Parameters, Option<f64>)> = noises.collect();
+    let pulses = Pulses::grouped(nothing, control_of).into_iter();
+    let noises: Vec<(Parameters, Option<f64>)> = pulses.map(noise).collect();
     for row in rows {
-        let control = control(row);
+        let control = control_of(row);
         let noise = noises.iter().find(|(of, _)| *of == control);
         row.noise = noise.and_then(|(_, noise)| *noise);
     }

@@ -52,8 +52,8 @@ impl Values {
             numbers.push(cells[column].filter(|number| number.is_finite()));
             intervals.push(Interval::of(&columns, column, &cells));
         }
-        let words: BTreeSet<String> = given.iter().flatten().cloned().collect();
-        let words: Vec<String> = words.into_iter().collect();
+        let distinct: BTreeSet<String> = given.iter().flatten().cloned().collect();
+        let words: Vec<String> = distinct.into_iter().collect();
         for (number, word) in numbers.iter_mut().zip(given) {
             *number = number.or_else(|| words.binary_search(&word?).ok().map(|index| index as f64));
         }
@@ -89,10 +89,10 @@ impl Values {
     }
 
     fn of_formula<R: Row>(rows: &[R], text: &str, columns: &[Column]) -> Result<Self, String> {
-        let formula = formula(text, columns)?;
-        let numbers = rows.iter().map(|row| evaluate(&formula, row));
+        let expression = formula(text, columns)?;
+        let numbers = rows.iter().map(|row| evaluate(&expression, row));
         let found = numbers.map(|number| (number.is_finite().then_some(number), None));
-        Ok(Self::of_numbers(text, &formula, columns, found))
+        Ok(Self::of_numbers(text, &expression, columns, found))
     }
 
     /// The numbers of a formula of columns, with their unit, and their intervals.
@@ -241,9 +241,9 @@ impl Condition {
             let Column { name, unit, .. } = &columns[place];
             let name_alone = Expression::Name(place);
             let values = rows.iter().map(|row| evaluate(&name_alone, row));
-            let values = values.filter(|value| value.is_finite());
+            let finite = values.filter(|value| value.is_finite());
             let distance = |value: &f64| (value - wanted).abs();
-            let nearest = values.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            let nearest = finite.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
             let value = format!("{} {unit}", Shortest(nearest));
             Some(format!("{name} nearest to {wanted}: {}", value.trim_end()))
         };
@@ -291,8 +291,8 @@ fn unknown(name: &str, columns: &[Column]) -> String {
     let names: Vec<&str> = columns.iter().map(|column| &*column.name).collect();
     let is_longer = |known: &&str| known.starts_with(name) || known.ends_with(&format!("_{name}"));
     let offered = columns.iter().filter(|column| !column.is_end());
-    let longer = offered.map(|column| &*column.name).filter(is_longer);
-    let longer: Vec<&str> = longer.take(MAX_NAMES).collect();
+    let offered_names = offered.map(|column| &*column.name);
+    let longer: Vec<&str> = offered_names.filter(is_longer).take(MAX_NAMES).collect();
     let meant = match synonym(name, &names) {
         None if !longer.is_empty() => Some(longer.join(", ")),
         synonym => synonym.or_else(|| nearest(name, &names)).map(str::to_owned),
@@ -303,10 +303,10 @@ fn unknown(name: &str, columns: &[Column]) -> String {
 
 /// Each value once, in their order.
 pub fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup_by(|next, value| is_same(*next, *value));
-    values
+    let mut distinct: Vec<f64> = values.collect();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup_by(|next, value| is_same(*next, *value));
+    distinct
 }
 
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
@@ -337,8 +337,8 @@ pub fn swept(rows: &[SetRow]) -> Vec<Values> {
             &[symbol.key()]
         };
         let columns = names.iter().filter_map(|name| Values::of(rows, name).ok());
-        let columns = columns.map(Values::of_modulated);
-        columns.min_by_key(|swept| (swept.distinct.len(), !has_even_steps(&swept.distinct)))
+        let modulated = columns.map(Values::of_modulated);
+        modulated.min_by_key(|swept| (swept.distinct.len(), !has_even_steps(&swept.distinct)))
     };
     let symbols = differing(&rows.iter()).into_iter();
     let mut all: Vec<Values> = symbols.filter_map(column).collect();
