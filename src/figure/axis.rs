@@ -80,9 +80,9 @@ impl Axis {
 
     fn set_steps(&mut self, step: f64, power: i32) {
         let unit = libm::exp10(f64::from(power));
-        let decimals = decimals(step / unit);
+        let digits = decimals(step / unit);
         self.ticks = multiples(step, self.low, self.high)
-            .map(|tick| (tick, number(tick / unit, decimals)))
+            .map(|tick| (tick, number(tick / unit, digits)))
             .collect();
         // A step of 2 is halved, others are cut in five.
         let parts = if (step / libm::exp10(f64::from(exponent(step)))).round() == 2.0 {

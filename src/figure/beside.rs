@@ -76,8 +76,8 @@ impl Beside {
     ) -> Vec<LegendEntry> {
         let hollow = |other| has_marks(other).then_some(Mark::Hollow(other));
         let others = (0..self.others.len()).map(hollow);
-        let marks = std::iter::once(first).chain(others);
-        let marks = marks.map(|mark| mark.unwrap_or(Mark::Absent));
+        let found = std::iter::once(first).chain(others);
+        let marks = found.map(|mark| mark.unwrap_or(Mark::Absent));
         let entry = |(mark, name)| entry(mark, name);
         marks.zip(&self.names).map(entry).collect()
     }

@@ -143,9 +143,9 @@ impl<'a> Chart<'a> {
                 panels.push(panel);
             }
         }
-        let look = look.with_note(&self.note(&inside, &dots.free, bars_cut));
+        let noted = look.with_note(&self.note(&inside, &dots.free, bars_cut));
         let legend = self.legend(&inside, &dots);
-        Ok(panel::draw(name, &look, layout, &legend, panels))
+        Ok(panel::draw(name, &noted, layout, &legend, panels))
     }
 
     fn count(&self) -> usize {
@@ -154,14 +154,14 @@ impl<'a> Chart<'a> {
 
     fn refuse_empty(&self) -> BadOption {
         let Self { x, ys, .. } = self;
-        let is_log = x.is_log && x.column.distinct.first().is_none_or(|least| *least <= 0.0);
-        let is_log = is_log || ys.iter().any(|y| y.is_log);
+        let is_log_x = x.is_log && x.column.distinct.first().is_none_or(|least| *least <= 0.0);
+        let is_log = is_log_x || ys.iter().any(|y| y.is_log);
         let kind = if is_log { "a value > 0" } else { "a value" };
         let names: Vec<&str> = std::iter::once(x).chain(ys).map(Quantity::name).collect();
-        let names = names.join(" and ");
         let problem = format!(
-            "none of the {} has {kind} of both {names}; nothing can be drawn",
-            self.of
+            "none of the {} has {kind} of both {}; nothing can be drawn",
+            self.of,
+            names.join(" and ")
         );
         ys.first().unwrap_or(x).refuse(&problem)
     }
@@ -174,8 +174,8 @@ impl<'a> Chart<'a> {
                 && !self.x.has(set)
                 && self.ys.iter().any(|y| y.has(set))
         };
-        let free = (0..self.rows.sets.len()).filter(|set| self.other(*set).is_none());
-        let free: Vec<usize> = free.filter(is_free).collect();
+        let own = (0..self.rows.sets.len()).filter(|set| self.other(*set).is_none());
+        let free: Vec<usize> = own.filter(is_free).collect();
         if free.len() > INKS.len() {
             Vec::new()
         } else {
@@ -197,10 +197,10 @@ impl<'a> Chart<'a> {
         }
         let is_other = |swept: &&Values| parameter(&swept.column) != Some(symbol);
         let others = self.rows.swept.iter().filter(is_other);
-        let others: Vec<_> = others.map(Values::places).collect();
+        let of_others: Vec<_> = others.map(Values::places).collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
         for &set in sets.iter().filter(|set| self.other(**set).is_none()) {
-            let key = others.iter().map(|places| places[set]).collect();
+            let key = of_others.iter().map(|places| places[set]).collect();
             lines.entry(key).or_default().push(set);
         }
         let mut lines: Vec<Vec<usize>> =
@@ -243,9 +243,9 @@ impl<'a> Chart<'a> {
         }
         layers.extend(dots.free.iter().filter_map(level));
         for line in &dots.lines {
-            let mut line = line.clone();
-            line.retain(|set| members.contains(set));
-            self.add_line(&mut layers, y, dots, &line);
+            let mut of_members = line.clone();
+            of_members.retain(|set| members.contains(set));
+            self.add_line(&mut layers, y, dots, &of_members);
         }
         let dotted = members.iter().filter(|set| self.is_dotted(dots, **set));
         let alone = dotted.filter_map(|&set| self.drive_at(y, set));
@@ -349,8 +349,9 @@ impl<'a> Chart<'a> {
         };
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
         let mut sets = self.rows.sets.iter();
-        let free = sets.find(|row| row.parameters.modulation_period.is_none());
-        let free = free.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
+        let control = sets.find(|row| row.parameters.modulation_period.is_none());
+        let free =
+            control.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
         Some((REDUCTION.0 * unit, REDUCTION.1 * unit))
     }
@@ -372,8 +373,8 @@ impl Chart<'_> {
         }
         let has_marks = |other| inside.iter().any(|&set| self.other(set) == other);
         let ink = dots.hues.as_ref().map_or(INKS[0], |_| DARK_GREY);
-        let own = has_marks(None).then_some(Mark::Dot(Dot::solid(ink, RADIUS)));
-        let own = own.or((!dots.free.is_empty()).then_some(Mark::Line(REFERENCE)));
+        let dot = has_marks(None).then_some(Mark::Dot(Dot::solid(ink, RADIUS)));
+        let own = dot.or((!dots.free.is_empty()).then_some(Mark::Line(REFERENCE)));
         let beside = self.rows.beside;
         entries.extend(beside.entries(own, |other| has_marks(Some(other))));
         if !dots.free.is_empty() {
@@ -415,13 +416,13 @@ impl Chart<'_> {
 
     /// Swept parameters that nothing shows.
     fn pooled(&self) -> Option<String> {
-        let asked = self.ys.iter().chain([&self.x]).chain(&self.colour);
-        let asked = asked.map(|quantity| &quantity.column);
+        let quantities = self.ys.iter().chain([&self.x]).chain(&self.colour);
+        let asked = quantities.map(|quantity| &quantity.column);
         let sources = asked.chain(&self.panels).flat_map(|values| &values.sources);
         let shown: Vec<Option<Symbol>> = sources.map(parameter).collect();
         let is_pooled = |swept: &&Values| !shown.contains(&parameter(&swept.column));
-        let others = self.rows.others.iter();
-        let others = others.flat_map(|sets| swept(&self.rows.sets[sets.clone()]));
+        let ranges = self.rows.others.iter();
+        let others = ranges.flat_map(|sets| swept(&self.rows.sets[sets.clone()]));
         let all: Vec<Values> = self.rows.swept.iter().cloned().chain(others).collect();
         let pooled = all.iter().filter(is_pooled);
         let symbols: Vec<String> = pooled.map(|swept| swept.label.symbol.clone()).collect();
@@ -503,8 +504,8 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
     };
     let of = |&value: &f64| {
         let is_of = |set: &usize| values.numbers[*set].is_some_and(|number| is_same(value, number));
-        let sets: Vec<usize> = sets.iter().copied().filter(is_of).collect();
-        (values.setting(value), sets)
+        let members: Vec<usize> = sets.iter().copied().filter(is_of).collect();
+        (values.setting(value), members)
     };
     let mut groups: Vec<_> = values.distinct.iter().map(of).collect();
     groups.retain(|(_, sets)| !sets.is_empty());

@@ -133,10 +133,10 @@ fn medians_of<'a>(slips: &[RampedSlip], (low, high): Ends) -> Vec<Layer<'a>> {
             };
             let is_in_bin =
                 |slip: &&RampedSlip| slip.stage == stage && (start..end).contains(&slip.x);
-            let ratios = ratios(slips.iter().filter(is_in_bin));
-            let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share));
+            let of_bin = ratios(slips.iter().filter(is_in_bin));
+            let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&of_bin, share));
             if let [Some(first), Some(median), Some(third)] = quartiles
-                && ratios.len() >= MIN_INTERVALS
+                && of_bin.len() >= MIN_INTERVALS
             {
                 let x = start + (0.5 + OFFSETS[stage]) * width;
                 let stroke = Stroke::solid(ink, 2.0);

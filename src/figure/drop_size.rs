@@ -39,8 +39,8 @@ fn drop_size(sizes: &DropSizes, look: &Look) -> Option<Picture> {
         Some(Panel::inside(200.0, x.clone(), y, layers))
     };
     let number = counts().map(|count| (count.least, count.slips as f64));
-    let mean = counts().filter(|count| count.intervals > 0);
-    let mean = mean.map(|count| (count.least, count.seconds / count.intervals as f64));
+    let with_intervals = counts().filter(|count| count.intervals > 0);
+    let mean = with_intervals.map(|count| (count.least, count.seconds / count.intervals as f64));
     let panels = [
         panel("Number of slips", number.collect())?,
         panel("Mean interval (s)", mean.collect())?,

@@ -88,7 +88,7 @@ impl Layout {
         natural_heights: &[f64],
     ) -> (Page, Picture) {
         let count = natural_heights.len();
-        let natural_heights = natural_heights.iter().step_by(self.columns);
+        let row_heights = natural_heights.iter().step_by(self.columns);
         let columns = self.columns as f64;
         let between = (columns - 1.0) * self.column_gap;
         let beside = LEFT + between + self.right;
@@ -109,17 +109,17 @@ impl Layout {
         } else {
             Vec::new()
         };
-        let rows = natural_heights.len() as f64;
+        let rows = row_heights.len() as f64;
         let above_notes = top + rows * self.heading + (rows - 1.0) * self.row_gap + UNDER;
         let below_last = if notes.is_empty() { 0.0 } else { 0.5 };
         let around = above_notes + (notes.len() as f64 + below_last) * NOTE_ROW;
-        let natural: f64 = natural_heights.clone().sum();
+        let natural: f64 = row_heights.clone().sum();
         let scale = match asked {
             Some((_, height)) => (height - around) / natural,
             None => (width / self.width).min(1.0),
         };
-        let heights = natural_heights.map(|height| (scale * height).max(SHORTEST));
-        let heights: Vec<f64> = heights.collect();
+        let scaled = row_heights.map(|height| (scale * height).max(SHORTEST));
+        let heights: Vec<f64> = scaled.collect();
         let frames: f64 = heights.iter().sum();
 
         let mut sheet = Picture::new(name, look, (total, frames + around));
@@ -306,8 +306,8 @@ impl Frame {
             let (start, end) = self.room;
             let (label, size) = fitted_label("", &self.x, end - start);
             let half = 0.5 * text_width(&label, size);
-            let middle = self.left + 0.5 * self.width;
-            let middle = middle.min(end - half).max(start + half);
+            let of_frame = self.left + 0.5 * self.width;
+            let middle = of_frame.min(end - half).max(start + half);
             let place = (middle, self.bottom() + UNDER - 12.0);
             sheet.text(place, &label, size, Anchor::Middle);
         }
@@ -378,8 +378,8 @@ fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
 /// Values at the ticks of an axis of this length, and their lengths; in print without those that would stand close.
 fn ticks(axis: &Axis, length: f64, style: Style) -> impl Iterator<Item = (f64, f64)> {
     let are_left_out = style == Style::Print && axis.is_crowded(length);
-    let minor = axis.minor.iter().filter(move |_| !are_left_out);
-    let minor = minor.map(|&value| (value, MINOR_TICK_LENGTH));
+    let shown = axis.minor.iter().filter(move |_| !are_left_out);
+    let minor = shown.map(|&value| (value, MINOR_TICK_LENGTH));
     minor.chain(axis.ticks.iter().map(|&(value, _)| (value, TICK_LENGTH)))
 }
 

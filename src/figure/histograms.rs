@@ -55,9 +55,8 @@ impl<'a> HistogramPanel<'a> {
     /// What it shows, and the size of the sample.
     fn heading(&self) -> String {
         let count = |bars: &[&HistogramBin]| bars.iter().map(|bar| bar.count).sum::<u64>();
-        let overlay = self.overlay.as_ref();
-        let overlay = overlay.map(|bars| format!(" and {}", count(bars)));
-        let overlay = overlay.unwrap_or_default();
+        let other_bars = self.overlay.as_ref();
+        let overlay = other_bars.map_or_else(String::new, |bars| format!(" and {}", count(bars)));
         format!("{}: {}{overlay} intervals", self.title, count(&self.bars))
     }
 }
@@ -72,8 +71,8 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
         density: bin.density / factor,
         ..bin.clone()
     };
-    let bins: Vec<HistogramBin> = bins.iter().map(in_unit).collect();
-    let panels = panels(sets, &bins);
+    let scaled: Vec<HistogramBin> = bins.iter().map(in_unit).collect();
+    let panels = panels(sets, &scaled);
     if panels.len() > MAX_PANELS {
         return None;
     }
@@ -82,18 +81,18 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
     let panel = |(index, panel): (usize, &HistogramPanel<'_>)| {
         let x = Axis::linear(&format!("Slip interval τ ({unit})"), low.max(0.0), high);
         let period = factor * panel.period.unwrap_or(0.0);
-        let multiples = panel.period.map(|_| x.multiples_of(period, MAX_MULTIPLES));
-        let multiples = multiples.unwrap_or_default();
+        let of_period = panel.period.map(|_| x.multiples_of(period, MAX_MULTIPLES));
+        let multiples = of_period.unwrap_or_default();
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
         let density = format!("Probability density (1/{unit})");
         // The numbers cover no bar.
         let head = if multiples.is_empty() { 1.1 } else { 1.25 };
         let y = Axis::sparse(if index == 0 { &density } else { "" }, 0.0, head * highest);
         let bars = panel.bars.iter();
-        let bars = bars.map(|bar| (((bar.low, bar.high), (0.0, bar.density)), BAR.ink));
+        let cells = bars.map(|bar| (((bar.low, bar.high), (0.0, bar.density)), BAR.ink));
         let outlines = outline(&panel.bars).into_iter();
         let overlay = panel.overlay.iter().flat_map(|bars| outline(bars));
-        let mut inside = vec![Layer::Cells(bars.collect(), OVERLAP)];
+        let mut inside = vec![Layer::Cells(cells.collect(), OVERLAP)];
         inside.extend(outlines.map(|line| Layer::Curve(line, OUTLINE)));
         inside.extend(overlay.map(|line| Layer::Curve(line, OVERLAY)));
         let numbered = Layer::Drawn(Box::new(move |sheet, frame| {
@@ -134,8 +133,8 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<HistogramPanel<'
     shown.sort_by(|left, right| frequency(left).total_cmp(&frequency(right)));
     let mut others = differing(&shown.iter().copied());
     others.retain(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T));
-    let names = [Symbol::Delta.key(), FREQUENCY].into_iter();
-    let names = names.chain(others.into_iter().map(Symbol::key));
+    let of_modulation = [Symbol::Delta.key(), FREQUENCY].into_iter();
+    let names = of_modulation.chain(others.into_iter().map(Symbol::key));
     let columns: Vec<Values> = names
         .filter_map(|name| Values::of(sets, name).ok())
         .collect();
@@ -170,8 +169,8 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<HistogramPanel<'
 fn legend(panels: &[HistogramPanel<'_>]) -> Vec<LegendEntry> {
     let has_overlay = panels.iter().any(|panel| panel.overlay.is_some());
     let overlay = has_overlay.then(|| entry(Mark::Line(OVERLAY), "identical contacts, Δfₛ = 0"));
-    let multiples = panels.iter().any(|panel| panel.period.is_some());
-    let multiples = multiples.then(|| entry(Mark::Line(REFERENCE), "τ = nT"));
+    let has_period = panels.iter().any(|panel| panel.period.is_some());
+    let multiples = has_period.then(|| entry(Mark::Line(REFERENCE), "τ = nT"));
     [entry(Mark::Patch(BAR), "slips of all seeds")]
         .into_iter()
         .chain(overlay)

@@ -63,8 +63,8 @@ impl Hues {
         let Self::Inks(values) = self else {
             return Vec::new();
         };
-        let values = values.iter().filter(|(value, _)| is_shown(*value));
-        values
+        let shown = values.iter().filter(|(value, _)| is_shown(*value));
+        shown
             .map(|(value, name)| entry(Mark::Dot(Dot::solid(self.ink(*value), radius)), name))
             .collect()
     }

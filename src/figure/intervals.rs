@@ -107,9 +107,9 @@ pub(super) fn intervals(points: &[Point], beside: &Beside, look: &Look) -> Optio
         }
     });
     let note = "pooled: sets that differ in Δ";
-    let look = &look.with_note(if has_both { note } else { "" });
+    let noted = look.with_note(if has_both { note } else { "" });
     let layout = Layout::column(560.0);
-    Some(panel::draw(NAME, look, layout, &entries, panels.into()))
+    Some(panel::draw(NAME, &noted, layout, &entries, panels.into()))
 }
 
 #[cfg(test)]

@@ -69,17 +69,18 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         if let Some(set) = modulated.filter(|_| is_locking) {
             let amplitude =
                 |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
-            let places = x_axis.evenly_placed(200).into_iter();
-            let places: Vec<Place> = places.map(|place| (place, amplitude(place))).collect();
+            let along_x = x_axis.evenly_placed(200).into_iter();
+            let places: Vec<Place> = along_x.map(|place| (place, amplitude(place))).collect();
             let lines = [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke));
             lines.into()
         } else {
             let mut lines = map.borders(|set| sets[set].regime);
             for (regime, ink, _) in MARKS {
-                let of_it = map.sets.iter().map(|set| set.0);
-                let of_it = of_it.filter(|&set| sets[set].regime == Some(regime));
-                let places = of_it.filter_map(|set| x.number(set).zip(y.number(set)));
-                let places: Vec<Place> = places.collect();
+                let drawn = map.sets.iter().map(|set| set.0);
+                let of_it = drawn.filter(|&set| sets[set].regime == Some(regime));
+                let places: Vec<Place> = of_it
+                    .filter_map(|set| x.number(set).zip(y.number(set)))
+                    .collect();
                 lines.push(Layer::Dots(places.clone(), Dot::solid(BLACK, MARK)));
                 lines.push(Layer::Dots(places, Dot::solid(ink, HOLE)));
             }
@@ -108,8 +109,8 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         }
         let none = is_of_periods.then_some(FREE);
         let ink = |set| number(set).map(|n| colour(scale.place(n))).or(none);
-        let cells = map.sets.iter();
-        let cells = cells.filter_map(|&(set, position)| Some((map.cell(position), ink(set)?)));
+        let drawn = map.sets.iter();
+        let cells = drawn.filter_map(|&(set, position)| Some((map.cell(position), ink(set)?)));
         let cells = Layer::Cells(cells.collect(), OVERLAP);
         let layers = std::iter::once(cells).chain(lines());
         let heading = Some(std::mem::take(&mut bar.label));
@@ -128,8 +129,8 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let panels = columns.into_iter().filter_map(panel).collect();
     let name = if is_locking { LOCKING } else { REGIMES };
     let layout = Layout::column(if is_locking { 560.0 } else { 490.0 });
-    let legend = legend(is_locking, sets);
-    Some(panel::draw(name, look, layout, &legend, panels))
+    let entries = legend(is_locking, sets);
+    Some(panel::draw(name, look, layout, &entries, panels))
 }
 
 /// T, or 1/T if its steps are even and those of T are not.
@@ -245,9 +246,10 @@ impl Map {
 
     /// Lines between neighbours of different regimes.
     fn borders(&self, regime: impl Fn(usize) -> Option<Regime>) -> Vec<Layer<'static>> {
-        let regimes = self.sets.iter();
-        let regimes = regimes.map(|&(set, position)| (position, regime(set)));
-        let regimes: BTreeMap<Position, _> = regimes.collect();
+        let sets = self.sets.iter();
+        let regimes: BTreeMap<Position, _> = sets
+            .map(|&(set, position)| (position, regime(set)))
+            .collect();
         let differs = |position, next| {
             let other = regimes.get(&next);
             other.is_some_and(|other| *other != regimes[&position])

@@ -114,10 +114,11 @@ pub struct Drawn {
 
 /// What is to be said of pictures: in what directories differ, which have no mark, and letters that are boxes.
 pub fn remarks(pictures: &[Picture]) -> Vec<String> {
-    let lines = pictures.iter().flat_map(|picture| &picture.directories);
-    let lines = distinct(lines.map(String::as_str)).into_iter();
-    let lines = lines.map(|line| format!("differs  {}", line.replace('\u{a0}', " ")));
-    let mut remarks: Vec<String> = lines.collect();
+    let directories = pictures.iter().flat_map(|picture| &picture.directories);
+    let lines = distinct(directories.map(String::as_str)).into_iter();
+    let mut remarks: Vec<String> = lines
+        .map(|line| format!("differs  {}", line.replace('\u{a0}', " ")))
+        .collect();
     for picture in pictures {
         let name = picture.name();
         let absent = picture.absent.iter();
@@ -149,7 +150,7 @@ pub fn draw_all(
     // Slips after a pulse have a figure of their own.
     sets.retain(|set| set.parameters.pulse_start.is_none());
     let of_all = &beside.look(look, &sets);
-    let look = &look.with_note(&common(sets.iter().map(|set| &*set.parameters), &[]));
+    let noted = &look.with_note(&common(sets.iter().map(|set| &*set.parameters), &[]));
     let mut pictures: Vec<Picture> = Vec::new();
     pictures.extend(phase_eta::phase_eta(
         &points,
@@ -158,10 +159,10 @@ pub fn draw_all(
         of_all,
     ));
     pictures.extend(intervals::intervals(&points, beside, of_all));
-    pictures.extend(drag::drag(&points, look));
+    pictures.extend(drag::drag(&points, noted));
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
-        let map = map::map(&sets, look);
+        let map = map::map(&sets, noted);
         // More values than colours would be a net of lines, which a map shows better; a single set would be a dot.
         let is_net = || {
             swept(&sets)
@@ -174,11 +175,11 @@ pub fn draw_all(
         pictures.extend(map);
     }
     let edges: Vec<EdgeRow> = read_optional(layout).map_err(advise(ADVICE))?;
-    pictures.extend(edge_values::edges(&edges, look));
+    pictures.extend(edge_values::edges(&edges, noted));
     let pulses: Vec<PulseRow> = read_optional(layout).map_err(advise(ADVICE))?;
-    pictures.extend(triggering::triggering(&pulses, look));
+    pictures.extend(triggering::triggering(&pulses, noted));
     if sets.len() <= histograms::MAX_SETS {
-        pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
+        pictures.extend(histograms::histograms(&sets, &read(layout)?, noted));
     }
     if pictures.is_empty() {
         pictures.extend(overview::overview(&sets, beside, of_all));
@@ -191,7 +192,7 @@ pub fn draw_all(
             "no figure shows other directories: there is none of {figures}"
         ));
     }
-    let files = write(layout, &pictures, look, formats)?;
+    let files = write(layout, &pictures, noted, formats)?;
     // What earlier data gave, and these do not.
     for name in layout.storage.list(&layout.figures())? {
         let path = layout.figures().join(name);
@@ -211,8 +212,9 @@ pub fn draw_custom(
     figure: &CustomFigure,
     look: &Look,
 ) -> Result<Picture> {
-    let sets = read_sets(results.layout()).collect::<Result<Vec<_>, _>>();
-    let sets = sets.map_err(advise(ADVICE))?;
+    let sets = read_sets(results.layout())
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(advise(ADVICE))?;
     let picture = match figure.of {
         Dots::Sets => draw_sets(results, sets, beside, figure, look),
         Dots::Slips => draw_slips(results, &sets, figure, look),
@@ -273,9 +275,9 @@ fn draw_slips(
     } else {
         String::new()
     };
-    let common = common(slips.iter().map(|slip| &*slip.0.1), &[]);
+    let shared = common(slips.iter().map(|slip| &*slip.0.1), &[]);
     let condition = figure.shown_condition();
-    let look = look.with_note(&format!("{common}{condition}; {part}{matching} slips"));
+    let noted = look.with_note(&format!("{shared}{condition}; {part}{matching} slips"));
     let unknown = gaps(results.sweep()).unknown;
     let quantity = |option, name: &str| {
         let quantity = Quantity::of(&slips, option, name)?;
@@ -291,7 +293,7 @@ fn draw_slips(
         beside: &Beside::default(),
         others: Vec::new(),
     };
-    custom::custom(&quantity, rows, figure, &look)
+    custom::custom(&quantity, rows, figure, &noted)
 }
 
 /// Puts a figure into `figures/`, in these formats.

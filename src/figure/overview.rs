@@ -21,8 +21,8 @@ const QUANTITIES: [&str; 5] = [
 /// panels. A single set is a dot over its velocity. `None` if nothing was found.
 pub(super) fn overview(own: &[SetRow], beside: &Beside, look: &Look) -> Option<Picture> {
     let swept = swept(own);
-    let (rows, others) = beside.with_others(own.to_vec());
-    let rows = &rows[..];
+    let (all, others) = beside.with_others(own.to_vec());
+    let rows = &all[..];
     let quantity = |place: usize, option| Quantity::of(rows, option, swept.get(place)?.name()).ok();
     let x = quantity(0, "x").or_else(|| Quantity::of(rows, "x", "V0").ok())?;
     let shown = |y: &Quantity<'_>| -> Vec<usize> {
@@ -45,16 +45,16 @@ pub(super) fn overview(own: &[SetRow], beside: &Beside, look: &Look) -> Option<P
         values.sort();
         values.dedup();
         let has_all = |y: &Quantity<'_>| {
-            let shown = shown(y);
-            let is_shown = |value: &Option<usize>| shown.iter().any(|&set| places[set] == *value);
+            let sets = shown(y);
+            let is_shown = |value: &Option<usize>| sets.iter().any(|&set| places[set] == *value);
             values.iter().all(is_shown)
         };
         values.len() <= MAX_COLUMNS && ys.iter().all(has_all)
     };
     let mut candidates = [2, 1].into_iter().filter(|_| swept.len() > 2);
-    let panels = candidates.find(fills_panels);
-    let colour = quantity(if panels == Some(1) { 2 } else { 1 }, "colour");
-    let panels = panels.map(|place| swept[place].clone());
+    let of_panels = candidates.find(fills_panels);
+    let colour = quantity(if of_panels == Some(1) { 2 } else { 1 }, "colour");
+    let panels = of_panels.map(|place| swept[place].clone());
     Chart {
         of: "sets",
         rows: ChartRows {

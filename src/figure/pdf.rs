@@ -315,8 +315,8 @@ impl PdfPage {
             cmap.pair(code, letter);
         }
         pdf.cmap(to_unicode, &cmap.finish());
-        let letters = subsetter::subset(FACE.raw_face().data, 0, &self.glyphs);
-        let letters = letters.expect("the font of the program has its letters");
+        let letters = subsetter::subset(FACE.raw_face().data, 0, &self.glyphs)
+            .expect("the font of the program has its letters");
         pdf.stream(file, &compressed(&letters))
             .filter(Filter::FlateDecode);
     }

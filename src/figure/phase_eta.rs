@@ -168,8 +168,8 @@ fn columns(slips: &[Place], per_decade: f64) -> Vec<DensityColumn> {
     }
     // An η that no axis can show has no column.
     let bounded = |slips: Vec<Place>| Some((bounds(slips.iter().map(|slip| slip.0))?, slips));
-    let bins = bins.into_values().filter_map(bounded);
-    let (values, bins): (Vec<Ends>, Vec<_>) = bins.unzip();
+    let filled = bins.into_values().filter_map(bounded);
+    let (values, bins): (Vec<Ends>, Vec<_>) = filled.unzip();
     let column = |(index, slips): (usize, Vec<Place>)| {
         let (low, high) = values[index];
         let before = (index > 0).then(|| (low / values[index - 1].1).sqrt());

@@ -247,8 +247,8 @@ impl Picture {
         ink: Option<Ink>,
     ) {
         // XML has no way to write control characters, nor these two.
-        let content = shown_text(text).to_string();
-        let content = content.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
+        let shown = shown_text(text).to_string();
+        let content = shown.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
         let Some((before, (lower, after))) = subscript(&content) else {
             self.scene.add(Primitive::Text {
                 x,
@@ -343,8 +343,10 @@ fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
         let mut done = 0.0;
         while done < length {
             let at = |done: f64| {
-                let x = x + (end_x - x) * done / length;
-                (x, y + (end_y - y) * done / length)
+                (
+                    x + (end_x - x) * done / length,
+                    y + (end_y - y) * done / length,
+                )
             };
             let step = left.min(length - done);
             if draws {

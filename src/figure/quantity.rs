@@ -60,9 +60,9 @@ impl Quantity<'_> {
             column.distinct = ascending(column.numbers.iter().copied().flatten());
         }
         let mut columns = R::columns().into_iter();
-        let drive = columns.find(|other| other.class.explained() == Some(column.name()));
-        let drive = drive.and_then(|drive| Values::of(rows, &drive.name).ok());
-        let drive = drive.filter(|drive| drive.numbers.iter().any(Option::is_some));
+        let of_drive = columns.find(|other| other.class.explained() == Some(column.name()));
+        let values = of_drive.and_then(|drive| Values::of(rows, &drive.name).ok());
+        let drive = values.filter(|drive| drive.numbers.iter().any(Option::is_some));
         Ok(Self {
             drive,
             ..Self::of_values(option, column)
@@ -104,8 +104,8 @@ impl Quantity<'_> {
     /// The first of the swept parameters that it is made of, if it is made of parameters alone.
     pub(super) fn joined_along(&self, swept: &[Values]) -> Option<Symbol> {
         let own = self.parameters();
-        let mut swept = swept.iter().filter_map(|swept| parameter(&swept.column));
-        swept.find(|symbol| own.contains(symbol))
+        let mut symbols = swept.iter().filter_map(|swept| parameter(&swept.column));
+        symbols.find(|symbol| own.contains(symbol))
     }
 
     pub(super) fn axis_label(&self) -> String {
@@ -209,11 +209,11 @@ impl Quantity<'_> {
         let longest = FAR_LONGER * quantile(&lengths, 0.5).unwrap_or(0.0);
         let shown = |&set: &usize| {
             let bar = self.interval(set).filter(|&bar| length(bar) <= longest);
-            let bar = bar.map(|(low, high)| [low, high]);
+            let ends = bar.map(|(low, high)| [low, high]);
             let drive = self.drive.as_ref().and_then(|drive| drive.numbers[set]);
             self.number(set)
                 .into_iter()
-                .chain(bar.into_iter().flatten())
+                .chain(ends.into_iter().flatten())
                 .chain(drive)
         };
         let values = sets.iter().flat_map(shown);
@@ -261,8 +261,8 @@ fn lies_decades_apart(column: &Values) -> bool {
     let values = &column.distinct;
     // Shares are seen near 0, where their intervals reach it.
     let intervals = column.intervals.iter().flatten();
-    let intervals = intervals.filter(|_| column.label.unit.is_empty());
-    let least = intervals.map(|ends| ends.low).fold(least, f64::min);
+    let of_shares = intervals.filter(|_| column.label.unit.is_empty());
+    let least = of_shares.map(|ends| ends.low).fold(least, f64::min);
     // A single set, such as the only one that slides, changes no scale.
     let alone = usize::from(values.len() >= FEW_VALUES);
     let ends = (values[alone], values[values.len() - 1 - alone]);

@@ -91,8 +91,8 @@ fn draw(
     map: Option<&[MapRow]>,
     onsets: [&[f64]; 2],
 ) -> Result<Picture> {
-    let instants = trace.into_iter().flatten().map(|sample| sample.0);
-    let instants = instants.chain(map.into_iter().flatten().map(|cell| cell.time));
+    let of_trace = trace.into_iter().flatten().map(|sample| sample.0);
+    let instants = of_trace.chain(map.into_iter().flatten().map(|cell| cell.time));
     let (first, last) = bounds(instants)
         .filter(|(first, last)| last > first)
         .ok_or_else(|| anyhow!("figure {name}: there are fewer than two instants to draw"))?;
@@ -106,8 +106,8 @@ fn draw(
     let mut legend = Vec::new();
     let mut marks = Vec::new();
     for (onsets, (stroke, word)) in onsets.into_iter().zip(ONSETS) {
-        let shown = onsets.iter().filter(|onset| (first..=last).contains(onset));
-        let shown: Vec<(f64, Stroke)> = shown.map(|onset| (factor * onset, stroke)).collect();
+        let within = onsets.iter().filter(|onset| (first..=last).contains(onset));
+        let shown: Vec<(f64, Stroke)> = within.map(|onset| (factor * onset, stroke)).collect();
         legend.extend((!shown.is_empty()).then(|| entry(Mark::Line(stroke), word)));
         marks.extend(shown);
     }
@@ -141,8 +141,8 @@ impl Shared<'_> {
         under: Option<Layer<'l>>,
         over: impl IntoIterator<Item = Layer<'l>>,
     ) -> Panel<'l> {
-        let peaks = self.peaks.iter();
-        let peaks = peaks.map(|&peak| Layer::Upright(peak, REFERENCE));
+        let times = self.peaks.iter();
+        let peaks = times.map(|&peak| Layer::Upright(peak, REFERENCE));
         // Many lines would cover the slips.
         let are_marks = self.onsets.len() > MAX_LINES;
         let length = if are_marks { 0.07 } else { 1.0 } * (y.high - y.low);
@@ -170,9 +170,9 @@ impl Shared<'_> {
         let ends = bounds(trace.iter().map(|sample| sample.1));
         let (low, high) = widened(ends.unwrap_or((0.0, 0.0)));
         let y = Axis::linear("Shear force Fₛ (N)", low, high);
-        let force = thinned(trace, self.width).into_iter();
-        let force = force.map(|(time, force)| (self.factor * time, force));
-        let force = Layer::Curve(force.collect(), TRACE);
+        let samples = thinned(trace, self.width).into_iter();
+        let places = samples.map(|(time, force)| (self.factor * time, force));
+        let force = Layer::Curve(places.collect(), TRACE);
         self.panel(230.0, y, None, [force])
     }
 
@@ -180,10 +180,10 @@ impl Shared<'_> {
         let Self { factor, first, .. } = *self;
         let length = self.parameters.slider_length * MILLIMETRES;
         let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, length);
-        let cells = cells(map, self.parameters.blocks, first, length, self.width).into_iter();
-        let cells = cells
+        let unscaled = cells(map, self.parameters.blocks, first, length, self.width).into_iter();
+        let scaled = unscaled
             .map(|(((left, right), y), colour)| (((factor * left, factor * right), y), colour));
-        let cells = Layer::Cells(cells.collect(), OVERLAP);
+        let cells = Layer::Cells(scaled.collect(), OVERLAP);
         let percent = Axis::linear("detached (%)", 0.0, 100.0);
         Panel {
             bar: Some(ColourBar::of_axis(&percent, shade)),

@@ -107,8 +107,8 @@ impl Look {
 
     /// The same look with more small print.
     pub fn with_note(&self, more: &str) -> Self {
-        let notes = [&*self.note, more].into_iter();
-        let notes: Vec<&str> = notes.filter(|note| !note.is_empty()).collect();
+        let both = [&*self.note, more].into_iter();
+        let notes: Vec<&str> = both.filter(|note| !note.is_empty()).collect();
         Self {
             note: notes.join("; "),
             ..self.clone()

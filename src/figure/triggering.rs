@@ -44,10 +44,10 @@ struct DelayCurve {
 impl DelayCurve {
     fn values(&self) -> impl Iterator<Item = f64> + '_ {
         let bars = self.means.iter().filter_map(Mean::bar);
-        let bars = bars.flat_map(|(_, (low, high))| [low, high]);
+        let ends = bars.flat_map(|(_, (low, high))| [low, high]);
         let means = self.means.iter();
-        let means = means.flat_map(|mean| [mean.seen, mean.by_drive]);
-        means.chain(bars)
+        let values = means.flat_map(|mean| [mean.seen, mean.by_drive]);
+        values.chain(ends)
     }
 
     fn layers<'a>(self) -> [Layer<'a>; 3] {
@@ -93,7 +93,7 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
         let series = inks().map(|(period, ink)| {
             let own = rows.iter().filter(|row| is_of(row, amplitude, period));
             let parts = own.filter(|row| !row.is_of_whole_cycle());
-            let means = parts.filter_map(|row| {
+            let of_parts = parts.filter_map(|row| {
                 Some(Mean {
                     x: 0.5 * (row.place_low + row.place_high),
                     seen: row.advance_mean?,
@@ -101,7 +101,7 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
                     by_drive: row.advance_drive?,
                 })
             });
-            let means = means.collect();
+            let means = of_parts.collect();
             DelayCurve { ink, means }
         });
         series.collect::<Vec<_>>()
@@ -136,8 +136,8 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
         let means = shares.collect();
         DelayCurve { ink, means }
     });
-    let shares: Vec<DelayCurve> = shares.collect();
-    let most = shares
+    let curves: Vec<DelayCurve> = shares.collect();
+    let most = curves
         .iter()
         .flat_map(DelayCurve::values)
         .fold(0.0, f64::max);
@@ -147,24 +147,24 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
         HEIGHT,
         x,
         y,
-        shares.into_iter().flat_map(DelayCurve::layers),
+        curves.into_iter().flat_map(DelayCurve::layers),
     );
     last.heading = Some("within the pulse, later without it".to_owned());
     panels.push(last);
     let frequency = label("frequency");
-    let legend = inks().map(|(period, ink)| {
+    let periods = inks().map(|(period, ink)| {
         let text = frequency.setting(1.0 / period, Digits::THREE);
         entry(Mark::Bar(Dot::solid(ink, RADIUS)), text)
     });
     let drive = entry(Mark::Line(drive_alone(BLACK)), "by the drive alone");
-    let legend: Vec<LegendEntry> = legend.chain([drive]).collect();
+    let legend: Vec<LegendEntry> = periods.chain([drive]).collect();
     let layout = Layout {
         columns: COLUMNS.min(panels.len()),
         column_gap: LEFT + GAP,
         ..Layout::column(WIDTH)
     };
-    let look = look.with_note("bars: 95 % over seeds");
-    Some(panel::draw(NAME, &look, layout, &legend, panels))
+    let noted = look.with_note("bars: 95 % over seeds");
+    Some(panel::draw(NAME, &noted, layout, &legend, panels))
 }
 
 #[cfg(test)]

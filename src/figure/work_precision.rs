@@ -144,14 +144,14 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
         let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance))?;
         let y = Axis::logarithmic(if column == 0 { work_label } else { "" }, least, most);
         let x = Axis::logarithmic(&panel.label, low, high);
-        let chance = panel.by_chance.into_iter();
-        let chance = chance.map(|by_chance| Layer::Stripe((low, by_chance), STRIPE));
-        let lines = lines.iter().map(|line| panel.layer(line, x.low));
-        let layers = chance.chain(lines).collect();
+        let errors = panel.by_chance.into_iter();
+        let chance = errors.map(|by_chance| Layer::Stripe((low, by_chance), STRIPE));
+        let curves = lines.iter().map(|line| panel.layer(line, x.low));
+        let layers = chance.chain(curves).collect();
         Some(Panel::new(HEIGHT, x, y, layers))
     };
-    let panels: Option<Vec<Panel<'_>>> = panels.iter().enumerate().map(panel).collect();
-    let panels = panels.ok_or_else(empty)?;
+    let drawn: Option<Vec<Panel<'_>>> = panels.iter().enumerate().map(panel).collect();
+    let panels = drawn.ok_or_else(empty)?;
     Ok(panel::draw(NAME, look, layout, &legend, panels))
 }
 
