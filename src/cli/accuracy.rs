@@ -170,8 +170,8 @@ fn study_text(study: &Study, findings: &Findings) -> String {
 
 /// A line for each solver at a set; -> before that of the sweep.
 fn table(study: &Study, findings: &Findings, set: &Parameters) -> String {
-    let rows = findings.methods.iter();
-    let rows: Vec<&MethodRow> = rows.filter(|row| *row.parameters == *set).collect();
+    let methods = findings.methods.iter();
+    let rows: Vec<&MethodRow> = methods.filter(|row| *row.parameters == *set).collect();
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     let mut columns = TextTable::default();
     columns.words("   solver", &rows, |row| {

@@ -121,14 +121,14 @@ fn script(arguments: &Arguments, program: &Path) -> Result<String> {
             (HYPERQUEUE, arguments.of_hyperqueue(name), as_read)
         }
     };
-    let options = own_options.iter().chain(&arguments.options);
-    let options: String = options.map(|option| as_read(option)).collect();
-    let command: Vec<String> = command.iter().map(|word| quoted(word)).collect();
+    let all_options = own_options.iter().chain(&arguments.options);
+    let options: String = all_options.map(|option| as_read(option)).collect();
+    let words: Vec<String> = command.iter().map(|word| quoted(word)).collect();
     let values = [
         ("name", name),
         ("logs", &quoted(&logs)),
         ("options", &options),
-        ("command", &command.join(" ")),
+        ("command", &words.join(" ")),
     ];
     Ok(filled(template, &values))
 }
@@ -163,13 +163,13 @@ impl Arguments {
             String::new()
         };
         let seconds = self.time.as_secs();
-        let logs = logs.replace('%', "%%");
+        let escaped = logs.replace('%', "%%");
         let mut options = vec![
             format!("--job-name={name}"),
             format!("--array=1-{starts}{limit}"),
             format!("--cpus-per-task={}", self.threads),
             format!("--time={}:{:02}", seconds / 60, seconds % 60),
-            format!("--output={logs}/%A_%a.log"),
+            format!("--output={escaped}/%A_%a.log"),
         ];
         if margin(self.time) == MAX_MARGIN {
             options.push(format!("--signal=B:USR1@{WARNING}"));
@@ -292,9 +292,9 @@ fn by_clock(text: &str) -> Option<f64> {
         (None, 2) => &[MINUTE, 1],
         _ => return None,
     };
-    let fields = fields.into_iter().zip(units);
+    let pairs = fields.into_iter().zip(units);
     let mut seconds = 0.0;
-    for (number, unit) in fields.chain(days.map(|days| (days, &DAY))) {
+    for (number, unit) in pairs.chain(days.map(|days| (days, &DAY))) {
         seconds += f64::from(number.parse::<u32>().ok()?) * *unit as f64;
     }
     Some(seconds)
@@ -308,8 +308,8 @@ fn with_units(time: Duration) -> String {
         (seconds % HOUR / MINUTE, "m"),
         (seconds % MINUTE, "s"),
     ];
-    let parts = parts.into_iter().filter(|(number, _)| *number > 0);
-    parts
+    let nonzero = parts.into_iter().filter(|(number, _)| *number > 0);
+    nonzero
         .map(|(number, unit)| format!("{number}{unit}"))
         .collect::<Vec<_>>()
         .concat()

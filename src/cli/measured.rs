@@ -62,20 +62,20 @@ pub struct Arguments {
 
 impl Arguments {
     fn request(&self) -> Result<Request> {
-        let maximum = self.maximum.iter();
-        let maximum = maximum.map(|time| format!("maximum={time}"));
+        let times = self.maximum.iter();
+        let maximum = times.map(|time| format!("maximum={time}"));
         let settings: Vec<String> = self.settings.iter().cloned().chain(maximum).collect();
         let mut options = Vec::new();
         for (flag, texts) in [("--column", &self.columns), ("--set", &settings)] {
-            let texts = texts.iter().map(|text| output::quoted(text));
-            options.extend(texts.map(|text| format!("{flag} {text}")));
+            let quoted = texts.iter().map(|text| output::quoted(text));
+            options.extend(quoted.map(|text| format!("{flag} {text}")));
         }
         options.extend(self.decimal_comma.then(|| "--decimal-comma".to_owned()));
         if let Some(size) = &self.drop_size {
             options.push(format!("--drop-size {size} --smooth {}", self.smooth));
         }
-        let trace = self.drop_size.as_ref();
-        let trace = trace
+        let drop_size = self.drop_size.as_ref();
+        let trace = drop_size
             .map(|size| TraceRequest::new(size, self.smooth))
             .transpose()?;
         let columns = Given::parse_all("--column", &self.columns)?;
@@ -95,23 +95,23 @@ pub fn measured(arguments: &Arguments) -> Result<Exit> {
     // A library that panics on a damaged file has nothing to say to a user.
     let hook = panic::take_hook();
     panic::set_hook(Box::new(|_| ()));
-    let experiment = Experiment::read(&arguments.files, &request);
+    let outcome = Experiment::read(&arguments.files, &request);
     panic::set_hook(hook);
     let layout = layout(&arguments.out);
     let draw = |sizes: &DropSizes| -> Result<()> {
         let files = draw_drop_size(&layout, sizes)?;
         output::lines(files.iter().map(|path| format!("figure  {}", shown(path))))
     };
-    if let Err(error) = &experiment
+    if let Err(error) = &outcome
         && let Some(refused) = error.downcast_ref::<NoPlateau>()
         && !arguments.dry_run
     {
         draw(&refused.sizes)?;
     }
-    let experiment = experiment.map_err(refused)?;
+    let experiment = outcome.map_err(refused)?;
     let sweep = &experiment.sweep;
-    let read = experiment.read.iter();
-    let read: Vec<_> = read.map(|(head, text)| (&**head, text.clone())).collect();
+    let pairs = experiment.read.iter();
+    let read: Vec<_> = pairs.map(|(head, text)| (&**head, text.clone())).collect();
     output::pairs(&read)?;
     output::warn(&sweep.warnings());
     if arguments.dry_run {

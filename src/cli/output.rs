@@ -89,8 +89,8 @@ impl fmt::Display for TextTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = |cell: &String| cell.chars().count();
         let columns = self.0.iter().map(|(_, cells)| cells);
-        let widths = columns.clone().map(|cells| cells.iter().map(width).max());
-        let widths: Vec<usize> = widths.map(Option::unwrap_or_default).collect();
+        let widest = columns.clone().map(|cells| cells.iter().map(width).max());
+        let widths: Vec<usize> = widest.map(Option::unwrap_or_default).collect();
         let lines = columns.clone().next().map_or(0, Vec::len);
         let has_heads = columns.clone().any(|cells| !cells[0].is_empty());
         for line in usize::from(!has_heads)..lines {
@@ -137,9 +137,8 @@ pub fn missing(jobs_missing: u64, jobs_spilled: u64) -> String {
 /// What is missing of a directory, and the command that continues; `None` if nothing is.
 pub fn unfinished(results: &Results<'_>) -> Result<Option<String>> {
     let overview = results.overview()?;
-    let missing = missing(overview.jobs_missing, overview.jobs_spilled);
-    let command = command(results);
-    let unfinished = format!("{missing}; {command} continues with them");
+    let missing_jobs = missing(overview.jobs_missing, overview.jobs_spilled);
+    let unfinished = format!("{missing_jobs}; {} continues with them", command(results));
     Ok((overview.jobs_missing > 0).then_some(unfinished))
 }
 
@@ -152,11 +151,10 @@ pub fn command(results: &Results<'_>) -> String {
     if measured.files.is_empty() {
         return format!("stickslip.measured(TABLE, \"{root}\", ...) in Python, with its table");
     }
-    let files = measured.files.iter();
+    let sources = measured.files.iter();
     // Not to be taken for a flag.
-    let files = files.map(|file| quoted_path(&Path::new(".").join(&file.name)));
-    let files: Vec<String> = files.collect();
-    let files = files.join(" ");
+    let quoted = sources.map(|file| quoted_path(&Path::new(".").join(&file.name)));
+    let files = quoted.collect::<Vec<String>>().join(" ");
     format!("stickslip measured {files} {} -o {root}", measured.options)
 }
 
@@ -171,13 +169,13 @@ pub fn count(number: u64, noun: &str) -> String {
 
 /// Lines of the most frequent reasons of failures.
 pub fn by_reason(reasons: &Reasons) -> String {
-    let reasons = reasons.sorted();
+    let sorted = reasons.sorted();
     let mut lines = String::new();
-    for (reason, jobs) in reasons.iter().take(MAX_REASONS) {
+    for (reason, jobs) in sorted.iter().take(MAX_REASONS) {
         let jobs = count(*jobs, "job");
         lines = format!("{lines}failed  {jobs} in all: {}\n", shown_text(reason));
     }
-    if reasons.len() > MAX_REASONS {
+    if sorted.len() > MAX_REASONS {
         lines += "failed  for other reasons, too: see outcome and reason in tables/jobs\n";
     }
     lines

@@ -96,8 +96,8 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset, &changes)?;
     output::warn(&sweep.warnings());
     let default = || sweep::root(arguments.sweep.as_deref(), &sweep);
-    let root = arguments.out.clone();
-    let root = root.or_else(|| changes.is_empty().then(default));
+    let given = arguments.out.clone();
+    let root = given.or_else(|| changes.is_empty().then(default));
     if let Some(root) = &root {
         sweep::warn_of_partitions(root, &sweep);
     }
@@ -147,9 +147,9 @@ impl<'a> Forecast<'a> {
     }
 
     fn pairs(&self, sweep: &Sweep) -> Vec<(&'static str, String)> {
-        let axes = self.axes.iter();
-        let axes = axes.map(|axis| format!("{} ({})", axis.keys, axis.points));
-        let axes = match &*axes.collect::<Vec<_>>() {
+        let briefs = self.axes.iter();
+        let with_points = briefs.map(|axis| format!("{} ({})", axis.keys, axis.points));
+        let axes = match &*with_points.collect::<Vec<_>>() {
             [] => "none: a single point".to_owned(),
             axes => axes.join(" x "),
         };

@@ -111,8 +111,8 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         .iter()
         .map(|other| self::layout(other))
         .collect();
-    let others = layouts.iter().map(|other| renew(&Results::read(other)?));
-    let others = others.collect::<Result<Vec<Results<'_>>>>()?;
+    let renewed = layouts.iter().map(|other| renew(&Results::read(other)?));
+    let others = renewed.collect::<Result<Vec<Results<'_>>>>()?;
     if arguments.from.or(arguments.until).is_some() {
         let picture = trace(&results, arguments)?;
         let files = write_custom(layout, picture, &look, &arguments.format)?;
@@ -154,8 +154,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
 /// A stretch of the trace that slips came from.
 fn trace(results: &Results<'_>, arguments: &Arguments) -> Result<Picture> {
     let sweep = results.sweep();
-    let measured = sweep.measured();
-    let measured = measured.ok_or_else(|| {
+    let measured = sweep.measured().ok_or_else(|| {
         UsageError(
             "--from, --until: slips were computed; `simulate --plot` draws their trace".into(),
         )

@@ -39,8 +39,8 @@ pub fn report(arguments: &Arguments) -> Result<Exit> {
     let path = match &arguments.out {
         None => crate::report::write(&results, None)?,
         Some(device) if is_device(device) => {
-            let file = OpenOptions::new().append(true).open(device);
-            let file = file.map_err(StorageError::at("write", device))?;
+            let opened = OpenOptions::new().append(true).open(device);
+            let file = opened.map_err(StorageError::at("write", device))?;
             let page = crate::report::page(&results, None)?;
             // Nothing follows the page there.
             StoredFile::new(device, file).write(page.as_bytes())?;

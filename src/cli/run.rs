@@ -100,10 +100,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     };
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new(threads, sweep.rounds().is_some());
-    let report = crate::run::join(&layout, &sweep, options, |joined| {
+    let ended = crate::run::join(&layout, &sweep, options, |joined| {
         work(joined, &sweep, arguments, &mut progress)
     });
-    let report = report.map_err(|error| match Exit::of(&error) {
+    let report = ended.map_err(|error| match Exit::of(&error) {
         Exit::Stopped if progress.has_results() => {
             error.context("the run stopped; what was committed is kept")
         }

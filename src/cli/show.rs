@@ -92,8 +92,8 @@ impl Arguments {
         mut found: Json,
     ) -> Result<()> {
         if self.json {
-            let sets = (0..count).map(|set| record(columns, set).into_iter().collect());
-            let sets: Vec<Map<String, Json>> = sets.collect();
+            let records = (0..count).map(|set| record(columns, set).into_iter().collect());
+            let sets: Vec<Map<String, Json>> = records.collect();
             found["sets"] = serde_json::json!(sets);
             output::json(JSON_FORMAT, &found)
         } else if self.csv {
@@ -142,18 +142,19 @@ fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) 
     let of_drive = differences
         .iter()
         .filter(|difference| difference.is_of_drive());
-    let of_drive: Vec<String> = of_drive
+    let symbols: Vec<String> = of_drive
         .map(|difference| symbol_of(difference.symbol))
         .collect();
-    if !of_drive.is_empty() {
-        let drive = of_drive.join(", ");
+    if !symbols.is_empty() {
+        let drive = symbols.join(", ");
         output::warn(&[format!(
             "A and B differ in {drive}, which enters all differences below"
         )]);
     }
-    let constants = differences.iter();
-    let constants = constants.map(|difference| (difference.symbol.key(), &difference.constants));
-    let constants: BTreeMap<&str, &Vec<Option<Parameter>>> = constants.collect();
+    let constants: BTreeMap<&str, &Vec<Option<Parameter>>> = differences
+        .iter()
+        .map(|difference| (difference.symbol.key(), &difference.constants))
+        .collect();
     arguments.print(
         &columns,
         count,
@@ -164,8 +165,8 @@ fn show_differences(arguments: &Arguments, results: &Results<'_>, other: &Path) 
 
 /// Shows the sets of a directory whose reduced data are up to date.
 fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
-    let all = read_sets_in_rounds(results.layout()).collect::<Result<_, _>>();
-    let mut all: Vec<SetInRounds> = all?;
+    let mut all: Vec<SetInRounds> =
+        read_sets_in_rounds(results.layout()).collect::<Result<_, _>>()?;
     let usual = usual_names(&all.iter().map(|(row, _)| row));
     if let Some(text) = &arguments.condition {
         let refuse = |problem: String| UsageError(format!("--where {text}: {problem}"));
@@ -241,8 +242,8 @@ fn usual_names<'a>(rows: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<&'s
 }
 
 fn columns_of<'a>(names: impl IntoIterator<Item = &'a str>, rows: &[SetRow]) -> Vec<Values> {
-    let names = names.into_iter();
     names
+        .into_iter()
         .filter_map(|name| Values::of(rows, name).ok())
         .collect()
 }
@@ -327,8 +328,8 @@ fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
     let first = record(columns, 0);
     writer.write_record(first.iter().map(|(name, _)| name))?;
     for set in 0..sets {
-        let record = record(columns, set);
-        writer.write_record(record.iter().map(|(_, value)| match value {
+        let of_set = record(columns, set);
+        writer.write_record(of_set.iter().map(|(_, value)| match value {
             Json::Null => String::new(),
             Json::String(word) => word.clone(),
             value => value.to_string(),
@@ -376,12 +377,12 @@ fn parameters_but(symbol: Symbol, rows: impl Iterator<Item = Parameters>) -> Tex
         parameters: Selected::new(parameters),
         ..SetRow::default()
     };
-    let rows: Vec<SetRow> = rows.map(as_set).collect();
-    let mut parameters = differing(&rows.iter());
+    let sets: Vec<SetRow> = rows.map(as_set).collect();
+    let mut parameters = differing(&sets.iter());
     parameters.retain(|other| *other != symbol);
     let mut columns = TextTable::default();
-    for values in columns_of(parameters.into_iter().map(column_of), &rows) {
-        add_column(&mut columns, &values, &rows, rows.len());
+    for values in columns_of(parameters.into_iter().map(column_of), &sets) {
+        add_column(&mut columns, &values, &sets, sets.len());
     }
     columns
 }
@@ -418,11 +419,10 @@ fn table_of_pulses(results: &Results<'_>, pulses: &[PulseRow]) -> Result<String>
     });
     let triggers: Vec<TriggerRow> = read_optional(results.layout())?;
     let silent = triggers.iter().filter(|row| row.advance.is_none()).count();
-    let noise = triggers.iter().filter_map(|row| row.noise);
-    let noise = noise.reduce(f64::max).map(|noise| {
+    let noises = triggers.iter().filter_map(|row| row.noise);
+    let noise = noises.reduce(f64::max).map_or_else(String::new, |noise| {
         format!("; pulses of 1e-12 m at most advance slips by up to {noise:.1e} s, by the error of the solver")
     });
-    let noise = noise.unwrap_or_default();
     Ok(format!(
         "{columns}without a slip to compare: {silent} of {} pulses{noise}\n\n",
         triggers.len()
@@ -619,8 +619,9 @@ fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     let job = places
         .next()
         .and_then(|set| sweep.jobs_at(set..set + 1).next());
-    let command = job.map(|job| format!("; a job of one such set: {}", sweep.command(&job)));
-    let command = command.unwrap_or_default();
+    let command = job.map_or_else(String::new, |job| {
+        format!("; a job of one such set: {}", sweep.command(&job))
+    });
     Some(format!(
         "{jobs} ended because no further slip came: the slider slides, or give_up_after is too short{command}"
     ))
@@ -629,9 +630,10 @@ fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
 fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
     let jobs = jobs_of_sets(rows, |row| row.jobs_cut)?;
     let cut = rows.iter().filter(|row| row.jobs_cut > 0);
-    let off = cut.filter_map(|row| row.tau_off).reduce(f64::min);
-    let off = off.map(|off| format!(", by up to about {:.1} %", -100.0 * off));
-    let off = off.unwrap_or_default();
+    let most_off = cut.filter_map(|row| row.tau_off).reduce(f64::min);
+    let off = most_off.map_or_else(String::new, |off| {
+        format!(", by up to about {:.1} %", -100.0 * off)
+    });
     Some(format!(
         "{jobs} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` \
          in place of max_time ends jobs with a slip"
@@ -670,8 +672,8 @@ fn note_on_control(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
             let digits = Digits::THREE.distinguishing(&[value]);
             Some(label(symbol.key()).setting(value, digits))
         };
-        let settings = [Symbol::V0, Symbol::Kd].into_iter().filter_map(setting);
-        let settings: Vec<String> = settings.collect();
+        let known = [Symbol::V0, Symbol::Kd].into_iter().filter_map(setting);
+        let settings: Vec<String> = known.collect();
         format!("a control, slips at Δ = 0 and {}", settings.join(", "))
     } else {
         "control = true".to_owned()
@@ -708,16 +710,16 @@ const SIDE_EFFECTS: [(Symbol, &str); 3] = [
 ];
 
 fn note_on_model(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
-    let differing = differing(&rows.iter());
+    let varied = differing(&rows.iter());
     let applies = |symbol: &Symbol| match symbol {
-        Symbol::M => !differing.contains(&Symbol::Gamma),
+        Symbol::M => !varied.contains(&Symbol::Gamma),
         Symbol::Ns => sweep.recording().precursor_size.is_none(),
         _ => true,
     };
-    let notes = SIDE_EFFECTS
+    let relevant = SIDE_EFFECTS
         .iter()
-        .filter(|(symbol, _)| differing.contains(symbol) && applies(symbol));
-    let notes: Vec<&str> = notes.map(|(_, note)| *note).collect();
+        .filter(|(symbol, _)| varied.contains(symbol) && applies(symbol));
+    let notes: Vec<&str> = relevant.map(|(_, note)| *note).collect();
     (!notes.is_empty()).then(|| notes.join("\n"))
 }
 
@@ -740,8 +742,8 @@ fn note_on_removed_sets(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
         named.push(format!("{more} more"));
     }
     let sets = output::count(gone.len() as u64, "set");
-    let named = named.join("; ");
-    Some(format!("no longer in the sweep: {sets} of these: {named}"))
+    let names = named.join("; ");
+    Some(format!("no longer in the sweep: {sets} of these: {names}"))
 }
 
 #[cfg(test)]

@@ -313,15 +313,15 @@ impl Arguments {
         // The sample at an end is shown, however its time is rounded.
         let slack = 1e-6 * self.tables.sample;
         let shown = from - slack..=self.plot.until.unwrap_or(f64::INFINITY) + slack;
-        let trace = records.trace.iter().filter(|row| shown.contains(&row.time));
-        let trace: Vec<(f64, f64)> = trace.map(|row| (row.time, row.force)).collect();
-        let map = records.map.iter().filter(|row| shown.contains(&row.time));
-        let map: Vec<_> = map.copied().collect();
+        let samples = records.trace.iter().filter(|row| shown.contains(&row.time));
+        let trace: Vec<(f64, f64)> = samples.map(|row| (row.time, row.force)).collect();
+        let cells = records.map.iter().filter(|row| shown.contains(&row.time));
+        let map: Vec<_> = cells.copied().collect();
         let onsets: Vec<f64> = measured.slips.iter().map(|slip| slip.onset).collect();
         let trace = self.plot.draws(PlotPanel::Force).then_some(&*trace);
         let map = self.plot.draws(PlotPanel::Map).then_some(&*map);
-        let picture = simulation(parameters, trace, map, [&measured.start_up, &onsets]);
-        let picture = picture.map_err(|error| refused(error.to_string()))?;
+        let picture = simulation(parameters, trace, map, [&measured.start_up, &onsets])
+            .map_err(|error| refused(error.to_string()))?;
         for path in files {
             let (destination, format) = picture_file(path)?;
             output::write(&destination, &picture.encoded(format)?)?;
@@ -345,10 +345,10 @@ impl JobFlags {
             ("tolerance", &self.tolerance),
             ("dt", &dt),
         ];
-        let flags = flags.into_iter();
-        let flags = flags.filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
+        let pairs = flags.into_iter();
+        let of_flags = pairs.filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
         changes(&Variation {
-            settings: self.settings.iter().cloned().chain(flags).collect(),
+            settings: self.settings.iter().cloned().chain(of_flags).collect(),
             axes: Vec::new(),
         })
     }

@@ -91,11 +91,11 @@ const IN_THE_FILE: &str =
 /// What `--set` and `--axis` change.
 pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<KeyChange>, UsageError> {
     let mut changes: Vec<KeyChange> = Vec::new();
-    let settings = settings.iter().map(|text| ("--set", text));
-    for (flag, text) in settings.chain(axes.iter().map(|text| ("--axis", text))) {
+    let of_settings = settings.iter().map(|text| ("--set", text));
+    for (flag, text) in of_settings.chain(axes.iter().map(|text| ("--axis", text))) {
         let refused = |problem: String| UsageError(format!("{flag} {text}: {problem}"));
-        let (key, value) = text.split_once('=').unwrap_or_default();
-        let key = key.trim();
+        let (before, value) = text.split_once('=').unwrap_or_default();
+        let key = before.trim();
         if changes.iter().any(|earlier| earlier.key == key) {
             return Err(refused(format!("{key} is set before; keep one")));
         }

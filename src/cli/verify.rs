@@ -58,12 +58,12 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let is_damaged = !verification.whole && !arguments.repair;
     let root = output::quoted_path(layout.root());
     let results = Results::read(layout)?;
-    let sources = results
+    let sources: Vec<(&str, Compared)> = results
         .sweep()
         .measured()
         .into_iter()
-        .flat_map(compare_files);
-    let sources: Vec<(&str, Compared)> = sources.collect();
+        .flat_map(compare_files)
+        .collect();
     let has_changed = sources.iter().any(|(_, state)| *state == Compared::Differs);
     let mut commands = Vec::new();
     if is_damaged {
