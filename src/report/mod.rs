@@ -206,10 +206,11 @@ fn html(content: &Json) -> Result<String> {
         digest(&script),
         digest(STYLE)
     );
-    let page = PAGE.replacen("{{policy}}", &policy, 1);
-    let page = page.replacen("{{style}}", STYLE, 1);
-    let page = page.replacen("{{script}}", &script, 1);
-    Ok(page.replacen("{{data}}", &data, 1))
+    Ok(PAGE
+        .replacen("{{policy}}", &policy, 1)
+        .replacen("{{style}}", STYLE, 1)
+        .replacen("{{script}}", &script, 1)
+        .replacen("{{data}}", &data, 1))
 }
 
 /// The content, compressed, in characters that mean nothing in HTML.
