@@ -163,8 +163,8 @@ impl Collector<'_, '_> {
             // Each thread takes address space.
             threads = 1;
         }
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|error| {
+        let built = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = built.map_err(|error| {
             let problem =
                 format!("cannot start {threads} threads: {error}; take fewer with --threads");
             ResultsError::refused(self.pending.results.layout().root(), problem)
@@ -353,8 +353,8 @@ impl Collector<'_, '_> {
 
     /// Reports what other workers have done since the run began.
     fn report_others(&mut self) -> Result<(), ResultsError> {
-        let (jobs, cost) = self.pending.done_since()?;
-        let jobs = jobs.saturating_sub(self.own.0);
+        let (done, cost) = self.pending.done_since()?;
+        let jobs = done.saturating_sub(self.own.0);
         let predicted_cost = (cost - self.own.1).max(0.0);
         Ok(self.events.send(&RunEvent::OthersDone {
             jobs,

@@ -46,8 +46,8 @@ impl Threads {
         environment: impl Fn(&str) -> Option<OsString>,
     ) -> Result<Self, ThreadsError> {
         if let Some(asked) = asked {
-            let count = parse_threads(&asked.to_string());
-            let count = count.map_err(|must| ThreadsError(format!("{asked} threads: {must}")))?;
+            let count = parse_threads(&asked.to_string())
+                .map_err(|must| ThreadsError(format!("{asked} threads: {must}")))?;
             return Ok(Self {
                 count: Some(count),
                 variable: None,
@@ -156,8 +156,8 @@ fn left() -> [f64; 2] {
 
 /// Bytes that hard limits leave for jobs: of control groups, of the address space and of data; infinite if unknown.
 pub(super) fn allowed_memory() -> f64 {
-    let of_groups = of_groups(&text_of("/proc/self/cgroup"), Path::new("/sys/fs/cgroup"));
-    left().into_iter().fold(of_groups, f64::min)
+    let in_groups = of_groups(&text_of("/proc/self/cgroup"), Path::new("/sys/fs/cgroup"));
+    left().into_iter().fold(in_groups, f64::min)
 }
 
 /// Bytes that this process has or could get now without taking them from others; infinite if unknown.

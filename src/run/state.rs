@@ -141,8 +141,8 @@ pub fn status(results: &Results<'_>, max_failures: u64) -> Result<Status, Result
     };
     let living = results.layout().living(now)?;
     let workers: Vec<Present> = living.into_values().map(present).collect();
-    let threads = workers.iter().map(|worker| worker.threads);
-    let threads = threads.reduce(usize::saturating_add).or(last_threads);
+    let of_workers = workers.iter().map(|worker| worker.threads);
+    let threads = of_workers.reduce(usize::saturating_add).or(last_threads);
     let pace = (predicted > 0.0).then(|| measured / predicted);
     Ok(Status {
         name: results.sweep().name().to_owned(),

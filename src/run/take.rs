@@ -273,8 +273,8 @@ impl<'a> Work<'a> {
         }
         let part = self.pending.part(outline);
         let runs = |position: usize, why| self.pending.runs_again(&part.jobs[position], why);
-        let again = again.iter().filter(|(position, why)| runs(**position, why));
-        let jobs: Vec<usize> = again.map(|(position, _)| *position).collect();
+        let runnable = again.iter().filter(|(position, why)| runs(**position, why));
+        let jobs: Vec<usize> = runnable.map(|(position, _)| *position).collect();
         Ok(!jobs.is_empty() && self.take(part, BTreeSet::new(), jobs, generation)?)
     }
 
