@@ -140,8 +140,8 @@ impl Bias {
         let of = |which: fn(&Sample) -> &Estimate| {
             let [own, other] = [which(sample), which(reference)];
             let bias = own.value - other.value;
-            let half = own.half_width().zip(other.half_width());
-            let half = half.map(|(own, other)| libm::hypot(own, other));
+            let both = own.half_width().zip(other.half_width());
+            let half = both.map(|(own, other)| libm::hypot(own, other));
             (bias, half.map(|half| Interval::around(bias, half)))
         };
         let (of_mean, interval_of_mean) = of(|sample| &sample.mean);

@@ -71,8 +71,8 @@ pub fn write(
         to_json(study, findings).to_string().into_bytes(),
     )];
     for set in sets {
-        let others = other_settings(&set).map(|(key, value)| format!("-{key}-{value}"));
-        let others: String = others.collect();
+        let settings = other_settings(&set).map(|(key, value)| format!("-{key}-{value}"));
+        let others: String = settings.collect();
         let name = format!("work-precision-V0-{:e}{others}", set.drive_velocity);
         let picture = work_precision_figure(&set, findings)?;
         documents.push((name.clone(), "svg", picture.svg().into_bytes()));
@@ -96,9 +96,9 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
                         so that chance alone puts 1 dot of 20 above 1; bars: 95 %. Errors of break times: median, bars up to the \
                         largest.";
     const EXTRAPOLATED: &str = " * Cost extrapolated from that of a step.";
-    let rows = findings.methods.iter();
-    let rows = rows.filter(|row| row.parameters.without_modulation() == *set);
-    let rows: Vec<&MethodRow> = rows.collect();
+    let methods = findings.methods.iter();
+    let of_set = methods.filter(|row| row.parameters.without_modulation() == *set);
+    let rows: Vec<&MethodRow> = of_set.collect();
     let breaks = points(&rows, |row| {
         let error = row.break_times.median?;
         Some((error, (error, row.break_times.largest?)))
@@ -143,8 +143,8 @@ fn points(
     rows: &[&MethodRow],
     error: impl Fn(&MethodRow) -> Option<(f64, (f64, f64))>,
 ) -> Vec<WorkPrecision> {
-    let modulated = rows.iter().map(|row| &row.parameters);
-    let mut modulated = modulated.filter(|set| set.modulation_amplitude > 0.0);
+    let sets = rows.iter().map(|row| &row.parameters);
+    let mut modulated = sets.filter(|set| set.modulation_amplitude > 0.0);
     let first = modulated.next();
     let is_one = modulated.all(|other| Some(other) == first);
     let point = |row: &&MethodRow| {

@@ -164,8 +164,8 @@ fn others_in_words(parameters: &Parameters) -> String {
 fn other_settings(parameters: &Parameters) -> impl Iterator<Item = (&'static str, Value)> {
     let defaults = Parameters::default();
     let others = |symbol: &Symbol| !DriveAndSeed::SYMBOLS.contains(symbol);
-    let settings = Symbol::ALL.into_iter().filter(others);
-    let settings = settings.map(|symbol| (symbol, parameters.get(symbol)));
-    let settings = settings.filter(move |(symbol, value)| *value != defaults.get(*symbol));
-    settings.map(|(symbol, value)| (symbol.key(), value))
+    let symbols = Symbol::ALL.into_iter().filter(others);
+    let settings = symbols.map(|symbol| (symbol, parameters.get(symbol)));
+    let changed = settings.filter(move |(symbol, value)| *value != defaults.get(*symbol));
+    changed.map(|(symbol, value)| (symbol.key(), value))
 }

@@ -231,8 +231,8 @@ impl Study {
             let seeds = self.seeds * if set == 0 { self.first_set_multiple } else { 1 };
             report("reference ensemble, and realisations that are not timed");
             let reference = event_driven(Resolve::Taylor, ENSEMBLE_TOLERANCE);
-            let others = first + REFERENCE_SEEDS;
-            let others = others..others + REFERENCE_SHARE * seeds;
+            let begin = first + REFERENCE_SEEDS;
+            let others = begin..begin + REFERENCE_SHARE * seeds;
             let reference = self.slips_of(parameters, reference, others)?;
             if reference.is_empty() {
                 let case = set_in_words(parameters);
@@ -242,8 +242,8 @@ impl Study {
             }
             let intervals: Vec<f64> = reference.iter().filter_map(|slip| slip.interval).collect();
             let mean_interval = intervals.iter().sum::<f64>() / intervals.len() as f64;
-            let ensembles = ensembles.into_iter().zip(errors);
-            for (&solver, (mut ensemble, break_times)) in self.solvers.iter().zip(ensembles) {
+            let with_errors = ensembles.into_iter().zip(errors);
+            for (&solver, (mut ensemble, break_times)) in self.solvers.iter().zip(with_errors) {
                 findings.methods.push(MethodRow {
                     parameters: Selected::new(parameters.clone()),
                     case: set_in_words(parameters),
@@ -313,16 +313,16 @@ impl Study {
     fn unbalanced(&self, parameters: &Parameters, solver: Solver) -> Result<f64> {
         let mut largest: f64 = 0.0;
         for seed in self.first_seed..self.first_seed + AUDITED_JOBS {
-            let parameters = parameters.with_seed(seed);
-            let recording = self.recording(&parameters, solver);
+            let job = parameters.with_seed(seed);
+            let recording = self.recording(&job, solver);
             let limits = Limits {
                 end_time: recording.max_time.unwrap_or(f64::INFINITY),
                 events: recording.max_events,
                 interrupt: None,
             };
-            let mut observer = SlipObserver::new(&parameters, &recording);
-            let (_, ledger) = simulate_audited(&parameters, solver, limits, &mut observer)
-                .with_context(|| in_words(&parameters, solver))?;
+            let mut observer = SlipObserver::new(&job, &recording);
+            let (_, ledger) = simulate_audited(&job, solver, limits, &mut observer)
+                .with_context(|| in_words(&job, solver))?;
             largest = largest.max(ledger.residual().abs());
         }
         Ok(largest)
@@ -372,9 +372,9 @@ fn measured(
     solver: Solver,
     recording: &Recording,
 ) -> Result<(f64, Measurements)> {
-    let (cpu_seconds, measured) =
+    let (cpu_seconds, outcome) =
         limits::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
-    let measured = measured.with_context(|| in_words(parameters, solver))?;
+    let measured = outcome.with_context(|| in_words(parameters, solver))?;
     Ok((cpu_seconds, measured))
 }
 

@@ -40,10 +40,10 @@ pub fn too_few_slips(study: &Study) -> Option<String> {
 /// The lines, the answer first.
 pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
     let own = SolverColumns::from(study.own);
-    let compared = findings.biases.iter().filter(|row| row.solver == own);
-    let compared: Vec<&BiasRow> = compared.collect();
-    let rows = findings.methods.iter().filter(|row| row.solver == own);
-    let rows: Vec<&MethodRow> = rows.collect();
+    let own_biases = findings.biases.iter().filter(|row| row.solver == own);
+    let compared: Vec<&BiasRow> = own_biases.collect();
+    let own_methods = findings.methods.iter().filter(|row| row.solver == own);
+    let rows: Vec<&MethodRow> = own_methods.collect();
     let subject = if study.slips_of_sets.is_empty() {
         "The solver"
     } else {
@@ -81,7 +81,7 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
             comparisons
         ),
         None => {
-            let least_known = least_known.map(|row| {
+            let caveat = least_known.map(|row| {
                 let place = set_in_words(&row.parameters);
                 format!(
                     "one of the {} below {:.1} % would go unseen at {place}",
@@ -91,7 +91,7 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
             });
             format!(
                 "no bias found; with {slips} slips per solver {}",
-                least_known.unwrap_or_default()
+                caveat.unwrap_or_default()
             )
         }
     };
@@ -137,7 +137,7 @@ fn unbalanced(rows: &[&MethodRow]) -> Option<String> {
 /// The statistical error of the mean interval in the sets of a sweep, and whether the solver could add to it.
 fn statistical_error(study: &Study, intervals: &[&BiasRow], is_biased: bool) -> Option<String> {
     // The error of a difference of two means, scaled to the slips of the sweep: neighbours are correlated in both.
-    let errors = study
+    let errors: Vec<f64> = study
         .slips_of_sets
         .iter()
         .zip(&study.sets)
@@ -147,8 +147,8 @@ fn statistical_error(study: &Study, intervals: &[&BiasRow], is_biased: bool) -> 
             let of_difference = 1.0 / row.slips as f64 + 1.0 / row.reference_slips as f64;
             let scaled = half_width(row) * (1.0 / (own as f64 * of_difference)).sqrt();
             Some(percent(row, scaled)).filter(|error| error.is_finite())
-        });
-    let errors: Vec<f64> = errors.collect();
+        })
+        .collect();
     let least = errors.iter().copied().reduce(f64::min)?;
     let largest = errors.iter().copied().reduce(f64::max)?;
     let excluded_from = |row: &&BiasRow| percent(row, row.bias.of_mean.abs() + half_width(row));
