@@ -82,13 +82,13 @@ impl Label {
     /// Of a formula in this unit: with symbols in place of its columns.
     pub fn of_formula(text: &str, columns: &[Column], unit: String) -> Self {
         let is_sign = |letter: char| !letter.is_alphanumeric() && letter != '_';
-        let symbols = text.split_inclusive(is_sign).map(|part| {
+        let parts = text.split_inclusive(is_sign).map(|part| {
             let name = part.trim_end_matches(is_sign);
             let place = columns.iter().position(|known| known.name == name);
             let symbol = place.map(|place| Self::of(columns, place).symbol);
             symbol.unwrap_or_else(|| name.to_owned()) + &part[name.len()..]
         });
-        let symbols: String = symbols.collect();
+        let symbols: String = parts.collect();
         let symbol = symbols.replace('*', "·").replace("sqrt", "√");
         Self {
             what: symbol.clone(),
@@ -276,11 +276,11 @@ pub fn power_of_ten(mantissa: f64, power: i32) -> String {
         let digit = character.to_digit(10);
         digit.map_or('⁻', |digit| RAISED[digit as usize])
     };
-    let power: String = power.to_string().chars().map(raised).collect();
+    let exponent: String = power.to_string().chars().map(raised).collect();
     if mantissa == 1.0 {
-        format!("10{power}")
+        format!("10{exponent}")
     } else {
-        format!("{mantissa}·10{power}")
+        format!("{mantissa}·10{exponent}")
     }
 }
 
