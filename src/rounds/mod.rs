@@ -70,12 +70,12 @@ fn need(precision: &Precision, seeds: u64, most: u64, row: &SetRow) -> Option<u6
 /// The seeds that a set with `seeds` seeds gets next, if its half-width is `error` times the target; `None` if it needs
 /// no more. It ends with `least` at least, and with `most` at most.
 fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option<u64> {
-    let least = least.min(most);
-    if error <= 1.0 && seeds >= least {
+    let fewest = least.min(most);
+    if error <= 1.0 && seeds >= fewest {
         return None;
     }
     let now = seeds as f64;
-    let predicted = (now * error * error).ceil().max(least as f64);
+    let predicted = (now * error * error).ceil().max(fewest as f64);
     let next = predicted.clamp((1.25 * now).ceil(), 2.0 * now);
     let next = floored(next) as u64;
     Some(next.max(seeds + 1).min(most))
@@ -146,8 +146,8 @@ fn at_edges(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEd
     standing.sets_open = wanted.len() as u64;
     let is_done = |set: &&u64| !wanted.contains_key(set) && !capped.contains(set);
     standing.sets_done = sets.keys().filter(is_done).count() as u64;
-    let points = wanted.iter();
-    let points = points.flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds));
+    let asked = wanted.iter();
+    let points = asked.flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds));
     Round {
         points: sweep.with_controls(points.collect()),
         standing,
