@@ -25,8 +25,8 @@ pub fn measured(
     trace: Option<(String, usize)>,
     out: PathBuf,
 ) -> PyResult<Vec<(String, String)>> {
-    let trace = trace.map(|(drop_size, smooth)| TraceRequest::new(&drop_size, smooth));
-    let experiment = read(stream, &columns, &set, trace.transpose()).map_err(|error| {
+    let request = trace.map(|(drop_size, smooth)| TraceRequest::new(&drop_size, smooth));
+    let experiment = read(stream, &columns, &set, request.transpose()).map_err(|error| {
         let refused = error.downcast_ref::<NoPlateau>();
         let figure =
             refused.map(|refused| draw_drop_size(&Layout::new(&Disk, &out), &refused.sizes));

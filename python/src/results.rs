@@ -48,16 +48,16 @@ pub fn side_by_side(
             .iter()
             .map(|directory| Layout::new(&Disk, directory))
             .collect();
-        let all = layouts.iter().map(|layout| renew(&Results::read(layout)?));
-        let all: Vec<Results<'_>> = all.collect::<anyhow::Result<_>>()?;
+        let renewed = layouts.iter().map(|layout| renew(&Results::read(layout)?));
+        let all: Vec<Results<'_>> = renewed.collect::<anyhow::Result<_>>()?;
         let Some((first, others)) = all.split_first() else {
             return Ok(Vec::new());
         };
         let beside = Beside::read(first, others, &names)?;
         let sets = read_sets(first.layout()).collect::<Result<Vec<_>, _>>()?;
         let described = beside.described(&sets);
-        let described = described.map(|(name, settings)| (name.to_owned(), settings));
-        Ok::<_, Error>(described.collect())
+        let owned = described.map(|(name, settings)| (name.to_owned(), settings));
+        Ok::<_, Error>(owned.collect())
     });
     Ok(described?)
 }
