@@ -11,8 +11,8 @@ from stickslip.statistics import difference, jackknife, mean, near_whole, share
 from stickslip.tables import Sweep, select
 
 from .document import Section
-from .intervals import SIZES, count_by_slip, of_same_jobs
-from .kinematics import beyond_text, load_phase
+from .intervals import count_by_slip, of_same_jobs
+from .kinematics import beyond_drive, load_phase
 
 #: η from which the window of the phase holds φ_min (docs/model.md).
 WHOLE_WINDOW = 1.014
@@ -59,16 +59,15 @@ def locking_map(results: Path) -> Section:
         section.rows.append(
             {
                 "η": f"{low:g} to {high:g}",
-                "sets": len(mine),
                 "R": f"{mine['resultant_length'].mean():.3f}",
-                "R of the drive alone": f"{mine['resultant_drive'].mean():.3f}",
+                "of the drive alone": f"{mine['resultant_drive'].mean():.3f}",
                 "locking index": f"{mine['locking_index'].mean():.3f}",
-                "locking index of the drive alone": f"{mine['locking_index_drive'].mean():.3f}",
+                "of the drive alone ": f"{mine['locking_index_drive'].mean():.3f}",
             }
         )
     section.remark(
-        f"Means over {len(sets)} parameter sets with {sets['intervals'].sum()} intervals. All sets have the same control of"
-        " two seeds, so they err together.",
+        f"Means over {len(sets)} sets with {sets['intervals'].sum()} intervals. All have the same control of two seeds, so they"
+        " err together.",
     )
     return section
 
@@ -99,7 +98,7 @@ def staircase(results: Path) -> Section:
         section.rows.append({"Δ (µm)": f"{1e6 * amplitude:.1f}", "on a step": shares[amplitude].text(2)} | steps)
     widens = shares[max(shares)].low > shares[min(shares)].high
     section.remark(
-        "A period is on a step if the median τ is within 0.05 T of nT, by chance 0.1 of them.",
+        "A period is on a step if the median τ is within 0.05 T of nT; 0.1 of them are by chance.",
         f"The steps {'widen' if widens else 'do not widen beyond their errors'} with the amplitude.",
     )
     return section
@@ -112,25 +111,24 @@ def dependences(results: Path) -> Section:
         "`sweeps/locking-size.toml`, `locking-contacts.toml` and `locking-disorder.toml`, Δ = 1 µm",
         ("size", "contacts", "disorder"),
     )
-    bunched, beyond = [], []
+    bunched = []
     for sweep, column, symbol in (("size", "N", "N"), ("contacts", "Ns", "N_s"), ("disorder", "disorder", "Δf_s/f_s")):
         sets = Sweep(results / f"locking-{sweep}").sets()
         sets = sets.assign(disorder=(sets["dfs"] / sets["fs"]).round(3))
         still, modulated = (select(sets, Delta=amplitude) for amplitude in (0.0, 1e-6))
         tau, spread = 1e3 * still["tau_mean"], still["tau_sd"] / still["tau_mean"]
         bunched += list(modulated["resultant_length_low"] > 0.5)
-        beyond.append(f"{beyond_text(modulated, 'resultant')} ({symbol})")
         section.rows.append(
             {
                 "varied": f"{symbol} from {sets[column].min():g} to {sets[column].max():g}",
-                "τ unmodulated (ms)": f"{tau.min():.1f} to {tau.max():.1f}",
+                "τ of the control (ms)": f"{tau.min():.1f} to {tau.max():.1f}",
                 "s.d. over mean": f"{spread.min():.2f} to {spread.max():.2f}",
-                "least resultant of φ": f"{modulated['resultant_length'].min():.2f}",
+                "least R": f"{modulated['resultant_length'].min():.2f}",
+                "excess of R": beyond_drive(modulated, "resultant").text(2),
             }
         )
     section.remark(
-        f"The resultant of φ lies above 0.5 with its interval in {sum(bunched)} of {len(bunched)} sets.",
-        f"Less what the drive alone gives, with ends as in Fig. 3, it is {'; '.join(beyond)}.",
+        f"R lies above 0.5 with its interval in {sum(bunched)} of {len(bunched)} sets.",
     )
     return section
 
@@ -140,9 +138,9 @@ def choices(results: Path) -> Section:
     section = Section("What the model's choices change", source)
     sweep = Sweep(results / "choices")
     slips = sweep.slips()
-    changes = []
+    changes, unchanged = [], []
     for name, values in (
-        ("without modulation", {"Delta": 0.0}),
+        ("in the control", {"Delta": 0.0}),
         ("at 29 Hz", {"Delta": 1e-6, "T": 1 / 29}),
         ("at 58 Hz", {"Delta": 1e-6, "T": 1 / 58}),
         ("at Δ = 5 µm, 200 Hz", {"Delta": 5e-6, "T": 1 / 200}),
@@ -151,41 +149,42 @@ def choices(results: Path) -> Section:
         change = difference(tension, magnitude, "interval").scaled(1e3)
         pairs = tension.merge(magnitude, on=["seed", "slip"], suffixes=("", "_other"))
         same = (pairs["interval"] == pairs["interval_other"]).mean()
-        changes.append(f"{change.text(3)} ms {name} ({100 * same:.0f} %)")
+        # Intervals of either rule that have the same bits.
+        (unchanged if same == 1 else changes).append(name if same == 1 else f"mean τ by {change.text(3)} ms {name}")
     section.item(
-        f'`break_on = "tension"` changes mean τ by {"; ".join(changes)} (in brackets, intervals with the same bits).'
+        f'`break_on = "tension"` changes {", ".join(changes) or "nothing"};'
+        f" no interval {', '.join(unchanged) or 'is the same everywhere'}."
     )
     slips = slips[slips["break_on"] == "magnitude"]
     paper = slips[(slips["V0"] < 2e-4) & (slips["Delta"] < 2e-6)]
     still = select(paper, Delta=0.0)
     precursors = of_same_jobs(sweep.table("precursors"), still)
-    counts = (f"{count_by_slip(still, precursors, size).mean():.2f} at {size}" for size in (5, 10, *SIZES))
-    section.item(f"`precursor_size`: precursors per slip by their least number of breaks: {', '.join(counts)}.")
+    counts = (f"{count_by_slip(still, precursors, size).mean():.2f} from {size} breaks on" for size in (5, 20, 40, 100))
+    section.item(f"`precursor_size`: precursors of a slip of the control: {', '.join(counts)}.")
     whole = of_same_jobs(sweep.table("precursors"), slips)["extent"] >= slips["N"].iloc[0]
     released = 1 - slips["least_attached"] / slips["attached_before"]
     section.item(
         f"Cut of a slip (half of the attached contacts, a tenth of all): it rejects {whole.sum()} ruptures of extent N."
-        f" Slips release at least {released[paper.index].min():.2f} of the attached contacts for Δ up to 1 µm at 1e-4 m/s,"
-        f" {released.min():.2f} in the whole sweep."
+        f" Slips release at least {released.min():.2f} of the attached contacts, {released[paper.index].min():.2f} for Δ up to"
+        " 1 µm at 1e-4 m/s."
     )
-    sizes = ", ".join(f"{(still['largest_drop_before'] >= size).mean():.2f} from {size} N" for size in (0.5, 1, 2, 5, 10))
+    sizes = ", ".join(f"{(still['largest_drop_before'] >= size).mean():.2f} from {size} N" for size in (0.5, 2, 10))
     section.item(
-        f"`drop_size`: the least drop of a slip is {paper['drop_during'].min():.0f} N for Δ up to 1 µm at 1e-4 m/s."
-        f" Without modulation, shares of the slips that follow another drop: {sizes}."
+        f"`drop_size`: for the same Δ and V0 the least drop of a slip is {paper['drop_during'].min():.0f} N."
+        f" The share of the slips of the control that follow another drop is {sizes}."
     )
     sliding = sweep.table("jobs").query("slips == 0 and Delta == 0")
     given_up = (sliding["V0"] * sliding["simulated_time"]).min()
     waits = (slips["V0"] * slips["interval"])[slips["Delta"] == 0].max()
     section.item(
-        f"`give_up_after`: the longest wait for a slip is {waits / given_up:.2f} of it, from 1e-4 to 1e-3 m/s without"
-        " modulation."
+        f"`give_up_after`: the longest wait for a slip of the control is {waits / given_up:.2f} of it, from 1e-4 to 1e-3 m/s."
     )
     shares = select(sweep.sets(), Delta=0.0, break_on="magnitude").sort_values("V0")
     levels = (0.4, 0.5, 0.6, 0.9, 0.95, 0.99)
     edges = 1e3 * numpy.interp(levels, shares["slip_share"], shares["V0"])
     section.item(
-        "Edges of the regimes, by their share of time within slips:"
-        f" {', '.join(f'{edge:.2f} mm/s at {level:g}' for edge, level in zip(edges, levels, strict=True))}."
+        "Edges of the regimes, in mm/s by their share of time within slips:"
+        f" {', '.join(f'{edge:.2f} at {level:g}' for edge, level in zip(edges, levels, strict=True))}."
     )
     phases = Sweep(results / "fig3").slips()
     high = phases[phases["eta"] > WHOLE_WINDOW]
@@ -196,16 +195,20 @@ def choices(results: Path) -> Section:
     )
     low = phases[phases["eta"].between(0.28, 0.29) & (phases["Delta"] > 9e-7)]
     memory = numpy.exp(1j * load_phase(low)).groupby(low["slip"]).mean().abs()
-    section.item(
-        "Start at a maximum of the modulation: at η = 0.285 and Δ = 1 µm in `fig3`, load phases have a resultant of"
-        f" {', '.join(f'{length:.2f}' for length in memory)} at successive slips of {low['job_id'].nunique()} jobs."
-    )
+    later = len(memory) // 2
+    # A short sweep has no such sets.
+    if not memory.empty:
+        section.item(
+            "Start at a maximum of the modulation: at η = 0.285 and Δ = 1 µm in `fig3`, load phases of"
+            f" {low['job_id'].nunique()} jobs have an R of {memory.iloc[0]:.2f} at the first slip and of"
+            f" {memory.iloc[later:].max():.2f} at most from slip {later + 1} on."
+        )
     slips = Sweep(results / "choices-startup").slips()
     p = startup(slips)
     needed = p.index[p < 0.05].max() + 1 if (p < 0.05).any() else 0
     section.item(
         f"Start-up (`discard`): in {slips['set_id'].nunique()} sets of {slips['seed'].nunique()} seeds the first {needed}"
-        " slips differ from those from 20 on (Mann-Whitney, Holm's correction, 5 %); after them the least p is"
+        " slips differ from those from 20 on (Mann-Whitney, Holm's correction, 5 %); the least p of later ones is"
         f" {p[p.index >= needed].min():.2f}."
     )
     return section

@@ -18,6 +18,7 @@ from .kinematics import SOURCE, bounds_text
 
 #: Frequencies in Hz of Fig. 2e and 2f.
 FREQUENCIES = (29, 58)
+FIG_2 = "`sweeps/fig2.toml`; two values are those at 29 and 58 Hz"
 #: Minimum break counts at which precursors are counted; 20 is one block's worth.
 SIZES = (20, 30, 40, 60, 100)
 #: Breaks from which a precursor is large: ten blocks' worth.
@@ -65,12 +66,12 @@ def count_by_slip(slips: pandas.DataFrame, precursors: pandas.DataFrame, size: i
 
 
 def stick_slip(results: Path) -> Section:
-    section = Section("1. Stick-slip is regular but stochastic", "`sweeps/fig2.toml`", ("fig2",))
+    section = Section("1. Stick-slip is regular but stochastic", FIG_2, ("fig2",))
     sweep = Sweep(results / "fig2")
     slips = without_modulation(sweep.slips())
     spread = jackknife(lambda rows: rows["interval"].std() / rows["interval"].mean(), slips)
     section.check(
-        "unmodulated intervals are stochastic",
+        "intervals of the control are stochastic",
         "s.d. over mean from 0.05 to 0.3",
         spread.text(),
         spread.lies(above=0.05, below=0.3),
@@ -81,8 +82,7 @@ def stick_slip(results: Path) -> Section:
     section.check(
         "their distribution has two peaks",
         "two modes at Silverman's width in 95 of 100 samples of half of the seeds, and not in 5",
-        f"in {having_two} of {SAMPLES}; of all seeds,"
-        f" modes at {', '.join(f'{1e3 * mode:.0f}' for mode in modes)} ms",
+        f"in {having_two} of {SAMPLES}; modes of all at {', '.join(f'{1e3 * mode:.0f}' for mode in modes)} ms",
         having_two >= 0.95 * SAMPLES if is_decided else None,
     )
     ends = [0, *((low + high) / 2 for low, high in pairwise(modes)), slips["interval"].max()]
@@ -99,13 +99,13 @@ def stick_slip(results: Path) -> Section:
         *(before.high < after.low for found in numbers.values() for before, after in pairwise(found)),
     )
     drops = share(slips["drops_before"].isin([2, 3]), slips["seed"])
-    two_or_three = (f"{count.isin([2, 3]).mean():.2f} from {size} breaks" for size, count in counts.items())
+    two_or_three = (f"{count.isin([2, 3]).mean():.2f}" for count in counts.values())
     section.remark(
-        f"Slips with two or three precursors, as most in the paper: {', '.join(two_or_three)}; {drops.text(2)} by drops of the"
-        " force of 0.5 N or more."
+        f"Two or three precursors, as most slips of the paper, have {', '.join(two_or_three)} of the slips at these sizes,"
+        f" {drops.text(2)} by drops of the force of 0.5 N or more."
     )
     parts = ", ".join(f"{len(rows) / len(slips):.0%}" for rows in of_modes)
-    section.why = f"modes of all seeds have {parts} of the slips; {having_two} of {SAMPLES} halves have two"
+    section.why = f"two modes, with {parts} of the slips; {having_two} of {SAMPLES} halves of the seeds have two"
     return section
 
 
@@ -116,7 +116,7 @@ def of_slips(count: pandas.Series, slips: pandas.DataFrame) -> Estimate:
 
 
 def identical_contacts(results: Path) -> Section:
-    section = Section("2. Identical contacts keep the distribution broad", "`sweeps/fig2.toml`")
+    section = Section("2. Identical contacts keep the distribution broad", FIG_2)
     slips = Sweep(results / "fig2").slips()
     identical, disordered = (
         jackknife(lambda rows: 1e3 * rows["interval"].std(), rows)
@@ -132,7 +132,7 @@ def identical_contacts(results: Path) -> Section:
 
 
 def integer_multiples(results: Path) -> Section:
-    section = Section("3. Intervals are integer multiples of the period", "`sweeps/fig2.toml`")
+    section = Section("3. Intervals are integer multiples of the period", FIG_2)
     sweep = Sweep(results / "fig2")
     slips, precursors = sweep.slips(), sweep.table("precursors")
     still = without_modulation(slips)
@@ -140,34 +140,34 @@ def integer_multiples(results: Path) -> Section:
     indices = [jackknife(lambda rows: locking_index(rows["tau_over_T"]), rows) for rows in modulated]
     unmodulated = [locking_index(still["interval"] * frequency) for frequency in FREQUENCIES]
     reduced = [select(sweep.sets(), T=1 / frequency, Delta=1e-6).iloc[0] for frequency in FREQUENCIES]
-    near = [share(near_whole(rows["tau_over_T"]), rows["seed"]) for rows in modulated]
     section.check(
         "τ locks",
         "locking index > 0.7",
-        f"{at_frequencies(indices)}; unmodulated {', '.join(f'{chance:.3f}' for chance in unmodulated)};"
-        f" within 0.1 T of nT {', '.join(one.text() for one in near)}, by chance 0.2",
+        f"{texts(indices)}; control {', '.join(f'{chance:.3f}' for chance in unmodulated)}",
         *(index.lies(above=0.7) for index in indices),
+    )
+    by_drive = (f"{row['locking_index_drive']:.3f}" for row in reduced)
+    excesses = (
+        f"{row['locking_index_excess']:.3f}"
+        f" ({row['locking_index_excess_low']:.3f}–{row['locking_index_excess_high']:.3f})"
+        for row in reduced
     )
     section.check(
         "more than the drive alone makes",
-        "locking index above that of the drive alone",
-        ", ".join(
-            f"{row['locking_index_drive']:.3f} by the drive, excess {row['locking_index_excess']:.3f}"
-            f" ({row['locking_index_excess_low']:.3f}–{row['locking_index_excess_high']:.3f}) at {frequency} Hz"
-            for row, frequency in zip(reduced, FREQUENCIES, strict=True)
-        ),
+        "excess of the locking index above 0",
+        f"{', '.join(excesses)}; drive alone {', '.join(by_drive)}",
         *(row["locking_index_excess_low"] > 0 for row in reduced),
     )
     for what, intervals, column in (
-        ("so do times from the largest precursor to its slip", lead_times(sweep), "lead"),
-        ("so do those between precursors, if longer than T/2", precursors, "interval"),
+        ("so do times from the largest precursor to the slip", lead_times(sweep), "lead"),
+        ("so do times between precursors, if longer than T/2", precursors, "interval"),
     ):
         found = [index_of(column, select(intervals, T=1 / frequency), frequency) for frequency in FREQUENCIES]
         chances = [index_of(column, of_same_jobs(intervals, still), frequency) for frequency in FREQUENCIES]
         section.check(
             what,
-            "locking index > 0.5 and above unmodulated",
-            f"{at_frequencies(found)}; unmodulated {', '.join(f'{chance.value:.3f}' for chance in chances)}",
+            "locking index > 0.5 and above the control's",
+            f"{texts(found)}; control {', '.join(f'{chance.value:.3f}' for chance in chances)}",
             *(index.low > max(chance.high, 0.5) for index, chance in zip(found, chances, strict=True)),
         )
     return section
@@ -179,8 +179,8 @@ def index_of(column: str, rows: pandas.DataFrame, frequency: float) -> Estimate:
     return jackknife(lambda rows: locking_index(rows[column] * frequency), rows)
 
 
-def at_frequencies(found: list[Estimate], digits: int = 3, unit: str = "") -> str:
-    return ", ".join(f"{one.text(digits)}{unit} at {f} Hz" for one, f in zip(found, FREQUENCIES, strict=True))
+def texts(found: list[Estimate]) -> str:
+    return ", ".join(one.text() for one in found)
 
 
 def lead_times(sweep: Sweep) -> pandas.DataFrame:
@@ -199,15 +199,15 @@ def many_periods(results: Path) -> Section:
     slips = slips.assign(near=near_whole(slips["tau_over_T"]))
     whole, bunched = (share(rows["near"], rows["set_id"]) for rows in (slips, slips[slips["resultant_length"] > 0.5]))
     section.check("", "more than the 0.2 of chance within 0.1 T of nT, for η > 1", whole.text(), whole.lies(above=0.2))
-    section.check("once locked", "more than 0.5 where the resultant of φ is above 0.5", bunched.text(), bunched.lies(above=0.5))
+    section.check("once locked", "more than 0.5 where R is above 0.5", bunched.text(), bunched.lies(above=0.5))
     sets = Sweep(results / "locking-drive-alone").sets()
     section.note = "; for slow drives the drive alone makes it so"
-    section.why = f"the locking index is {bounds_text(sets[sets['eta'] > 1], 'locking_index')}"
+    section.why = f"up to 1e-5 m/s the excess of the locking index is {bounds_text(sets[sets['eta'] > 1], 'locking_index')}"
     return section
 
 
 def stress_drops(results: Path) -> Section:
-    section = Section("9. Stress drops synchronise in part", "`sweeps/fig2.toml`")
+    section = Section("9. Stress drops synchronise in part", FIG_2)
     slips = Sweep(results / "fig2").slips()
     still = without_modulation(slips).dropna(subset="interval")
 
@@ -215,7 +215,7 @@ def stress_drops(results: Path) -> Section:
         """The share of the drops' variance that a straight line in τ explains."""
         return rows["interval"].corr(rows["drop"]) ** 2
 
-    of_tau = {"without modulation": jackknife(common, still)}
+    of_tau = [jackknife(common, still)]
     modulated, chances = [], []
     for frequency in FREQUENCIES:
         rows = select(slips, Delta=1e-6, frequency=frequency).dropna(subset="periods")
@@ -224,18 +224,18 @@ def stress_drops(results: Path) -> Section:
             """The locking index of the drops, in units of what the force gains in a period."""
             return locking_index(rows["drop"] * frequency / stats.linregress(rows["interval"], rows["drop"]).slope)
 
-        of_tau[f"at {frequency} Hz"] = jackknife(common, rows)
+        of_tau.append(jackknife(common, rows))
         modulated.append(jackknife(index, rows))
         chances.append(jackknife(index, still))
     section.check(
         "",
-        "locking index of the drops, in units of what the force gains in T, above that without modulation",
-        f"{at_frequencies(modulated)}; unmodulated {', '.join(one.text() for one in chances)}",
+        "locking index of the drops, in units of what the force gains in T, above the control's",
+        f"{texts(modulated)}; control {texts(chances)}",
         *(one.low > chance.high for one, chance in zip(modulated, chances, strict=True)),
     )
     section.remark(
-        "Drops follow τ, as the force grows at the rate K_d V0; the square of their correlation is"
-        f" {', '.join(f'{found.text(3)} {where}' for where, found in of_tau.items())}.",
+        "Drops follow τ, as the force grows at the rate K_d V0: the square of their correlation is"
+        f" {texts(of_tau[1:])}; control {of_tau[0].text()}.",
     )
     section.verdict = "restates statement 3"
     section.why = "drops follow τ"

@@ -56,11 +56,11 @@ def beyond_text(sets: pandas.DataFrame, column: str) -> str:
 
 
 def bounds_text(sets: pandas.DataFrame, column: str) -> str:
-    """How far off what the drive alone gives sets with slow drives are at most."""
+    """The greatest excess of sets with slow drives, of either sign."""
     sets = sets[sets["V0"] < SLOW]
     mean = beyond_drive(sets, column)
     each = sets[[f"{column}_excess_low", f"{column}_excess_high"]].abs().max(axis=None)
-    return f"the drive's to {max(-mean.low, mean.high):.2f} in the mean over sets, to {each:.2f} in each, up to 1e-5 m/s"
+    return f"at most {max(-mean.low, mean.high):.2f} in the mean over sets, {each:.2f} in each"
 
 
 def nucleation_phase(slips: pandas.DataFrame) -> pandas.Series:

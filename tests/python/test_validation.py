@@ -95,7 +95,7 @@ def test_slips_at_random_loads_above_phi_min_meet_the_criteria_of_statement_5():
     ("other", "failed"),
     [
         (lambda eta, ranks: kinematics.random_load_phases(eta, ranks) - 0.4, "almost no slip below"),
-        (lambda eta, ranks: 0.6 * kinematics.random_load_phases(eta, ranks), "the back-bone is"),
+        (lambda eta, ranks: 0.6 * kinematics.random_load_phases(eta, ranks), "the backbone is"),
         (lambda eta, ranks: -ranks * eta ** (-1 / 3), "φ ∝"),
         (lambda eta, ranks: 0.6 * kinematics.random_load_phases(eta, ranks), "slips appear with"),
         (lambda eta, ranks: kinematics.random_load_phases(eta, ranks) + 0.4, "φ saturates"),
