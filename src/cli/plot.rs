@@ -45,6 +45,13 @@ pub struct Arguments {
         value_parser = choice(&Style::ALL, Style::word, Style::description)
     )]
     style: Style,
+    /// Size of the labels of axes in points, such as 14 for slides; all else is in proportion [default: 13.5, in print
+    /// 7.6]
+    #[arg(long, value_name = "POINTS", value_parser = font)]
+    font: Option<f64>,
+    /// Leave the small print to the caption, and print it
+    #[arg(long)]
+    no_caption: bool,
     /// Another results directory, computed or measured, as hollow marks in phi-eta, tau-T, overview and custom figures
     /// of sets. Repeatable
     #[arg(long = "with", value_name = "DIR")]
@@ -77,6 +84,7 @@ const EXAMPLES: &str = "\
 Examples:
   stickslip plot results/fig3                                          the standing figures, as SVG and PNG
   stickslip plot results/fig3 --format pdf --style print               for a paper
+  stickslip plot results/fig3 --font 14 --no-caption --size 240mmx135mm  for a slide
   stickslip plot --list                                                the columns that can be drawn
   stickslip plot results/sliding-velocity --x V0 --y tau_mean --log xy
   stickslip plot results/fig3 --x eta --y phase_mean --colour V0 --panels Delta --log x -o phase.pdf
@@ -90,6 +98,8 @@ impl Arguments {
         Look {
             style: self.style,
             size: self.size,
+            font: self.font,
+            no_caption: self.no_caption,
             ..Look::of_sweep(results.sweep().name())
         }
     }
@@ -126,8 +136,8 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     }
     let drawn = if let Some(figure) = arguments.custom.figure() {
         let picture = draw_custom(&results, &beside, &figure, &look)?;
-        if look.style == Style::Print {
-            output::report(&format!("for the caption: {}", picture.note()));
+        if let Some(caption) = picture.caption() {
+            output::report(&format!("for the caption: {caption}"));
         }
         let remarks = remarks(std::slice::from_ref(&picture));
         let files = match &out {
@@ -288,6 +298,13 @@ fn limits(text: &str) -> Result<AxisLimits, &'static str> {
         Some((low, high)) if text.trim() != ":" => Ok((end(low)?, end(high)?)),
         _ => Err(WANTED),
     }
+}
+
+/// Points of a label.
+fn font(text: &str) -> Result<f64, &'static str> {
+    let points = text.parse().ok();
+    let points = points.filter(|points| (4.0..=100.0).contains(points));
+    points.ok_or("must be a number of points from 4 to 100, such as 14")
 }
 
 /// `86mmx60mm`; lengths in mm, cm, in, pt or px, a pixel being 1/96 inch.

@@ -93,15 +93,14 @@ impl Layout {
         let between = (columns - 1.0) * self.column_gap;
         let beside = LEFT + between + self.right;
         let natural = beside + columns * self.width;
-        let asked = look.size.map(|size| size.units(look.style));
-        let total = asked.map_or_else(|| look.style.width(natural), |(width, _)| width);
+        let asked = look.asked();
+        let total = asked.map_or_else(|| look.width(natural), |(width, _)| width);
         let width = ((total - beside) / columns).max(SHORTEST);
         let total = beside + columns * width;
 
         let right = total - MARGIN;
         let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * legend::ROW;
-        // A journal has the small print in the caption.
-        let notes = if look.style == Style::Screen {
+        let notes = if look.has_caption() {
             let notes = std::iter::once(&look.note).chain(&look.directories);
             notes
                 .flat_map(|note| wrapped(note, right - MARGIN))

@@ -2,7 +2,7 @@
 //! and amplitude of the modulation, a regime map over two other parameters.
 
 use super::axis::{Axis, bounds, is_wide};
-use super::frame::{Cell, Layout, OVERLAP};
+use super::frame::{Cell, Ends, Layout, OVERLAP};
 use super::hues::ColourBar;
 use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
@@ -91,8 +91,13 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let quantity = of(column)?;
         let class = quantity.column.column.class;
         let is_of_periods = class == Class::Category;
-        let is_known = |set: &usize| !is_of_periods || sets[*set].has_phase;
-        let number = |set: usize| quantity.number(set).filter(|_| is_known(&set));
+        let is_excess = class == Class::Excess;
+        let holds_zero = |(low, high): Ends| low <= 0.0 && high >= 0.0;
+        let is_unclear = |set: usize| {
+            (is_of_periods && !sets[set].has_phase)
+                || (is_excess && quantity.interval(set).is_some_and(holds_zero))
+        };
+        let number = |set: usize| quantity.number(set).filter(|_| !is_unclear(set));
         let most = if is_of_periods {
             MAX_PERIODS + 1.0
         } else {
@@ -101,13 +106,12 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let ends = || bounds((0..sets.len()).filter_map(number).map(|n| n.min(most)));
         let label = quantity.axis_label();
         let scale = scale_of(class, &label, ends())?;
-        let is_excess = class == Class::Excess;
         let colour = if is_excess { diverging } else { cell_shade };
         let mut bar = ColourBar::of_axis(&scale, colour);
         if is_of_periods {
             mark_periods(&mut bar, &scale, ends().unwrap_or_default());
         }
-        let none = is_of_periods.then_some(FREE);
+        let none = (is_of_periods || is_excess).then_some(FREE);
         let ink = |set| number(set).map(|n| colour(scale.place(n))).or(none);
         let drawn = map.sets.iter();
         let cells = drawn.filter_map(|&(set, position)| Some((map.cell(position), ink(set)?)));
@@ -200,7 +204,10 @@ fn legend(is_locking: bool, sets: &[SetRow]) -> Vec<LegendEntry> {
                 Mark::Line(LINE),
                 "η = 1; above, the load falls in each period",
             ),
-            entry(Mark::Patch(free), "no phase"),
+            entry(
+                Mark::Patch(free),
+                "(a) no phase; (c) 0 within the interval of the excess",
+            ),
         ];
     }
     let mut entries = Vec::new();
@@ -342,7 +349,7 @@ mod tests {
             set.resultant_excess = Some(excess);
         }
         let svg = drawn(&sets);
-        assert!(svg.contains("Resultant length beyond"));
+        assert!(svg.contains("Excess of the resultant"));
         for share in [0.0, 0.5, 1.0] {
             assert!(
                 svg.matches(&diverging(share).to_string()).count() > 20,

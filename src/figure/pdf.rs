@@ -48,7 +48,7 @@ pub(super) fn pdf(scene: &Scene, points: f64) -> Vec<u8> {
     clippy::cast_possible_truncation,
     reason = "a PDF has single precision"
 )]
-const fn single(value: f64) -> f32 {
+pub(super) const fn single(value: f64) -> f32 {
     value as f32
 }
 

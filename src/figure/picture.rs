@@ -1,9 +1,10 @@
 //! Pictures: what is drawn, as SVG, PNG and PDF. The same data give the same bytes.
 
 use super::BadOption;
-use super::pdf::pdf;
+use super::pdf::{pdf, single};
 use super::style::{
-    BLACK, Dot, FACE, Fill, HALF_DIGIT, Ink, Look, Size, Stroke, Style, text_width,
+    BLACK, Dot, FACE, Fill, HALF_DIGIT, Ink, Look, POINTS_PER_INCH, Size, Stroke, Style, Unit,
+    text_width,
 };
 use crate::table::shown::shown_text;
 use crate::table::value::words;
@@ -29,6 +30,9 @@ const MAX_PIXELS: f64 = 1e8;
 pub struct Picture {
     name: String,
     pub(super) style: Style,
+    unit: Unit,
+    /// Whether the small print is part of it.
+    has_caption: bool,
     note: String,
     /// In what each of several directories differs from others.
     pub(super) directories: Vec<String>,
@@ -65,8 +69,12 @@ impl Picture {
         &self.name
     }
 
-    /// Its small print, which print leaves to the caption.
-    pub fn note(&self) -> String {
+    /// Its small print, if that is left to the caption.
+    pub fn caption(&self) -> Option<String> {
+        (!self.has_caption).then(|| self.note())
+    }
+
+    fn note(&self) -> String {
         let lines = std::iter::once(&self.note).chain(&self.directories);
         // Lines may be broken anywhere there.
         lines
@@ -93,7 +101,7 @@ impl Picture {
 
     pub fn size(&self) -> Size {
         let [width, height] =
-            [self.scene.width, self.scene.height].map(|side| self.style.millimetres(side));
+            [self.scene.width, self.scene.height].map(|side| self.unit.millimetres(side));
         Size { width, height }
     }
 
@@ -101,13 +109,13 @@ impl Picture {
         match format {
             PictureFormat::Svg => Ok(self.svg().into_bytes()),
             PictureFormat::Png => self.png(),
-            PictureFormat::Pdf => Ok(pdf(&self.scene, self.style.points())),
+            PictureFormat::Pdf => Ok(pdf(&self.scene, self.unit.0)),
         }
     }
 
     pub fn svg(&self) -> String {
         let svg = SvgBackend::new().render_scene(&self.scene);
-        if self.style == Style::Screen {
+        if self.unit == Look::default().unit() {
             return svg;
         }
         // The library gives sizes in pixels only, so a picture of this size holds it.
@@ -118,7 +126,8 @@ impl Picture {
     }
 
     pub fn png(&self) -> Result<Vec<u8>> {
-        let pixels = self.scene.width * self.scene.height * f64::from(self.style.pixels()).powi(2);
+        let scale = self.style.resolution() * self.unit.0 / POINTS_PER_INCH;
+        let pixels = self.scene.width * self.scene.height * scale * scale;
         if pixels > MAX_PIXELS {
             return Err(BadOption(format!(
                 "figure {}: a PNG of {:.0} million pixels is too large, the most is {:.0} million; take a smaller --size, \
@@ -130,7 +139,7 @@ impl Picture {
             .into());
         }
         RasterBackend::new()
-            .with_scale(self.style.pixels())
+            .with_scale(single(scale))
             .render_scene(&self.scene)
             .map_err(|reason| anyhow!("figure {}: cannot be turned into PNG: {reason}", self.name))
     }
@@ -150,6 +159,8 @@ impl Picture {
         Self {
             name: name.to_owned(),
             style: look.style,
+            unit: look.unit(),
+            has_caption: look.has_caption(),
             note: look.note.clone(),
             directories: look.directories.clone(),
             absent: Vec::new(),

@@ -20,8 +20,8 @@ words! {
     }
 }
 
-/// Points, of 1/72 inch, per millimetre.
-const POINTS_PER_MILLIMETRE: f64 = 72.0 / 25.4;
+pub(super) const POINTS_PER_INCH: f64 = 72.0;
+const POINTS_PER_MILLIMETRE: f64 = POINTS_PER_INCH / 25.4;
 /// Widths of one and of two columns of a journal, in mm.
 const COLUMNS: [f64; 2] = [86.0, 178.0];
 /// Widest figure, in units, that goes into one column.
@@ -38,35 +38,26 @@ impl Style {
         })
     }
 
-    pub(super) const fn points(self) -> f64 {
+    /// Of a PNG, in pixels per inch.
+    pub(super) const fn resolution(self) -> f64 {
         match self {
-            Self::Screen => 0.75,
-            Self::Print => 0.42,
+            Self::Screen => 192.0,
+            Self::Print => 600.0,
         }
     }
+}
 
-    /// Pixels of a PNG per unit.
-    pub(super) const fn pixels(self) -> f32 {
-        match self {
-            Self::Screen => 2.0,
-            Self::Print => 3.5,
-        }
+/// The length of a unit, in points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Unit(pub(super) f64);
+
+impl Unit {
+    pub(super) fn of_millimetres(self, millimetres: f64) -> f64 {
+        millimetres * POINTS_PER_MILLIMETRE / self.0
     }
 
-    /// Width of a sheet of this natural width, in units, if no size is requested.
-    pub(super) fn width(self, natural: f64) -> f64 {
-        match self {
-            Self::Screen => natural,
-            Self::Print => {
-                COLUMNS[usize::from(natural > MAX_ONE_COLUMN)] * POINTS_PER_MILLIMETRE
-                    / self.points()
-            }
-        }
-    }
-
-    /// A length of a sheet in mm.
     pub(super) fn millimetres(self, units: f64) -> f64 {
-        units * self.points() / POINTS_PER_MILLIMETRE
+        units * self.0 / POINTS_PER_MILLIMETRE
     }
 }
 
@@ -77,19 +68,15 @@ pub struct Size {
     pub height: f64,
 }
 
-impl Size {
-    /// Width and height in units of a style.
-    pub(super) fn units(self, style: Style) -> (f64, f64) {
-        let units = |millimetres: f64| millimetres * POINTS_PER_MILLIMETRE / style.points();
-        (units(self.width), units(self.height))
-    }
-}
-
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
     pub style: Style,
     /// Their size; as the data need if it is not given.
     pub size: Option<Size>,
+    /// Size of the labels of axes, in points; that of the style if it is not given. All else is in proportion.
+    pub font: Option<f64>,
+    /// Whether the small print is left to the caption, as it always is in print.
+    pub no_caption: bool,
     /// Small print under them, or in the caption.
     pub note: String,
     /// A line of small print for each of several directories: in what it differs from others.
@@ -103,6 +90,38 @@ impl Look {
             note: format!("Sweep {name}"),
             ..Self::default()
         }
+    }
+
+    pub(super) fn unit(&self) -> Unit {
+        let of_style = match self.style {
+            Style::Screen => 0.75,
+            Style::Print => 0.42,
+        };
+        let of_font = self.font.map(|points| points / f64::from(LABEL_TEXT));
+        Unit(of_font.unwrap_or(of_style))
+    }
+
+    /// Width and height that are asked for, in units.
+    pub(super) fn asked(&self) -> Option<(f64, f64)> {
+        let units = |millimetres| self.unit().of_millimetres(millimetres);
+        self.size
+            .map(|size| (units(size.width), units(size.height)))
+    }
+
+    /// Width of a sheet of this natural width, in units, if no size is asked for.
+    pub(super) fn width(&self, natural: f64) -> f64 {
+        match self.style {
+            Style::Screen => natural,
+            Style::Print => {
+                let columns = usize::from(natural > MAX_ONE_COLUMN);
+                self.unit().of_millimetres(COLUMNS[columns])
+            }
+        }
+    }
+
+    /// Whether the small print stands under the figure.
+    pub(super) fn has_caption(&self) -> bool {
+        self.style == Style::Screen && !self.no_caption
     }
 
     /// The same look with more small print.
@@ -348,8 +367,95 @@ mod tests {
 
     #[test]
     fn print_is_one_or_two_columns_wide() {
-        let width = |natural| Style::Print.millimetres(Style::Print.width(natural));
+        let look = Look {
+            style: Style::Print,
+            ..Look::default()
+        };
+        let width = |natural| look.unit().millimetres(look.width(natural));
         assert!((width(660.0) - 86.0).abs() < 1e-9 && (width(1000.0) - 178.0).abs() < 1e-9);
+    }
+
+    type Matrix = [[f64; 3]; 3];
+
+    fn times(matrix: &Matrix, vector: [f64; 3]) -> [f64; 3] {
+        matrix.map(|row| row.iter().zip(vector).map(|(part, with)| part * with).sum())
+    }
+
+    /// CIE L*a*b* at D65 of a colour as it is seen.
+    fn perceived(Ink(parts): Ink, seen: &Matrix) -> [f64; 3] {
+        const XYZ: Matrix = [
+            [0.412_456_4, 0.357_576_1, 0.180_437_5],
+            [0.212_672_9, 0.715_152_2, 0.072_175_0],
+            [0.019_333_9, 0.119_192_0, 0.950_304_1],
+        ];
+        let linear = parts.map(|part| match f64::from(part) / 255.0 {
+            dark if dark <= 0.040_45 => dark / 12.92,
+            part => libm::pow((part + 0.055) / 1.055, 2.4),
+        });
+        let seen = times(seen, linear).map(|part| part.clamp(0.0, 1.0));
+        let [x, y, z] = times(&XYZ, seen);
+        let root = |share: f64| match share {
+            dark if dark <= 0.008_856 => 7.787 * dark + 16.0 / 116.0,
+            share => libm::cbrt(share),
+        };
+        let [x, y, z] = [x / 0.950_47, y, z / 1.088_83].map(root);
+        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+    }
+
+    /// Of linear red, green and blue, without cones for long, medium and short waves (G. M. Machado et al., IEEE Trans.
+    /// Vis. Comput. Graph. 15, 1291 (2009)); and of all.
+    const SEEN: [Matrix; 4] = [
+        [
+            [0.152_286, 1.052_583, -0.204_868],
+            [0.114_503, 0.786_281, 0.099_216],
+            [-0.003_882, -0.048_116, 1.051_998],
+        ],
+        [
+            [0.367_322, 0.860_646, -0.227_968],
+            [0.280_085, 0.672_501, 0.047_413],
+            [-0.011_820, 0.042_940, 0.968_881],
+        ],
+        [
+            [1.255_528, -0.076_749, -0.178_779],
+            [-0.078_411, 0.930_809, 0.147_602],
+            [0.004_733, 0.691_367, 0.303_900],
+        ],
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    ];
+
+    #[test]
+    fn colour_blind_readers_tell_the_inks_apart_and_scales_darken_for_all() {
+        /// A difference of 2.3 is just noticeable.
+        const CLEAR: f64 = 15.0;
+        for seen in &SEEN {
+            for (number, &ink) in INKS.iter().enumerate() {
+                for &other in &INKS[..number] {
+                    let pair = [ink, other].map(|ink| perceived(ink, seen));
+                    let squares = pair[0]
+                        .iter()
+                        .zip(pair[1])
+                        .map(|(own, other)| (own - other).powi(2));
+                    let distance = squares.sum::<f64>().sqrt();
+                    assert!(distance > CLEAR, "{ink} and {other}: {distance}");
+                }
+            }
+            for (name, scale) in [
+                ("dots", SCALE.to_vec()),
+                (
+                    "cells",
+                    (0..10)
+                        .map(|step| cell_shade(f64::from(step) / 9.0))
+                        .collect(),
+                ),
+            ] {
+                let lightness: Vec<f64> = scale
+                    .into_iter()
+                    .map(|ink| perceived(ink, seen)[0])
+                    .collect();
+                let darkens = lightness.windows(2).all(|pair| pair[0] > pair[1] + 2.3);
+                assert!(darkens, "{name}: {lightness:?}");
+            }
+        }
     }
 
     #[test]

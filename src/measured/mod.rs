@@ -271,7 +271,10 @@ impl Reading {
         let mut rest = self.rest_of_sweep(&request.sources)?;
         if request.trace.is_some() && self.series.len() == 1 {
             let [columns, settings] = request.sources.flags();
-            rest = format!("trace = {columns}\nsettings = {settings}\n{rest}");
+            let decimal_comma = request.decimal_comma;
+            rest = format!(
+                "trace = {columns}\nsettings = {settings}\ncommas = {decimal_comma}\n{rest}"
+            );
         }
         let text = format!(
             "name = \"{name}\"\n[measured]\nfiles = {names}\nbytes = {lengths}\nsha256 = {checksums}\n\

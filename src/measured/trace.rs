@@ -299,15 +299,15 @@ pub struct Excerpt {
 
 /// A stretch of the trace that slips came from.
 pub fn stretch(measured: &Measured, range: RangeInclusive<f64>) -> Result<Excerpt> {
-    let Some([columns, settings]) = &measured.trace else {
+    let Some(trace) = &measured.trace else {
         bail!("--from, --until: the slips did not come from a trace with one run");
     };
     let Some((name, compared)) = compare_files(measured).next() else {
         bail!("--from, --until: a program gave the trace, and it is gone");
     };
     ensure!(compared == Compared::Same, "{name}: {}", compared.word());
-    let columns = Given::parse_all("--column", columns)?;
-    let settings = Given::parse_all("--set", settings)?;
+    let columns = Given::parse_all("--column", &trace.columns)?;
+    let settings = Given::parse_all("--set", &trace.settings)?;
     let sources = Sources::new(columns, settings, true)?;
     let force = Force::of(&sources);
     ensure!(
@@ -318,10 +318,9 @@ pub fn stretch(measured: &Measured, range: RangeInclusive<f64>) -> Result<Excerp
         samples: Vec::new(),
         has_maximum: sources.has(Key::Maximum),
     };
-    let has_commas = measured.options.contains("--decimal-comma");
     open(Path::new(name))?
         .0
-        .read(&sources, has_commas, &mut |rows| {
+        .read(&sources, trace.decimal_comma, &mut |rows| {
             let of = |key| rows.of(key).unwrap_or_default().iter().copied();
             let samples = of(Key::Time).zip(of(Key::Force));
             let within = samples.filter(|(time, _)| range.contains(time));

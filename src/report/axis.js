@@ -1,8 +1,8 @@
 // Axes: where values lie, and their ticks.
 
 class Axis {
-  constructor({ label, log = false, low, high, whole = false }) {
-    Object.assign(this, { label, log, low, high, whole });
+  constructor({ label, log = false, low, high, whole = false, few = [] }) {
+    Object.assign(this, { label, log, low, high, whole, few });
     this.start = log ? Math.log(low) : low;
     this.span = (log ? Math.log(high) : high) - this.start;
   }
@@ -18,6 +18,8 @@ class Axis {
 
   /** Values with their labels; without for those between. */
   ticks(room) {
+    const few = this.few.filter((value) => value >= this.low && value <= this.high);
+    if (few.length > 1 && few.length <= room) return few.map((value) => [value, number(value)]);
     return this.log && this.high / this.low > 3 ? this.logTicks(room) : this.linearTicks(room);
   }
 
@@ -49,6 +51,13 @@ class Axis {
     }
     return ticks;
   }
+}
+
+/** Values that most points share, if they are few. */
+function fewOf(values) {
+  const known = values.filter((value) => value !== null && Number.isFinite(value));
+  const few = [...new Set(known.map((value) => Number(value.toPrecision(10))))];
+  return few.length <= 8 && few.length < known.length ? few : [];
 }
 
 const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };

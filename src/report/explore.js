@@ -314,7 +314,8 @@ class Explorer {
   drawFree() {
     const { report } = this;
     const [x, y] = ["x", "y"].map((key) => this.table().get(this.axisName(key)));
-    const axes = { x: { label: x.label, log: this.isLog("x") }, y: { label: y.label, log: this.isLog("y") } };
+    const axis = (column, key) => ({ label: column.label, log: this.isLog(key), few: fewOf(scaled(column)) });
+    const axes = { x: axis(x, "x"), y: axis(y, "y") };
     const key = [
       ["transparent", `y: ${y.meaning}`],
       ["transparent", `x: ${x.meaning}`],

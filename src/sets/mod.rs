@@ -90,7 +90,7 @@ columns! {
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
         locking_index_drive: Option<f64> = "",
             "the same by the drive alone: slips at the loads of the control; null without a control", "locking, drive" "Locking index by the drive alone", Class::ByDrive("locking_index");
-        locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: what the slider adds", "locking, excess" "Locking index beyond the drive's", Class::Excess;
+        locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: what the slider adds", "locking, excess" "Excess of the locking index", Class::Excess;
         locking_excess_interval as "locking_index_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         phase_mean: Option<f64> = "rad", "circular mean of the phase; if T is tau_mean or more, over whole cycles from the first onset of each job, and null below two of them a job", "⟨φ⟩" "Mean phase", Class::Mean;
         phase_interval as "phase_mean": Option<Interval> = "rad",
@@ -101,7 +101,7 @@ columns! {
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
         resultant_drive: Option<f64> = "",
             "the same by the drive alone: slips at the loads of the control; null without a control", "R, drive" "Resultant length by the drive alone", Class::ByDrive("resultant_length");
-        resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds", "R, excess" "Resultant length beyond the drive's", Class::Excess;
+        resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds", "R, excess" "Excess of the resultant length", Class::Excess;
         resultant_excess_interval as "resultant_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         schuster as "schuster_log10_p": Option<f64> = "", "log10 of Schuster's p, that phases have no direction, correlated slips counting less; it rejects this where the drive alone makes R, too: quote resultant_excess", "log p" "log₁₀ of Schuster's p", Class::Auxiliary;
         drop_mean: Option<f64> = "N", "mean stress drop", "⟨ΔF⟩", Class::Mean;

@@ -1,6 +1,7 @@
 //! `[measured]`: the slips of a sweep were measured, not computed. `stickslip measured` writes it.
 
 use super::source::{Entry, Refused, Section, all};
+use crate::table::value::Field as _;
 
 /// Where measured slips come from.
 #[derive(Clone, Debug)]
@@ -11,12 +12,21 @@ pub struct Measured {
     pub rows: String,
     /// The flags that read the files again.
     pub options: String,
-    /// Of a trace of forces with one run: `--column` and `--set`, each `KEY=FROM:UNIT`.
-    pub trace: Option<[Vec<String>; 2]>,
+    /// Of a trace with one run.
+    pub trace: Option<TraceSource>,
     /// Columns of slips that are known beside the onset.
     columns: Vec<String>,
     /// Those of them that have another unit than the model's, or none: `drop` alone can be one.
     pub pure: Vec<String>,
+}
+
+/// How a trace is read again.
+#[derive(Clone, Debug)]
+pub struct TraceSource {
+    /// Of `--column` and `--set`, each `KEY=FROM:UNIT`.
+    pub columns: Vec<String>,
+    pub settings: Vec<String>,
+    pub decimal_comma: bool,
 }
 
 /// A file that was read.
@@ -46,7 +56,7 @@ impl Measured {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, Refused> {
         section.only(&[
             "files", "bytes", "sha256", "rows", "options", "series", "columns", "pure", "trace",
-            "settings",
+            "settings", "commas",
         ])?;
         let required = |key| section.required(key, "`stickslip measured` writes this section");
         let text = |entry: &Entry<'_>| {
@@ -58,9 +68,15 @@ impl Measured {
             entry.list().ok_or_else(|| entry.must_be("a list"))
         };
         let texts = |key| all(list(key)?.iter().map(text));
-        let trace = section
-            .entry("trace")
-            .map(|_| -> Result<_, Refused> { Ok([texts("trace")?, texts("settings")?]) });
+        let trace = section.entry("trace").map(|_| -> Result<_, Refused> {
+            let decimal_comma = required("commas")?;
+            let flag = decimal_comma.value().and_then(bool::from_value);
+            Ok(TraceSource {
+                columns: texts("trace")?,
+                settings: texts("settings")?,
+                decimal_comma: flag.ok_or_else(|| decimal_comma.must_be("true or false"))?,
+            })
+        });
         // Where each series begins is for readers alone.
         texts("series")?;
         let names = texts("files")?;

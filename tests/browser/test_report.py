@@ -55,6 +55,13 @@ def test_a_sweep_under_modulation_has_all_its_charts(browser, report):
     assert "stickslip 0" in browser.text("#versions")
 
 
+def test_an_axis_of_few_values_has_its_ticks_there(browser, report):
+    browser.open(report(MODULATED))
+    labels = "return new Axis({ label: '', low: 20, high: 130, few: fewOf(%s) }).ticks(8).map(([, label]) => label)"
+    assert browser.run(labels % "[29, 58, 116, 58, null]") == ["29", "58", "116"]
+    assert browser.run(labels % "[29, 58, 116]") == ["20", "40", "60", "80", "100", "120"]
+
+
 def test_the_page_opens_with_the_result_and_its_table_and_shows_the_figures(browser, report):
     browser.open(report(MODULATED))
     assert [section.get_property("id") for section in browser.all("main > section")][:4] == ["explore", "sets", "slips", "figures"]

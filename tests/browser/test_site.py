@@ -114,7 +114,7 @@ def test_every_picture_stands_in_the_gallery_with_the_command_that_draws_it(brow
     for picture, item in gallery.items():
         assert item["width"] > 300, picture
         script, _, name = item["commands"][0].partition(" ")
-        assert script in ("scripts/predicted-cost", "scripts/reproduce", "scripts/sketch", "stickslip"), picture
+        assert script in ("python", "scripts/predicted-cost", "scripts/reproduce", "scripts/sketch", "stickslip"), picture
         if script == "scripts/reproduce":
             assert (ROOT / "sweeps" / f"{name}.toml").exists(), picture
             drawn = re.search(rf'\[{name}\]="([^"]+)"', reproduce)

@@ -274,8 +274,9 @@ fn runs_of_a_trace_are_series_and_a_drift_changes_nothing() {
 fn a_stretch_of_a_trace_is_drawn_from_its_file_as_long_as_that_is_the_same() {
     let folder = Folder::new();
     let trace = csv(&sawtooth(3000)).replace("time,force", "t,F");
+    let trace = trace.replace(',', ";").replace('.', ",");
     folder.write("trace.csv", &trace);
-    let columns = "--column time=t:s --column force=F:N --drop-size 30";
+    let columns = "--decimal-comma --column time=t:s --column force=F:N --drop-size 30";
     folder.ends(
         0,
         &format!("measured trace.csv -o out {columns} {UNMODULATED}"),
@@ -288,7 +289,7 @@ fn a_stretch_of_a_trace_is_drawn_from_its_file_as_long_as_that_is_the_same() {
     assert_eq!(figure.matches("#d62020").count(), 5, "{figure}");
     let problem = |command: &str| folder.ends(2, command).stderr;
     assert!(problem("plot out --from 9").contains("fewer than two instants"));
-    folder.write("trace.csv", &trace.replacen("\n0.5,", "\n0.50,", 1));
+    folder.write("trace.csv", &trace.replacen("\n0,5;", "\n0,50;", 1));
     assert!(problem(stretch).contains("trace.csv: differs from what was read"));
     std::fs::remove_file(folder.path("trace.csv")).unwrap();
     assert!(problem(stretch).contains("trace.csv: is not there"));
