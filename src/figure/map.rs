@@ -283,6 +283,7 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
+    use crate::table::columns::Interval;
 
     fn grid(amplitudes: u32, periods: u32) -> Vec<SetRow> {
         let row = |row: u32| {
@@ -344,7 +345,7 @@ mod tests {
     fn what_the_slider_adds_is_a_panel_where_there_are_controls_and_nothing_is_pale() {
         let mut sets = grid(8, 8);
         let drawn = |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg();
-        assert!(!drawn(&sets).contains("Resultant length beyond"));
+        assert!(!drawn(&sets).contains("Excess of the resultant"));
         for (set, excess) in sets.iter_mut().zip([-0.5, 0.0, 0.5].into_iter().cycle()) {
             set.resultant_excess = Some(excess);
         }
@@ -356,6 +357,19 @@ mod tests {
                 "{share}"
             );
         }
+    }
+
+    #[test]
+    fn an_excess_whose_interval_holds_zero_is_not_coloured() {
+        let mut sets = grid(8, 8);
+        for (set, low) in sets.iter_mut().zip([-0.3, 0.1].into_iter().cycle()) {
+            set.resultant_excess = Some(0.5);
+            set.resultant_excess_interval = Some(Interval { low, high: 0.9 });
+        }
+        let svg = map(&sets, &Look::default()).unwrap().svg();
+        let coloured = svg.matches(&diverging(1.0).to_string()).count();
+        assert!((32..40).contains(&coloured), "{coloured}");
+        assert!(svg.matches(&FREE.to_string()).count() >= 32);
     }
 
     #[test]
