@@ -2,7 +2,7 @@
 
     .venv/bin/python python/examples/redraw.py results/fig3
 
-Writes two files into the current folder: phase-eta.png, phases against eta with the back-bone (Fig. 3e), from
+Writes two files into the current folder: phase-eta.png, phases against eta with the backbone (Fig. 3e), from
 reduced/points.parquet and reduced/backbone.parquet; staircase.png, intervals in periods against the period, a colour
 for each amplitude, from reduced/sets.parquet.
 """

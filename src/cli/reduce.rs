@@ -51,8 +51,12 @@ pub fn summary_lines(
     layout: &Layout<'_>,
 ) -> Vec<(&'static str, String)> {
     let jobs = format!("{}, {} failed", summary.jobs, summary.failed_jobs);
-    let phased = summary.phased_sets;
-    let sets = format!("{}, {phased} of them with a preferred phase", summary.sets);
+    let mut sets = summary.sets.to_string();
+    // Without modulation there is none.
+    if !summary.backbone.is_empty() {
+        let phased = summary.phased_sets;
+        sets += &format!(", {phased} of them with a preferred phase");
+    }
     vec![
         ("jobs reduced", jobs),
         ("parameter sets", sets),

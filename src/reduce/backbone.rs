@@ -1,4 +1,4 @@
-//! The φ-η back-bone: phases pooled in logarithmic bins of η (Fig. 3e).
+//! The φ-η backbone: phases pooled in logarithmic bins of η (Fig. 3e).
 
 use super::estimate::{Estimate, Units, length};
 use super::set::FinishedSet;

@@ -1,4 +1,4 @@
-//! Reduction: the tables of a sweep become Fig. 3-style data: statistics per parameter set, the φ-η back-bone,
+//! Reduction: the tables of a sweep become Fig. 3-style data: statistics per parameter set, the φ-η backbone,
 //! histograms of τ, and a sample of slips for scatter figures.
 
 mod backbone;

@@ -1,4 +1,4 @@
-//! The reduction of a results directory: sets, histograms of τ (Fig. 2), back-bone, points and edges, committed
+//! The reduction of a results directory: sets, histograms of τ (Fig. 2), backbone, points and edges, committed
 //! together. Sets stand in the order of their parameters, so the same tables give the same bytes. Sets of an adaptive
 //! sweep have further columns: the rounds in which a set ran, and whether it is as precise as is wanted.
 //!

@@ -64,7 +64,7 @@ const MAX_FAILURES: u64 = 200;
 const MAX_PARTS: usize = 4_000;
 /// Runs that are listed: the last ones.
 const MAX_RUNS: usize = 50;
-/// η of the curves of the back-bone: from 1, in steps of 1/30 of a decade, over five decades.
+/// η of the curves of the backbone: from 1, in steps of 1/30 of a decade, over five decades.
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
 
