@@ -51,12 +51,13 @@ pub fn summary_lines(
     layout: &Layout<'_>,
 ) -> Vec<(&'static str, String)> {
     let jobs = format!("{}, {} failed", summary.jobs, summary.failed_jobs);
-    let mut sets = summary.sets.to_string();
-    // Without modulation there is none.
-    if !summary.backbone.is_empty() {
+    let sets = if summary.backbone.is_empty() {
+        // There is no modulation.
+        summary.sets.to_string()
+    } else {
         let phased = summary.phased_sets;
-        sets += &format!(", {phased} of them with a preferred phase");
-    }
+        format!("{}, {phased} of them with a preferred phase", summary.sets)
+    };
     vec![
         ("jobs reduced", jobs),
         ("parameter sets", sets),
