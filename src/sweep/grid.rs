@@ -18,6 +18,7 @@ use crate::model::{Parameters, Selection, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::sets::AllButSeed;
 use crate::solver::Solver;
+use crate::table::value::Shortest;
 use std::ops::Range;
 
 #[derive(Clone, Debug)]
@@ -220,9 +221,14 @@ impl Sweep {
         for symbol in Symbol::ALL {
             let value = parameters.get(symbol);
             let is_default = value == defaults.get(symbol) || value == Value::Null;
-            if symbol != Symbol::Seed && !is_default {
-                words.push(format!("--set {}={value}", symbol.key()));
+            if symbol == Symbol::Seed || is_default {
+                continue;
             }
+            let frequency = value.number().filter(|_| symbol == Symbol::T);
+            words.push(match frequency.and_then(frequency_of) {
+                Some(frequency) => format!("--set frequency={frequency}"),
+                None => format!("--set {}={value}", symbol.key()),
+            });
         }
         words.join(" ")
     }
@@ -366,4 +372,13 @@ pub(super) fn find_rows(mut number: u64, counts: &[u64], rows: &mut [u64]) {
         *row = number % count;
         number /= count;
     }
+}
+
+/// The frequency of a period, if it is the number with fewer digits and gives the period back to the same bits.
+fn frequency_of(period: f64) -> Option<Shortest> {
+    let frequency = to_twelve_digits(1.0 / period);
+    let is_exact = (1.0 / frequency).to_bits() == period.to_bits();
+    // Of the significand.
+    let digits = |number: f64| format!("{number:e}").find('e');
+    (is_exact && digits(frequency) < digits(period)).then_some(Shortest(frequency))
 }

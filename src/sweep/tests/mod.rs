@@ -77,6 +77,19 @@ fn a_time_alone_leaves_the_number_of_slips_open() {
 }
 
 #[test]
+fn a_command_has_the_frequency_where_its_period_has_more_digits() {
+    let command = |period: &str| {
+        let sweep = sweep(&format!("[model]\nDelta = 1\n{period}"));
+        sweep.command(&sweep.jobs().next().unwrap())
+    };
+    let expected =
+        |setting: &str| format!("stickslip simulate --set Delta=1 --set {setting} --slips 40");
+    assert_eq!(command("frequency = 116"), expected("frequency=116"));
+    assert_eq!(command("frequency = 50"), expected("T=0.02"));
+    assert_eq!(command("T = 0.0123456789"), expected("T=0.0123456789"));
+}
+
+#[test]
 fn all_sections_are_read() {
     let sweep = sweep(
         "[model]\nN = 0x14\nK = 2e8\nbreak_on = \"tension\"\nDelta = 1e-6\nT = 1\n\
