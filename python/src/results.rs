@@ -158,8 +158,9 @@ fn read_table(
     stop: &AtomicBool,
 ) -> Result<Table, Error> {
     if !results.tables().any(|recorded| recorded == table) {
-        let problem = "has no precursors; set precursors = true under [record]";
-        return Err(ResultsError::refused(results.layout().root(), problem).into());
+        let table = table.word();
+        let problem = format!("has no {table}; set {table} = true under [record]");
+        return Err(ResultsError::refused(results.layout().root(), &problem).into());
     }
     let joined = JoinedTable::new(results, table, columns);
     let mut batches = Vec::new();

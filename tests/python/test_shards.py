@@ -30,6 +30,7 @@ def shards(stickslip, tmp_path_factory):
     sweep = folder / "tiny.toml"
     sweep.write_text(SWEEP.format(seeds=PARTS // 2))
     stickslip("run", sweep, "--out", folder / "whole")
+    assert {table.name for table in (folder / "whole" / "tables").iterdir()} == set(TABLES), "all tables that can be recorded"
     for number, name in enumerate(("first", "second"), 1):
         stickslip("run", sweep, "--out", folder / name, "--shard", f"{number}/2", "--no-reduce")
     return folder

@@ -578,16 +578,18 @@ fn a_second_worker_takes_what_the_first_has_not_and_ends_before_it() {
             &mut |_| (),
         )
     };
+    // A thread that waits for the pool of the second runs other jobs of its own meanwhile: no lock may be held.
+    let has_begun = AtomicBool::new(false);
     let kernel = |job: &Job, interrupt: &AtomicBool| {
-        let mut second = second.lock().unwrap();
-        if second.is_none() {
+        if !has_begun.swap(true, Ordering::Relaxed) {
             let other_sweep = again(SEEDS + 1).unwrap_err();
             assert!(other_sweep.kind == ErrorKind::Busy, "{other_sweep}");
             assert!(
                 other_sweep.to_string().contains("for another sweep file"),
                 "{other_sweep}"
             );
-            *second = Some(again(SEEDS).unwrap());
+            let done = again(SEEDS).unwrap();
+            *second.lock().unwrap() = Some(done);
         }
         fine(job, interrupt)
     };
