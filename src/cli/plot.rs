@@ -4,7 +4,7 @@ use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
     AxisLimits, Beside, CustomFigure, Dots, Drawn, Look, Picture, PictureFormat, Size, Style,
-    draw_all, draw_custom, measured_trace, remarks, write_custom,
+    draw_all, draw_custom, draw_where, measured_trace, remarks, write_custom,
 };
 use crate::measured::stretch;
 use crate::reduce::{SetRow, SlipOfSet, read_sets, renew, sample_of_slips};
@@ -84,7 +84,7 @@ const EXAMPLES: &str = "\
 Examples:
   stickslip plot results/fig3                                          the standing figures, as SVG and PNG
   stickslip plot results/fig3 --format pdf --style print               for a paper
-  stickslip plot results/fig3 --font 14 --no-caption --size 240mmx135mm  for a slide
+  stickslip plot results/fig3 --where 'V0 < 1e-5' --font 14 --no-caption --size 240mmx135mm  some sets, for a slide
   stickslip plot --list                                                the columns that can be drawn
   stickslip plot results/sliding-velocity --x V0 --y tau_mean --log xy
   stickslip plot results/fig3 --x eta --y phase_mean --colour V0 --panels Delta --log x -o phase.pdf
@@ -148,6 +148,12 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
             }
         };
         Drawn { files, remarks }
+    } else if let Some(condition) = &arguments.custom.condition {
+        if !others.is_empty() {
+            let problem = "--where: standing figures of several directories show all sets; leave --with out, or ask for a custom figure with --x and --y";
+            return Err(UsageError(problem.to_owned()).into());
+        }
+        draw_where(&results, condition, &look, &arguments.format)?
     } else {
         draw_all(layout, &beside, &look, &arguments.format)?
     };
@@ -240,13 +246,9 @@ struct CustomFlags {
     /// Column whose values get a panel each, up to nine
     #[arg(long, value_name = "COLUMN", requires = "x")]
     panels: Option<String>,
-    /// Only sets, or slips with --of slips, for which a condition on their columns, by name or heading, holds, in SI
-    #[arg(
-        long = "where",
-        value_name = "CONDITION",
-        requires = "x",
-        allow_hyphen_values = true
-    )]
+    /// Only sets, or slips with --of slips, for which a condition on their columns, by name or heading, holds, in SI; the
+    /// names of standing figures then end in -where
+    #[arg(long = "where", value_name = "CONDITION", allow_hyphen_values = true)]
     condition: Option<String>,
     /// Logarithmic axes [default: where it was swept so, or values lie decades apart]
     #[arg(long, value_name = "AXES", requires = "x", value_parser = ["x", "y", "xy", "none"])]

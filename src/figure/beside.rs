@@ -5,7 +5,7 @@ use super::legend::{LegendEntry, Mark, entry};
 use super::style::{HOLLOW, Look};
 use super::{ADVICE, BadOption, check_text, common, read, sets_with_results};
 use crate::model::{Parameters, Symbol};
-use crate::reduce::{BackboneBin, Difference, Point, SetRow, advise};
+use crate::reduce::{BackboneBin, Condition, Difference, Point, SetRow, advise};
 use crate::results::Results;
 use anyhow::Result;
 use std::ops::Range;
@@ -91,6 +91,13 @@ impl Beside {
             ranges.push(begin..sets.len());
         }
         (sets, ranges)
+    }
+
+    /// Leaves sets out for which a condition does not hold.
+    pub(super) fn retain(&mut self, condition: &Condition) {
+        for other in &mut self.others {
+            other.sets.retain(|set| condition.holds(set));
+        }
     }
 
     fn differences(&self, first: &[SetRow]) -> Vec<Difference> {

@@ -9,14 +9,15 @@ use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Quantity, belongs_to_all, distinct, shows_angle, without_value};
 use super::style::{
-    BAR_WIDTH, BLACK, DARK_GREY, Dot, GREY, INKS, Ink, Look, Place, RADIUS, REFERENCE, STRIPE,
-    Stroke, WHITE, drive_alone,
+    BAR_WIDTH, BLACK, DARK_GREY, Dot, GREY, GRID, INKS, Ink, Look, Place, Polygon, RADIUS,
+    REFERENCE, SHAPES, STRIPE, Stroke, WHITE, drive_alone,
 };
 use super::{BadOption, Beside};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetRow, Values, is_same, resultant_at_random, swept};
 use crate::sets::parameter;
+use crate::table::columns::{Class, Column};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -33,6 +34,8 @@ const PANEL_GAP: f64 = 26.0;
 /// Between columns, for the labels of their axes.
 const LABEL_GAP: f64 = 16.0;
 const CURVE_POINTS: usize = 200;
+/// Whole numbers of periods with a line: those that can be told apart.
+const WHOLE: std::ops::RangeInclusive<u32> = 1..=10;
 /// Lines between sets; more would be a net.
 const MAX_LINES: usize = 24;
 pub(super) const LINE_WIDTH: f64 = 1.0;
@@ -47,6 +50,8 @@ const HOLE: f64 = 1.6;
 /// The sets of a chart, if each has a dot, and of which directories they are.
 pub(super) struct ChartRows<'a> {
     pub(super) sets: &'a [SetRow],
+    /// What all are compared with: the set without modulation that was run as a control alone.
+    pub(super) control: Option<&'a SetRow>,
     /// The swept parameters of the first directory, by which its sets are joined and told apart.
     pub(super) swept: &'a [Values],
     pub(super) beside: &'a Beside,
@@ -74,6 +79,10 @@ struct Marks {
     lines: Vec<Vec<usize>>,
     /// Sets without modulation that are levels.
     free: Vec<usize>,
+    /// The control on each axis of y, where it lies on it.
+    control: Vec<Option<f64>>,
+    /// The parameter that shapes show, where colours leave one.
+    shape: Option<Values>,
 }
 
 impl<'a> Chart<'a> {
@@ -122,14 +131,24 @@ impl<'a> Chart<'a> {
             radius: if has_many { SMALL_RADIUS } else { RADIUS },
             lines: self.lines(&sets),
             x_axis,
+            control: ys
+                .iter()
+                .zip(&y_axes)
+                .map(|(y, axis)| self.control(y, axis))
+                .collect(),
             free,
+            shape: self.shaped(),
         };
         let groups = groups(self.panels.as_ref(), &sets)?;
         let (layout, height) = layout(ys.len(), groups.len());
         let mut panels: Vec<Panel<'_>> = Vec::new();
-        for (y, axis) in ys.iter().zip(y_axes) {
+        for ((y, axis), control) in ys.iter().zip(y_axes).zip(&dots.control) {
             for (title, members) in &groups {
-                let layers = self.layers(y, &dots, members);
+                let control = control.map(|level| Layer::Level(level, REFERENCE));
+                let layers = control
+                    .into_iter()
+                    .chain(self.layers(y, &dots, members))
+                    .collect();
                 let mut panel = Panel::new(height, dots.x_axis.clone(), axis.clone(), layers);
                 if groups.len() > 1 {
                     if !panels.len().is_multiple_of(layout.columns) {
@@ -143,7 +162,7 @@ impl<'a> Chart<'a> {
                 panels.push(panel);
             }
         }
-        let noted = look.with_note(&self.note(&inside, &dots.free, bars_cut));
+        let noted = look.with_note(&self.note(&inside, &dots, bars_cut));
         let legend = self.legend(&inside, &dots);
         Ok(panel::draw(name, &noted, layout, &legend, panels))
     }
@@ -183,6 +202,12 @@ impl<'a> Chart<'a> {
         }
     }
 
+    /// The value of the control, on an axis of its column.
+    fn control(&self, y: &Quantity<'_>, axis: &Axis) -> Option<f64> {
+        let value = self.rows.control?.number(y.name())?;
+        Some(y.factor * value).filter(|value| axis.contains(*value))
+    }
+
     /// Sets that differ in the x axis alone, in its order.
     fn lines(&self, sets: &[usize]) -> Vec<Vec<usize>> {
         let Some(symbol) = self.x.joined_along(self.rows.swept) else {
@@ -216,6 +241,23 @@ impl<'a> Chart<'a> {
         }
     }
 
+    /// The swept parameter that nothing else shows, if it has few values. The marks of other directories are shapes, too.
+    fn shaped(&self) -> Option<Values> {
+        let free = self.unshown().into_iter().next()?;
+        let is_free = self.rows.others.is_empty() && free.distinct.len() <= SHAPES.len();
+        is_free.then_some(free)
+    }
+
+    /// The shape of the dot of a set: of a parameter that colours do not show, else of its colour.
+    fn shape(&self, dots: &Marks, set: usize) -> Option<Polygon> {
+        if let Some(shaped) = &dots.shape {
+            return shaped.places()[set].and_then(|place| SHAPES[place]);
+        }
+        let value = self.colour.as_ref()?.number(set)?;
+        let hues = dots.hues.as_ref()?;
+        hues.shape(value).filter(|_| self.rows.others.is_empty())
+    }
+
     fn ink(&self, dots: &Marks, set: usize) -> Ink {
         let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) else {
             // As in the legend.
@@ -233,6 +275,12 @@ impl<'a> Chart<'a> {
         };
         let mut layers: Vec<Layer<'a>> = Vec::new();
         layers.extend(self.reduction(y).map(|ends| Layer::Stripe(ends, STRIPE)));
+        if y.column.column.class == Class::Excess {
+            layers.push(Layer::Level(0.0, GRID));
+        }
+        if is_in_periods(y) {
+            layers.extend(WHOLE.map(|n| Layer::Level(f64::from(n), GRID)));
+        }
         if y.name() == "slip_share" {
             layers.extend(Regime::MIN_SHARES.map(|share| Layer::Level(share, REFERENCE)));
         }
@@ -260,10 +308,12 @@ impl<'a> Chart<'a> {
                 all.push(Layer::Hollow(place, other, self.ink(dots, set)));
                 continue;
             }
-            let dot = Dot::solid(self.ink(dots, set), dots.radius);
+            let shape = self.shape(dots, set);
+            let dot = Dot::solid(self.ink(dots, set), dots.radius).with_shape(shape);
             all.push(Layer::Dots(place.clone(), dot.with_opacity(0.9)));
             if self.slides(set) {
-                all.push(Layer::Dots(place, Dot::solid(WHITE, dots.radius - HOLE)));
+                let hole = Dot::solid(WHITE, dots.radius - HOLE).with_shape(shape);
+                all.push(Layer::Dots(place, hole));
             }
         }
         all
@@ -349,7 +399,8 @@ impl<'a> Chart<'a> {
         };
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
         let mut sets = self.rows.sets.iter();
-        let control = sets.find(|row| row.parameters.modulation_period.is_none());
+        let own = sets.find(|row| row.parameters.modulation_period.is_none());
+        let control = own.or(self.rows.control);
         let free =
             control.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
@@ -365,10 +416,21 @@ impl Chart<'_> {
         if let Some((colour, hues)) = self.colour.as_ref().zip(dots.hues.as_ref()) {
             let shown = [inside, &dots.free].concat();
             let numbers: Vec<Option<f64>> = shown.iter().map(|&set| colour.number(set)).collect();
-            entries.extend(hues.entries(RADIUS, |value| numbers.contains(&Some(value))));
+            let dot = |value| {
+                let is_shaped = dots.shape.is_none() && self.rows.others.is_empty();
+                let shape = hues.shape(value).filter(|_| is_shaped);
+                Dot::solid(hues.ink(value), RADIUS).with_shape(shape)
+            };
+            entries.extend(hues.entries(dot, |value| numbers.contains(&Some(value))));
             if inside.iter().any(|&set| colour.number(set).is_none()) {
                 let text = without_value(&colour.column);
                 entries.push(entry(Mark::Dot(Dot::solid(GREY, RADIUS)), text));
+            }
+        }
+        if let Some(shaped) = &dots.shape {
+            for (&value, shape) in shaped.distinct.iter().zip(SHAPES) {
+                let dot = Dot::solid(DARK_GREY, RADIUS).with_shape(shape);
+                entries.push(entry(Mark::Dot(dot), shaped.setting(value)));
             }
         }
         let has_marks = |other| inside.iter().any(|&set| self.other(set) == other);
@@ -377,7 +439,7 @@ impl Chart<'_> {
         let own = dot.or((!dots.free.is_empty()).then_some(Mark::Line(REFERENCE)));
         let beside = self.rows.beside;
         entries.extend(beside.entries(own, |other| has_marks(Some(other))));
-        if !dots.free.is_empty() {
+        if !dots.free.is_empty() || dots.control.iter().any(Option::is_some) {
             entries.push(entry(Mark::Line(REFERENCE), "Δ = 0"));
         }
         if inside.iter().any(|&set| self.slides(set)) {
@@ -391,6 +453,9 @@ impl Chart<'_> {
         }
         if self.ys.iter().any(|y| self.is_against_eta(y)) {
             entries.push(entry(Mark::Line(REFERENCE), "at random loads"));
+        }
+        if self.ys.iter().any(is_in_periods) {
+            entries.push(entry(Mark::Line(GRID), "τ = nT"));
         }
         let has_drive = |set: &&usize| self.ys.iter().any(|y| self.drive_at(y, **set).is_some());
         let explained = inside.iter().filter(has_drive);
@@ -414,24 +479,30 @@ impl Chart<'_> {
         entries
     }
 
-    /// Swept parameters that nothing shows.
-    fn pooled(&self) -> Option<String> {
+    /// Swept parameters that neither axes, colours nor panels show.
+    fn unshown(&self) -> Vec<Values> {
         let quantities = self.ys.iter().chain([&self.x]).chain(&self.colour);
         let asked = quantities.map(|quantity| &quantity.column);
         let sources = asked.chain(&self.panels).flat_map(|values| &values.sources);
         let shown: Vec<Option<Symbol>> = sources.map(parameter).collect();
-        let is_pooled = |swept: &&Values| !shown.contains(&parameter(&swept.column));
         let ranges = self.rows.others.iter();
         let others = ranges.flat_map(|sets| swept(&self.rows.sets[sets.clone()]));
-        let all: Vec<Values> = self.rows.swept.iter().cloned().chain(others).collect();
-        let pooled = all.iter().filter(is_pooled);
-        let symbols: Vec<String> = pooled.map(|swept| swept.label.symbol.clone()).collect();
+        let all = self.rows.swept.iter().cloned().chain(others);
+        all.filter(|swept| !shown.contains(&parameter(&swept.column)))
+            .collect()
+    }
+
+    /// Those that shapes do not show, either.
+    fn pooled(&self, dots: &Marks) -> Option<String> {
+        let shaped = usize::from(dots.shape.is_some());
+        let pooled = self.unshown().into_iter().skip(shaped);
+        let symbols: Vec<String> = pooled.map(|swept| swept.label.symbol).collect();
         let symbols = distinct(symbols.iter().map(String::as_str));
         (!symbols.is_empty()).then(|| format!("pooled: sets that differ in {}", symbols.join(", ")))
     }
 
     /// What bars are, and what is not there.
-    fn note(&self, inside: &[usize], free: &[usize], bars_cut: usize) -> String {
+    fn note(&self, inside: &[usize], dots: &Marks, bars_cut: usize) -> String {
         let mut notes = Vec::new();
         let has_bars = |y: &Quantity<'_>| inside.iter().any(|&set| y.interval(set).is_some());
         if self.ys.iter().any(has_bars) {
@@ -456,11 +527,11 @@ impl Chart<'_> {
             |set: &usize| shows_phase && self.rows.sets.get(*set).is_some_and(has_none);
         let unphased = (0..count).filter(is_unphased).count();
         if unphased > 0 {
-            let text = format!("not shown: {unphased} of {count} sets, without a phase");
+            let text = format!("not shown: {unphased} of {count} sets, without a preferred phase");
             notes.push(text);
         }
         let is_left_out = |set: &usize| {
-            let is_shown = inside.contains(set) || free.contains(set);
+            let is_shown = inside.contains(set) || dots.free.contains(set);
             !(is_shown || is_still(set) || is_unphased(set))
         };
         let left_out = (0..count).filter(is_left_out).count();
@@ -470,9 +541,20 @@ impl Chart<'_> {
                 self.of
             ));
         }
-        notes.extend(self.pooled());
+        notes.extend(self.pooled(dots));
         notes.join("; ")
     }
+}
+
+/// Whether it is an interval in periods: a pure number of nothing but a statistic in s and the period.
+fn is_in_periods(y: &Quantity<'_>) -> bool {
+    let [one, other] = &y.column.sources[..] else {
+        return false;
+    };
+    let is_interval = |column: &Column| column.unit == "s" && parameter(column).is_none();
+    let is_period = |column: &Column| parameter(column) == Some(Symbol::T);
+    let is_pair = |one, other| is_interval(one) && is_period(other);
+    y.column.label.unit.is_empty() && (is_pair(one, other) || is_pair(other, one))
 }
 
 /// Columns and widths of panels, and their height.
@@ -543,6 +625,7 @@ mod tests {
                 of: "sets",
                 rows: ChartRows {
                     sets: rows,
+                    control: None,
                     swept: &swept,
                     beside: &Beside::default(),
                     others: Vec::new(),

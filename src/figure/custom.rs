@@ -166,6 +166,7 @@ pub(super) mod tests {
         let quantity = |option, name: &str| Ok(Quantity::of(rows, option, name)?);
         let rows = ChartRows {
             sets: rows,
+            control: None,
             swept: &swept(rows),
             beside: &Beside::default(),
             others: Vec::new(),

@@ -39,6 +39,8 @@ const RIGHT: f64 = 26.0;
 pub(super) const ABOVE: f64 = 38.0;
 /// Space under a frame for numbers and label.
 const UNDER: f64 = 58.0;
+/// What a row over frames with another x axis needs beside, for its own numbers and label.
+pub(super) const NUMBERS: f64 = UNDER - 12.0;
 /// Between two rows of frames, for a label and some air.
 const ROW_GAP: f64 = 52.0;
 /// Space above a frame for a heading.
@@ -171,7 +173,7 @@ pub(super) struct Page {
 
 impl Page {
     /// The frame of this number, from 0, row by row. One of several has a letter.
-    pub(super) fn frame(&self, number: usize, x: Axis, y: Axis) -> Frame {
+    pub(super) fn frame(&self, number: usize, x: Axis, y: Axis, has_numbers: bool) -> Frame {
         let layout = self.layout;
         let columns = layout.columns;
         let row = number / columns;
@@ -199,7 +201,7 @@ impl Page {
             y,
             heading: layout.heading,
             letter: ('a'..='z').nth(number).filter(|_| self.count > 1),
-            is_lowest: number + columns >= self.count,
+            has_numbers,
         }
     }
 }
@@ -218,7 +220,7 @@ pub(super) struct Frame {
     heading: f64,
     letter: Option<char>,
     /// Whether it has the numbers and the label of the x axis.
-    is_lowest: bool,
+    has_numbers: bool,
 }
 
 impl Frame {
@@ -284,7 +286,7 @@ impl Frame {
             }
         }
         let mut free = EDGE;
-        for (value, number) in self.x.ticks.iter().filter(|_| self.is_lowest) {
+        for (value, number) in self.x.ticks.iter().filter(|_| self.has_numbers) {
             let x = self.x_of(*value);
             let half = 0.5 * text_width(number, TICK_TEXT);
             if x - half >= free && x + half <= sheet.scene.width - EDGE {
@@ -301,7 +303,7 @@ impl Frame {
             let place = (self.room.0, self.top - self.heading - Y_LABEL_RISE);
             sheet.text(place, &label, size, Anchor::Start);
         }
-        if self.is_lowest {
+        if self.has_numbers {
             let (start, end) = self.room;
             let (label, size) = fitted_label("", &self.x, end - start);
             let half = 0.5 * text_width(&label, size);
@@ -442,7 +444,7 @@ mod tests {
         };
         let (page, mut sheet) = layout.page("", &look, &[], &[200.0; 2]);
         for column in 0..2 {
-            let frame = page.frame(column, x.clone(), y.clone());
+            let frame = page.frame(column, x.clone(), y.clone(), true);
             frame.axes(&mut sheet);
             frame.heading(
                 &mut sheet,

@@ -5,7 +5,9 @@ use super::axis::Axis;
 use super::frame::{Frame, OVERLAP, fitting, outline};
 use super::legend::{LegendEntry, Mark, entry};
 use super::picture::{Anchor, Picture};
-use super::style::{AXIS, BLACK, Dot, INKS, Ink, LEGEND_TEXT, NOTE_TEXT, SCALE, TICK_TEXT, shade};
+use super::style::{
+    AXIS, BLACK, Dot, INKS, Ink, LEGEND_TEXT, NOTE_TEXT, Polygon, SCALE, SHAPES, TICK_TEXT, shade,
+};
 use crate::reduce::{ascending, is_same};
 use crate::table::value::floored;
 
@@ -58,14 +60,24 @@ impl Hues {
         }
     }
 
-    /// Entries of the legend, with dots of this radius, of values that are shown.
-    pub(super) fn entries(&self, radius: f64, is_shown: impl Fn(f64) -> bool) -> Vec<LegendEntry> {
+    /// Each ink has its own, so that they are told apart in grey.
+    pub(super) fn shape(&self, value: f64) -> Option<Polygon> {
+        let place = INKS.iter().position(|ink| *ink == self.ink(value))?;
+        SHAPES[place].filter(|_| matches!(self, Self::Inks(_)))
+    }
+
+    /// Entries of the legend of values that are shown.
+    pub(super) fn entries(
+        &self,
+        dot: impl Fn(f64) -> Dot,
+        is_shown: impl Fn(f64) -> bool,
+    ) -> Vec<LegendEntry> {
         let Self::Inks(values) = self else {
             return Vec::new();
         };
         let shown = values.iter().filter(|(value, _)| is_shown(*value));
         shown
-            .map(|(value, name)| entry(Mark::Dot(Dot::solid(self.ink(*value), radius)), name))
+            .map(|(value, name)| entry(Mark::Dot(dot(*value)), name))
             .collect()
     }
 
@@ -157,13 +169,14 @@ mod tests {
             })
         };
         let few = hues(3);
+        let dot = |_| Dot::solid(BLACK, 1.0);
         assert_eq!(
             [1.0, 2.0, 4.0].map(|value| few.ink(value)),
             [INKS[0], INKS[1], INKS[2]]
         );
-        assert!(few.entries(1.0, |_| true).len() == 3 && few.bar().is_none());
+        assert!(few.entries(dot, |_| true).len() == 3 && few.bar().is_none());
         let many = hues(7);
-        assert!(many.entries(1.0, |_| true).is_empty() && many.bar().is_some());
+        assert!(many.entries(dot, |_| true).is_empty() && many.bar().is_some());
         assert_eq!(
             (many.ink(1.0), many.ink(8.0), many.ink(64.0)),
             (SCALE[0], SCALE[5], SCALE[9])

@@ -78,14 +78,21 @@ pub(super) fn intervals(points: &[Point], beside: &Beside, look: &Look) -> Optio
         colour.setting(value / to_unit, digits)
     });
     let is_shown = |shown| phased.iter().any(|slip| is_same(value(slip.0), shown));
-    let mut entries: Vec<LegendEntry> = hues.entries(3.0, is_shown);
+    let mut entries: Vec<LegendEntry> =
+        hues.entries(|value| Dot::solid(hues.ink(value), 3.0), is_shown);
     if hues.bar().is_some() {
         let dot = Dot::solid(hues.ink(f64::INFINITY), RADIUS);
-        entries.push(entry(Mark::Dot(dot), "slips of sets with a phase"));
+        entries.push(entry(
+            Mark::Dot(dot),
+            "slips of sets with a preferred phase",
+        ));
     }
     if !unphased.is_empty() {
         let dot = Dot { ink: GREY, ..OTHER };
-        entries.push(entry(Mark::Dot(dot), "slips of sets without a phase"));
+        entries.push(entry(
+            Mark::Dot(dot),
+            "slips of sets without a preferred phase",
+        ));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     let own = Mark::Dot(Dot::solid(DARK_GREY, RADIUS));
@@ -145,7 +152,7 @@ mod tests {
             &points,
             &[
                 "Δ = 1 µm",
-                "slips of sets without a phase",
+                "slips of sets without a preferred phase",
                 "τ = nT",
                 "4",
                 "12"
@@ -163,8 +170,8 @@ mod tests {
             &points,
             &[
                 "V₀ (m/s)",
-                "slips of sets with a phase",
-                "slips of sets without a phase"
+                "slips of sets with a preferred phase",
+                "slips of sets without a preferred phase"
             ]
         ));
     }

@@ -1,7 +1,9 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
 use super::picture::{Anchor, Picture};
-use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, LEGEND_TEXT, Stroke, hollow, text_width};
+use super::style::{
+    BAR_WIDTH, BLACK, Dot, Fill, HOLLOW, Ink, LEGEND_TEXT, RADIUS, Stroke, outline_of, text_width,
+};
 
 /// Width of a line or a patch, and of a dot.
 const MARK: f64 = 26.0;
@@ -93,18 +95,21 @@ fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
                 opacity: dot.opacity.max(0.7),
                 ..dot
             };
-            sheet.discs([centre], dot);
+            sheet.dots([centre], dot);
         }
         Mark::Ring(ink, middle, radius, hole) => {
-            sheet.discs([centre], Dot::solid(ink, radius));
-            sheet.discs([centre], Dot::solid(middle, hole));
+            sheet.dots([centre], Dot::solid(ink, radius));
+            sheet.dots([centre], Dot::solid(middle, hole));
         }
         Mark::Bar(dot) => {
             let ends = vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)];
             sheet.line(ends, Stroke::solid(dot.ink, 1.6));
-            sheet.discs([centre], dot);
+            sheet.dots([centre], dot);
         }
-        Mark::Hollow(other) => sheet.line(hollow(other, centre), Stroke::solid(BLACK, BAR_WIDTH)),
+        Mark::Hollow(other) => {
+            let outline = outline_of(HOLLOW[other], RADIUS, centre);
+            sheet.line(outline, Stroke::solid(BLACK, BAR_WIDTH));
+        }
         Mark::Absent => {}
         Mark::Line(stroke) => sheet.line(vec![(start, middle), (end, middle)], stroke),
         Mark::Patch(fill) => sheet.rectangle([start, middle - 6.0, MARK, 12.0], fill),

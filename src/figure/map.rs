@@ -6,12 +6,15 @@ use super::frame::{Cell, Ends, Layout, OVERLAP};
 use super::hues::ColourBar;
 use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
-use super::picture::Picture;
+use super::picture::{Anchor, Picture};
 use super::quantity::{CellGrid, Quantity};
-use super::style::{BLACK, Dot, Fill, Ink, Look, Place, Stroke, WHITE, cell_shade, diverging};
+use super::style::{
+    BLACK, Dot, Fill, HALF_DIGIT, Ink, LEGEND_TEXT, Look, Place, Stroke, WHITE, cell_shade,
+    diverging,
+};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{FREQUENCY, SetRow, Values, differing, has_even_steps};
+use crate::reduce::{FREQUENCY, SetRow, Values, ascending, differing, has_even_steps, is_same};
 use crate::table::columns::Class;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -33,68 +36,143 @@ const MARKS: [(Regime, Ink, &str); 2] = [
 ];
 const MARK: f64 = 2.4;
 const HOLE: f64 = 1.5;
-/// Sets without a phase.
-const FREE: Ink = Ink::new(0xe9_e9_e7);
+/// Where a panel has no value, or one that is not significant.
+const UNCLEAR: Fill = Fill {
+    ink: Ink::new(0xd2_d2_d0),
+    opacity: 1.0,
+};
 
 /// A column and a row of a map.
 type Position = (usize, usize);
 
-/// Draws the map of sets in which two parameters alone differ and fill at least half of a grid: of 8 amplitudes and
-/// periods or more, or of 4 values or more of two other parameters; `None` for others. Sets without modulation do not
-/// count.
-pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
-    // The drive velocity is the x axis wherever it is one.
-    let [horizontal, vertical] = match differing(&sets.iter())[..] {
+/// What a map lies over, and what it shows.
+struct MapFigure<'a> {
+    name: &'static str,
+    sets: &'a [SetRow],
+    /// Columns of the axes, and least number of values along either.
+    axes: [&'static str; 2],
+    min_values: usize,
+    /// Those of its panels.
+    columns: [&'static str; 3],
+    width: f64,
+    height: f64,
+    legend: Vec<LegendEntry>,
+}
+
+/// Draws the map of sets in which amplitude and period of the modulation alone differ, and fill at least half of a grid of
+/// 8 values or more; `None` for others. Sets without modulation do not count.
+pub(super) fn locking(sets: &[SetRow], look: &Look) -> Option<Picture> {
+    let [Symbol::Delta, Symbol::T] = differing(&sets.iter())[..] else {
+        return None;
+    };
+    let mut modulated = sets.iter();
+    let first = modulated.find(|set| set.parameters.modulation_period.is_some())?;
+    let velocity = first.parameters.drive_velocity;
+    let figure = MapFigure {
+        name: LOCKING,
+        sets,
+        axes: [period_column(sets), "Delta"],
+        min_values: 8,
+        columns: ["periods", "locking_index", "resultant_excess"],
+        width: 560.0,
+        height: 280.0,
+        legend: vec![
+            entry(
+                Mark::Line(LINE),
+                "η = 1; above, the load falls in each period",
+            ),
+            entry(
+                Mark::Patch(UNCLEAR),
+                "(a) no phase; (c) 0 within the interval of the excess",
+            ),
+        ],
+    };
+    figure.draw(look, |map| {
+        let amplitude = |place| map.y.factor * velocity * map.x.period(place) / TAU;
+        let along_x = map.x_axis.evenly_placed(200).into_iter();
+        let places: Vec<Place> = along_x.map(|place| (place, amplitude(place))).collect();
+        let lines = [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke));
+        lines.into()
+    })
+}
+
+/// The same of two other parameters, of 4 values or more, with the borders between regimes. The drive velocity is the x
+/// axis wherever it is one.
+pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
+    let axes = match differing(&sets.iter())[..] {
         [first, Symbol::V0] => [Symbol::V0, first],
-        [first, second] if first == Symbol::Delta || ![first, second].contains(&Symbol::T) => {
-            [first, second]
-        }
+        [first, second] if ![first, second].contains(&Symbol::T) => [first, second],
         _ => return None,
     };
-    let is_locking = vertical == Symbol::T;
-    let columns = if is_locking {
-        [period_column(sets), "Delta"]
-    } else {
-        [horizontal.key(), vertical.key()]
-    };
-    let of = |column: &str| Quantity::of(sets, "map", column).ok();
-    let [x, y] = [of(columns[0])?, of(columns[1])?];
-    let map = Map::of(&x, &y, if is_locking { 8 } else { 4 })?;
-    let x_axis = map.columns.axis(&x.axis_label());
-    let y_axis = map.rows.axis(&y.axis_label());
-    let modulated = sets
-        .iter()
-        .find(|set| set.parameters.modulation_period.is_some());
-    let lines = || {
-        if let Some(set) = modulated.filter(|_| is_locking) {
-            let amplitude =
-                |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
-            let along_x = x_axis.evenly_placed(200).into_iter();
-            let places: Vec<Place> = along_x.map(|place| (place, amplitude(place))).collect();
-            let lines = [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke));
-            lines.into()
-        } else {
-            let mut lines = map.borders(|set| sets[set].regime);
-            for (regime, ink, _) in MARKS {
-                let drawn = map.sets.iter().map(|set| set.0);
-                let of_it = drawn.filter(|&set| sets[set].regime == Some(regime));
-                let places: Vec<Place> = of_it
-                    .filter_map(|set| x.number(set).zip(y.number(set)))
-                    .collect();
-                lines.push(Layer::Dots(places.clone(), Dot::solid(BLACK, MARK)));
-                lines.push(Layer::Dots(places, Dot::solid(ink, HOLE)));
-            }
-            lines
+    let mut legend = Vec::new();
+    for ((regime, ink, name), share) in MARKS.into_iter().zip(Regime::MIN_SHARES) {
+        if sets.iter().any(|set| set.regime == Some(regime)) {
+            let mark = Mark::Ring(BLACK, ink, MARK, HOLE);
+            legend.push(entry(mark, format!("{name}, share of {share} or more")));
         }
+    }
+    let borders = "between regimes; unmarked: stick-slip";
+    legend.push(entry(Mark::Line(BORDER), borders));
+    if sets.iter().any(|set| set.tau_mean.is_none()) {
+        legend.push(entry(Mark::Patch(UNCLEAR), "(c) no intervals"));
+    }
+    let figure = MapFigure {
+        name: REGIMES,
+        sets,
+        axes: axes.map(Symbol::key),
+        min_values: 4,
+        columns: ["slip_share", "mean_friction", "tau_mean"],
+        width: 490.0,
+        height: 220.0,
+        legend,
     };
-    let panel = |column: &str| {
-        let quantity = of(column)?;
+    figure.draw(look, |map| {
+        let mut lines = map.borders(|set| sets[set].regime);
+        for (regime, ink, _) in MARKS {
+            let drawn = map.sets.iter().map(|set| set.0);
+            let of_it = drawn.filter(|&set| sets[set].regime == Some(regime));
+            let place = |set| map.x.number(set).zip(map.y.number(set));
+            let places: Vec<Place> = of_it.filter_map(place).collect();
+            lines.push(Layer::Dots(places.clone(), Dot::solid(BLACK, MARK)));
+            lines.push(Layer::Dots(places, Dot::solid(ink, HOLE)));
+        }
+        lines
+    })
+}
+
+impl MapFigure<'_> {
+    fn quantity(&self, column: &str) -> Option<Quantity<'_>> {
+        Quantity::of(self.sets, "map", column).ok()
+    }
+
+    /// Draws a panel for each of its columns that has values, under these lines.
+    fn draw(
+        &self,
+        look: &Look,
+        lines: impl Fn(&Map<'_>) -> Vec<Layer<'static>>,
+    ) -> Option<Picture> {
+        let [x, y] = self.axes.map(|column| self.quantity(column));
+        let map = Map::of(x?, y?, self.min_values)?;
+        let panel = |column: &&str| self.panel(&map, column, lines(&map));
+        let panels = self.columns.iter().filter_map(panel).collect();
+        let layout = Layout::column(self.width);
+        Some(panel::draw(self.name, look, layout, &self.legend, panels))
+    }
+
+    /// The cells of a column, under lines, and their scale; `None` if it has no value.
+    fn panel(
+        &self,
+        map: &Map<'_>,
+        column: &str,
+        lines: Vec<Layer<'static>>,
+    ) -> Option<Panel<'static>> {
+        let quantity = self.quantity(column)?;
         let class = quantity.column.column.class;
         let is_of_periods = class == Class::Category;
         let is_excess = class == Class::Excess;
         let holds_zero = |(low, high): Ends| low <= 0.0 && high >= 0.0;
         let is_unclear = |set: usize| {
-            (is_of_periods && !sets[set].has_phase)
+            (is_of_periods && !self.sets[set].has_phase)
                 || (is_excess && quantity.interval(set).is_some_and(holds_zero))
         };
         let number = |set: usize| quantity.number(set).filter(|_| !is_unclear(set));
@@ -103,38 +181,28 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         } else {
             f64::INFINITY
         };
-        let ends = || bounds((0..sets.len()).filter_map(number).map(|n| n.min(most)));
+        let all = 0..self.sets.len();
+        let ends = bounds(all.filter_map(number).map(|n| n.min(most)));
         let label = quantity.axis_label();
-        let scale = scale_of(class, &label, ends())?;
+        let scale = scale_of(class, &label, ends)?;
         let colour = if is_excess { diverging } else { cell_shade };
         let mut bar = ColourBar::of_axis(&scale, colour);
         if is_of_periods {
-            mark_periods(&mut bar, &scale, ends().unwrap_or_default());
+            mark_periods(&mut bar, &scale, ends.unwrap_or_default());
         }
-        let none = (is_of_periods || is_excess).then_some(FREE);
-        let ink = |set| number(set).map(|n| colour(scale.place(n))).or(none);
+        let ink = |set| number(set).map_or(UNCLEAR.ink, |n| colour(scale.place(n)));
         let drawn = map.sets.iter();
-        let cells = drawn.filter_map(|&(set, position)| Some((map.cell(position), ink(set)?)));
-        let cells = Layer::Cells(cells.collect(), OVERLAP);
-        let layers = std::iter::once(cells).chain(lines());
+        let cells = drawn.map(|&(set, position)| (map.cell(position), ink(set)));
         let heading = Some(std::mem::take(&mut bar.label));
-        let height = if is_locking { 280.0 } else { 220.0 };
+        let cells = Layer::Cells(cells.collect(), OVERLAP);
+        let numbers = is_of_periods.then(|| map.numbers(&number, &scale));
+        let layers = std::iter::once(cells).chain(lines).chain(numbers);
         Some(Panel {
             heading,
             bar: Some(bar),
-            ..Panel::inside(height, x_axis.clone(), y_axis.clone(), layers)
+            ..Panel::inside(self.height, map.x_axis.clone(), map.y_axis.clone(), layers)
         })
-    };
-    let columns = if is_locking {
-        ["periods", "locking_index", "resultant_excess"]
-    } else {
-        ["slip_share", "mean_friction", "tau_mean"]
-    };
-    let panels = columns.into_iter().filter_map(panel).collect();
-    let name = if is_locking { LOCKING } else { REGIMES };
-    let layout = Layout::column(if is_locking { 560.0 } else { 490.0 });
-    let entries = legend(is_locking, sets);
-    Some(panel::draw(name, look, layout, &entries, panels))
+    }
 }
 
 /// T, or 1/T if its steps are even and those of T are not.
@@ -193,62 +261,82 @@ fn mark_periods(bar: &mut ColourBar, scale: &Axis, (first, last): (f64, f64)) {
         .collect();
 }
 
-fn legend(is_locking: bool, sets: &[SetRow]) -> Vec<LegendEntry> {
-    if is_locking {
-        let free = Fill {
-            ink: FREE,
-            opacity: 1.0,
-        };
-        return vec![
-            entry(
-                Mark::Line(LINE),
-                "η = 1; above, the load falls in each period",
-            ),
-            entry(
-                Mark::Patch(free),
-                "(a) no phase; (c) 0 within the interval of the excess",
-            ),
-        ];
-    }
-    let mut entries = Vec::new();
-    for ((regime, ink, name), share) in MARKS.into_iter().zip(Regime::MIN_SHARES) {
-        if sets.iter().any(|set| set.regime == Some(regime)) {
-            let mark = Mark::Ring(BLACK, ink, MARK, HOLE);
-            entries.push(entry(mark, format!("{name}, share of {share} or more")));
-        }
-    }
-    let borders = "between regimes; unmarked: stick-slip";
-    entries.push(entry(Mark::Line(BORDER), borders));
-    entries
-}
-
-struct Map {
+/// The grid of a map.
+struct Map<'a> {
+    x: Quantity<'a>,
+    y: Quantity<'a>,
     columns: CellGrid,
     rows: CellGrid,
+    x_axis: Axis,
+    y_axis: Axis,
     /// Those that lie on the grid, by their number.
     sets: Vec<(usize, Position)>,
 }
 
-impl Map {
+impl<'a> Map<'a> {
     /// `None` for fewer values of either quantity than `min_values`, or if less than half of their grid is filled.
-    fn of(x: &Quantity<'_>, y: &Quantity<'_>, min_values: usize) -> Option<Self> {
+    fn of(x: Quantity<'a>, y: Quantity<'a>, min_values: usize) -> Option<Self> {
         let places = x.column.places().into_iter().zip(y.column.places());
         let position =
             |(set, (column, row)): (usize, (Option<_>, Option<_>))| Some((set, (column?, row?)));
         let sets: Vec<(usize, Position)> = places.enumerate().filter_map(position).collect();
-        let counts = [x, y].map(|asked| asked.column.distinct.len());
+        let counts = [&x, &y].map(|asked| asked.column.distinct.len());
         let is_grid = counts.iter().all(|count| *count >= min_values)
             && 2 * sets.len() >= counts[0] * counts[1];
-        let grid = |asked: &Quantity<'_>| CellGrid::of(asked.distinct().collect());
-        is_grid.then(|| Self {
-            columns: grid(x),
-            rows: grid(y),
+        if !is_grid {
+            return None;
+        }
+        let [columns, rows] = [&x, &y].map(|asked| CellGrid::of(asked.distinct().collect()));
+        Some(Self {
+            x_axis: columns.axis(&x.axis_label()),
+            y_axis: rows.axis(&y.axis_label()),
+            x,
+            y,
+            columns,
+            rows,
             sets,
         })
     }
 
     fn cell(&self, (column, row): Position) -> Cell {
         (self.columns.cell(column), self.rows.cell(row))
+    }
+
+    /// Each number of periods in the midst of its cells, if these are enough.
+    fn numbers(&self, number: &impl Fn(usize) -> Option<f64>, scale: &Axis) -> Layer<'static> {
+        const FEWEST: usize = 12;
+        let known = self
+            .sets
+            .iter()
+            .filter_map(|&(set, position)| Some((number(set)?, position)));
+        let known: Vec<(f64, Position)> = known.collect();
+        let mut numbers = Vec::new();
+        for n in ascending(known.iter().map(|one| one.0).filter(|n| *n <= MAX_PERIODS)) {
+            let own = known
+                .iter()
+                .filter(|one| is_same(one.0, n))
+                .map(|one| one.1);
+            let own: Vec<Position> = own.collect();
+            let distance = |one: &Position| -> usize {
+                let squares = own
+                    .iter()
+                    .map(|other| one.0.abs_diff(other.0).pow(2) + one.1.abs_diff(other.1).pow(2));
+                squares.sum()
+            };
+            let middle = own.iter().copied().min_by_key(distance);
+            if let Some((column, row)) = middle.filter(|_| own.len() >= FEWEST) {
+                let place = (self.columns.value(column), self.rows.value(row));
+                let ink = if scale.place(n) > 0.5 { WHITE } else { BLACK };
+                numbers.push((place, n.to_string(), ink));
+            }
+        }
+        Layer::Drawn(Box::new(move |sheet, frame| {
+            for (place, text, ink) in numbers {
+                let (x, y) = frame.place(place);
+                let base = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
+                sheet.coloured_text(base, &text, LEGEND_TEXT, Anchor::Middle, Some(ink));
+            }
+        }))
     }
 
     /// Lines between neighbours of different regimes.
@@ -301,22 +389,22 @@ mod tests {
     #[test]
     fn only_a_grid_of_modulations_becomes_a_map() {
         let mut sets = grid(8, 9);
-        assert!(map(&sets, &Look::default()).is_some());
+        assert!(locking(&sets, &Look::default()).is_some());
         assert!(
-            map(&sets[..30], &Look::default()).is_none(),
+            locking(&sets[..30], &Look::default()).is_none(),
             "four amplitudes"
         );
-        assert!(map(&grid(9, 7), &Look::default()).is_none());
+        assert!(locking(&grid(9, 7), &Look::default()).is_none());
         sets.push(set(0.0, 1.0, 1.0));
         assert!(
-            map(&sets, &Look::default()).is_some(),
+            locking(&sets, &Look::default()).is_some(),
             "a set without modulation lies on no grid"
         );
         sets[3].parameters.parameters = Parameters {
             drive_velocity: 1e-5,
             ..sets[3].parameters.parameters.clone()
         };
-        assert!(map(&sets, &Look::default()).is_none(), "two velocities");
+        assert!(locking(&sets, &Look::default()).is_none(), "two velocities");
     }
 
     #[test]
@@ -324,14 +412,14 @@ mod tests {
         let sets: Vec<SetRow> = (1..=20)
             .map(|step| set(1e-7 * f64::from(step), 0.01 * f64::from(step), 3.0))
             .collect();
-        assert!(map(&sets, &Look::default()).is_none());
+        assert!(locking(&sets, &Look::default()).is_none());
     }
 
     #[test]
     fn large_numbers_of_periods_share_a_colour() {
         let mut sets = grid(8, 8);
         let bar = |sets: &[SetRow]| {
-            map(sets, &Look::default())
+            locking(sets, &Look::default())
                 .unwrap()
                 .svg()
                 .contains(">&gt;12<")
@@ -344,7 +432,7 @@ mod tests {
     #[test]
     fn what_the_slider_adds_is_a_panel_where_there_are_controls_and_nothing_is_pale() {
         let mut sets = grid(8, 8);
-        let drawn = |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg();
+        let drawn = |sets: &[SetRow]| locking(sets, &Look::default()).unwrap().svg();
         assert!(!drawn(&sets).contains("Excess of the resultant"));
         for (set, excess) in sets.iter_mut().zip([-0.5, 0.0, 0.5].into_iter().cycle()) {
             set.resultant_excess = Some(excess);
@@ -366,20 +454,20 @@ mod tests {
             set.resultant_excess = Some(0.5);
             set.resultant_excess_interval = Some(Interval { low, high: 0.9 });
         }
-        let svg = map(&sets, &Look::default()).unwrap().svg();
+        let svg = locking(&sets, &Look::default()).unwrap().svg();
         let coloured = svg.matches(&diverging(1.0).to_string()).count();
         assert!((32..40).contains(&coloured), "{coloured}");
-        assert!(svg.matches(&FREE.to_string()).count() >= 32);
+        assert!(svg.matches(&UNCLEAR.ink.to_string()).count() >= 32);
     }
 
     #[test]
     fn sets_without_a_phase_are_as_pale_as_the_ground() {
         let mut sets = grid(8, 8);
         let free = |sets: &[SetRow]| {
-            map(sets, &Look::default())
+            locking(sets, &Look::default())
                 .unwrap()
                 .svg()
-                .matches(&FREE.to_string())
+                .matches(&UNCLEAR.ink.to_string())
                 .count()
         };
         let none = free(&sets);
@@ -424,13 +512,13 @@ mod tests {
                 .collect()
         };
         let drawn = |sets: &[SetRow]| {
-            map(sets, &Look::default())
+            regimes(sets, &Look::default())
                 .unwrap()
                 .svg()
                 .matches("stroke-width=\"1.6\"")
                 .count()
         };
-        let svg = map(
+        let svg = regimes(
             &grid(|row, _| if row < 2 { 0.05 } else { 1.0 }),
             &Look::default(),
         );
@@ -449,7 +537,7 @@ mod tests {
             without + 3 * 4
         );
         assert!(
-            map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(),
+            regimes(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(),
             "two rows"
         );
     }

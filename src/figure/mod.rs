@@ -47,8 +47,9 @@ use self::chart::ChartRows;
 use self::quantity::{Quantity, distinct};
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{
-    EdgeRow, PulseRow, SetRow, SlipOfSet, advise, means_of_slips, read_optional, read_reduced,
-    read_sets, sample_of_slips, swept,
+    BackboneBin, Condition, EdgeRow, HistogramBin, Point, PulseRow, SetRow, SlipOfSet, advise,
+    means_of_slips, points_of, read_control, read_optional, read_reduced, read_sets,
+    sample_of_slips, swept,
 };
 use crate::results::commit::Commit;
 use crate::results::layout::Layout;
@@ -56,6 +57,7 @@ use crate::results::tables::gaps;
 use crate::results::{Results, ResultsError};
 use crate::sets::setting;
 use crate::table::Table;
+use crate::table::columns::Row;
 use anyhow::Result;
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -72,21 +74,173 @@ impl BadOption {
     }
 }
 
-/// The standing figures, which [`draw_all`] draws, in the order of the report.
-pub const STANDING: &[&str] = &[
-    overview::NAME,
-    map::LOCKING,
-    map::REGIMES,
-    edge_values::NAME,
-    drag::NAME,
-    phase_eta::NAME,
-    intervals::NAME,
-    histograms::NAME,
-    triggering::NAME,
+/// What standing figures are drawn from.
+struct Data<'a> {
+    points: Vec<Point>,
+    backbone: Vec<BackboneBin>,
+    /// Slips after a pulse have a figure of their own.
+    sets: Vec<SetRow>,
+    control: Option<SetRow>,
+    histograms: Vec<HistogramBin>,
+    edges: Vec<EdgeRow>,
+    pulses: Vec<PulseRow>,
+    beside: &'a Beside,
+    look: &'a Look,
+}
+
+impl<'a> Data<'a> {
+    fn read(layout: &Layout<'_>, beside: &'a Beside, look: &'a Look) -> Result<Self> {
+        let mut sets = sets_with_results(layout).map_err(advise(ADVICE))?;
+        sets.retain(|set| set.parameters.pulse_start.is_none());
+        let has_histograms = sets.len() <= histograms::MAX_SETS;
+        Ok(Self {
+            points: read(layout)?,
+            backbone: read(layout)?,
+            histograms: if has_histograms {
+                read(layout)?
+            } else {
+                Vec::new()
+            },
+            sets,
+            control: read_control(layout).map_err(advise(ADVICE))?,
+            edges: read_optional(layout).map_err(advise(ADVICE))?,
+            pulses: read_optional(layout).map_err(advise(ADVICE))?,
+            beside,
+            look,
+        })
+    }
+
+    /// Those of the sets for which a condition holds, with their slips.
+    fn retain(&mut self, results: &Results<'_>, condition: &str) -> Result<()> {
+        let refused = |problem: String| BadOption::new("where", condition, &problem);
+        let of_sets = Condition::read(condition, &SetRow::columns()).map_err(refused)?;
+        if !self.sets.iter().any(|set| of_sets.holds(set)) {
+            return Err(refused(of_sets.unmatched("sets", &self.sets)).into());
+        }
+        self.sets.retain(|set| of_sets.holds(set));
+        self.points = points_of(results, &self.sets)?;
+        // Their bins hold the slips of all sets.
+        self.backbone.clear();
+        retain(&mut self.edges, condition);
+        retain(&mut self.pulses, condition);
+        Ok(())
+    }
+
+    /// Of each standing figure that these data make, or the overview.
+    fn pictures(&self) -> Vec<Picture> {
+        let figures = STANDING.iter();
+        let mut pictures: Vec<Picture> = figures.filter_map(|figure| (figure.draw)(self)).collect();
+        if pictures.is_empty() {
+            pictures.extend(overview::overview(
+                &self.sets,
+                None,
+                self.beside,
+                &self.of_all(),
+            ));
+        }
+        pictures
+    }
+
+    /// The look of figures of this directory, and of all.
+    fn own(&self) -> Look {
+        let parameters = self.sets.iter().map(|set| &*set.parameters);
+        self.look.with_note(&common(parameters, &[]))
+    }
+
+    fn of_all(&self) -> Look {
+        self.beside.look(self.look, &self.sets)
+    }
+
+    /// The sets; none under a ramp, where a set has no one period.
+    fn still(&self) -> &[SetRow] {
+        let is_ramped = self.sets.iter().any(|set| set.parameters.ramp_time > 0.0);
+        if is_ramped { &[] } else { &self.sets }
+    }
+
+    fn map(&self) -> Option<Picture> {
+        let mut maps = [map::locking, map::regimes].into_iter();
+        maps.find_map(|map| map(self.still(), &self.own()))
+    }
+}
+
+/// `None` where a map shows it better: more values than colours would be a net of lines. A single set would be a dot.
+fn overview_of_sets(data: &Data<'_>) -> Option<Picture> {
+    let is_net = |sets: &[SetRow]| {
+        let swept = swept(sets);
+        swept
+            .get(1)
+            .is_some_and(|second| second.distinct.len() > INKS.len())
+    };
+    let sets = data.still();
+    let is_shown = sets.len() > 1 && !(is_net(sets) && data.map().is_some());
+    let of_control = data.control.as_ref();
+    is_shown.then(|| overview::overview(sets, of_control, data.beside, &data.of_all()))?
+}
+
+/// Leaves rows without the columns of a condition out, too.
+fn retain<R: Row>(rows: &mut Vec<R>, condition: &str) {
+    let condition = Condition::read(condition, &R::columns()).ok();
+    rows.retain(|row| {
+        condition
+            .as_ref()
+            .is_some_and(|condition| condition.holds(row))
+    });
+}
+
+/// A figure that [`draw_all`] draws if its data are there.
+struct Standing {
+    name: &'static str,
+    draw: fn(&Data<'_>) -> Option<Picture>,
+    /// Whether it shows other directories, too.
+    is_beside: bool,
+}
+
+impl Standing {
+    const fn new(name: &'static str, draw: fn(&Data<'_>) -> Option<Picture>) -> Self {
+        Self {
+            name,
+            draw,
+            is_beside: false,
+        }
+    }
+
+    const fn beside(self) -> Self {
+        Self {
+            is_beside: true,
+            ..self
+        }
+    }
+}
+
+/// All of them, in the order of the report.
+const STANDING: &[Standing] = &[
+    Standing::new(overview::NAME, overview_of_sets).beside(),
+    Standing::new(map::LOCKING, |data| map::locking(data.still(), &data.own())),
+    Standing::new(map::REGIMES, |data| map::regimes(data.still(), &data.own())),
+    Standing::new(edge_values::NAME, |data| {
+        edge_values::edges(&data.edges, &data.own())
+    }),
+    Standing::new(drag::NAME, |data| drag::drag(&data.points, &data.own())),
+    Standing::new(phase_eta::NAME, |data| {
+        phase_eta::phase_eta(&data.points, &data.backbone, data.beside, &data.of_all())
+    })
+    .beside(),
+    Standing::new(intervals::NAME, |data| {
+        intervals::intervals(&data.points, data.beside, &data.of_all())
+    })
+    .beside(),
+    Standing::new(histograms::NAME, |data| {
+        histograms::histograms(&data.sets, &data.histograms, &data.own())
+    }),
+    Standing::new(triggering::NAME, |data| {
+        triggering::triggering(&data.pulses, data.look)
+    }),
 ];
 
-/// Those that show other directories, too.
-const BESIDE: [&str; 3] = [phase_eta::NAME, intervals::NAME, overview::NAME];
+/// The names of the standing figures, in the order of the report.
+pub fn standing() -> impl Iterator<Item = &'static str> {
+    STANDING.iter().map(|figure| figure.name)
+}
 
 /// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
 const MAX_SETS: usize = 100_000;
@@ -145,64 +299,50 @@ pub fn draw_all(
     look: &Look,
     formats: &[PictureFormat],
 ) -> Result<Drawn> {
-    let points = read(layout)?;
-    let mut sets = sets_with_results(layout).map_err(advise(ADVICE))?;
-    // Slips after a pulse have a figure of their own.
-    sets.retain(|set| set.parameters.pulse_start.is_none());
-    let of_all = &beside.look(look, &sets);
-    let noted = &look.with_note(&common(sets.iter().map(|set| &*set.parameters), &[]));
-    let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(phase_eta::phase_eta(
-        &points,
-        &read(layout)?,
-        beside,
-        of_all,
-    ));
-    pictures.extend(intervals::intervals(&points, beside, of_all));
-    pictures.extend(drag::drag(&points, noted));
-    // Under a ramp a set has no one period.
-    if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
-        let map = map::map(&sets, noted);
-        // More values than colours would be a net of lines, which a map shows better; a single set would be a dot.
-        let is_net = || {
-            swept(&sets)
-                .get(1)
-                .is_some_and(|second| second.distinct.len() > INKS.len())
-        };
-        if sets.len() > 1 && !(map.is_some() && is_net()) {
-            pictures.extend(overview::overview(&sets, beside, of_all));
-        }
-        pictures.extend(map);
-    }
-    let edges: Vec<EdgeRow> = read_optional(layout).map_err(advise(ADVICE))?;
-    pictures.extend(edge_values::edges(&edges, noted));
-    let pulses: Vec<PulseRow> = read_optional(layout).map_err(advise(ADVICE))?;
-    pictures.extend(triggering::triggering(&pulses, noted));
-    if sets.len() <= histograms::MAX_SETS {
-        pictures.extend(histograms::histograms(&sets, &read(layout)?, noted));
-    }
-    if pictures.is_empty() {
-        pictures.extend(overview::overview(&sets, beside, of_all));
-    }
+    let pictures = Data::read(layout, beside, look)?.pictures();
     let mut remarks = remarks(&pictures);
-    let is_beside = |picture: &Picture| BESIDE.contains(&picture.name());
+    let all_beside = STANDING.iter().filter(|figure| figure.is_beside);
+    let all_beside: Vec<&str> = all_beside.map(|figure| figure.name).collect();
+    let is_beside = |picture: &Picture| all_beside.contains(&picture.name());
     if !beside.others.is_empty() && !pictures.iter().any(is_beside) {
-        let figures = BESIDE.join(", ");
+        let figures = all_beside.join(", ");
         remarks.push(format!(
             "no figure shows other directories: there is none of {figures}"
         ));
     }
-    let files = write(layout, &pictures, noted, formats)?;
+    let files = write(layout, &pictures, look, formats)?;
     // What earlier data gave, and these do not.
     for name in layout.storage.list(&layout.figures())? {
         let path = layout.figures().join(name);
         let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
         let is_drawn = pictures.iter().any(|picture| picture.name() == stem);
-        if STANDING.contains(&stem) && !is_drawn {
+        if standing().any(|name| name == stem) && !is_drawn {
             layout.remove(&path)?;
         }
     }
     Ok(Drawn { files, remarks })
+}
+
+/// Draws the standing figures of the sets for which a condition holds. Their names end in `-where`.
+pub fn draw_where(
+    results: &Results<'_>,
+    condition: &str,
+    look: &Look,
+    formats: &[PictureFormat],
+) -> Result<Drawn> {
+    let look = look.with_note(&format!("where {condition}"));
+    let beside = Beside::default();
+    let mut data = Data::read(results.layout(), &beside, &look)?;
+    data.retain(results, condition)?;
+    let mut pictures = data.pictures();
+    for picture in &mut pictures {
+        picture.name += "-where";
+    }
+    let files = write(results.layout(), &pictures, &look, formats)?;
+    Ok(Drawn {
+        files,
+        remarks: remarks(&pictures),
+    })
 }
 
 /// Draws a custom figure of the sets or slips of a results directory; writes nothing.
@@ -235,13 +375,13 @@ fn draw_sets(
         if !own.iter().any(|set| condition.holds(set)) {
             return Err(figure.unmatched(&condition, &own).into());
         }
-        let all = beside.others.iter_mut().map(|other| &mut other.sets);
-        all.chain([&mut own])
-            .for_each(|sets| sets.retain(|set| condition.holds(set)));
+        beside.retain(&condition);
+        own.retain(|set| condition.holds(set));
     }
     let mut look = beside.look(look, &own);
     look.note += &figure.shown_condition();
     let swept = swept(&own);
+    let control = read_control(results.layout()).map_err(advise(ADVICE))?;
     let (sets, others) = beside.with_others(own);
     let quantity = |option, name: &str| {
         Quantity::of(&sets, option, name).or_else(|unknown| {
@@ -251,6 +391,7 @@ fn draw_sets(
     };
     let rows = ChartRows {
         sets: &sets,
+        control: control.as_ref().filter(|_| others.is_empty()),
         swept: &swept,
         beside: &beside,
         others,
@@ -289,6 +430,7 @@ fn draw_slips(
     };
     let rows = ChartRows {
         sets: &[],
+        control: None,
         swept: &swept(sets),
         beside: &Beside::default(),
         others: Vec::new(),
@@ -466,7 +608,9 @@ mod tests {
         );
         let stems = names.iter().filter_map(|name| name.split('.').next());
         assert!(
-            stems.into_iter().all(|stem| STANDING.contains(&stem)),
+            stems
+                .into_iter()
+                .all(|stem| standing().any(|name| name == stem)),
             "the report shows them"
         );
         let bytes = || {

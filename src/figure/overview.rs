@@ -19,7 +19,12 @@ const QUANTITIES: [&str; 5] = [
 
 /// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third
 /// panels. A single set is a dot over its velocity. `None` if nothing was found.
-pub(super) fn overview(own: &[SetRow], beside: &Beside, look: &Look) -> Option<Picture> {
+pub(super) fn overview(
+    own: &[SetRow],
+    control: Option<&SetRow>,
+    beside: &Beside,
+    look: &Look,
+) -> Option<Picture> {
     let swept = swept(own);
     let (all, others) = beside.with_others(own.to_vec());
     let rows = &all[..];
@@ -59,6 +64,7 @@ pub(super) fn overview(own: &[SetRow], beside: &Beside, look: &Look) -> Option<P
         of: "sets",
         rows: ChartRows {
             sets: rows,
+            control,
             swept: &swept,
             beside,
             others,
@@ -86,7 +92,7 @@ mod tests {
     }
 
     fn overview_of(sets: &[SetRow]) -> String {
-        overview(sets, &Beside::default(), &Look::default())
+        overview(sets, None, &Beside::default(), &Look::default())
             .unwrap()
             .svg()
     }
@@ -98,7 +104,7 @@ mod tests {
             .flat_map(|&dfs| [spread(dfs, 0.0), spread(dfs, 1e-6)])
             .collect();
         let svg = overview_of(&sets);
-        for text in ["(c) Mean friction ⟨Fₛ⟩ (N)", "Δ = 0", "Δ = 1 µm", "0.05"] {
+        for text in ["(c) Mean friction ⟨F", "Δ = 0", "Δ = 1 µm", "0.05"] {
             assert!(svg.contains(&format!(">{text}<")), "{text}");
         }
         assert!(
@@ -124,7 +130,7 @@ mod tests {
             overview_of(&sets[..1]).contains("Drive velocity V₀"),
             "a single set"
         );
-        assert!(overview(&[], &Beside::default(), &Look::default()).is_none());
+        assert!(overview(&[], None, &Beside::default(), &Look::default()).is_none());
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! Panels as data: axes and what lies between them, layer by layer. One engine draws the panels of every figure.
 
 use super::axis::Axis;
-use super::frame::{Cell, Ends, Frame, HEADING, Layout};
+use super::frame::{Cell, Ends, Frame, HEADING, Layout, NUMBERS};
 use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::{LegendEntry, Mark};
 use super::picture::Picture;
-use super::style::{BAR_WIDTH, BLACK, Dot, Fill, Ink, Look, Place, Stroke, WHITE, hollow};
+use super::style::{
+    BAR_WIDTH, BLACK, Dot, Fill, HOLLOW, Ink, Look, Place, RADIUS, Stroke, WHITE, outline_of,
+};
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 
@@ -66,13 +68,13 @@ impl Layer<'_> {
                     .filter(|&(x, y)| frame.x.contains(x) && frame.y.contains(y));
                 let centres: Vec<Place> = inside.map(|point| frame.place(point)).collect();
                 if !centres.is_empty() {
-                    sheet.discs(centres, dot);
+                    sheet.dots(centres, dot);
                 }
             }
             Self::Hollow(points, other, ink) => {
                 for point in points {
                     if frame.x.contains(point.0) && frame.y.contains(point.1) {
-                        let outline = hollow(other, frame.place(point));
+                        let outline = outline_of(HOLLOW[other], RADIUS, frame.place(point));
                         // It is seen on any ground.
                         sheet.line(outline.clone(), Stroke::solid(WHITE, 2.5 * BAR_WIDTH));
                         sheet.line(outline, Stroke::solid(ink, BAR_WIDTH));
@@ -169,11 +171,22 @@ pub(super) fn draw(
     if panels.iter().any(|panel| panel.heading.is_some()) {
         layout.heading = HEADING;
     }
+    let columns = layout.columns;
+    let is_over_same = |number: usize| {
+        let below = panels.get(number + columns);
+        below.map(|below| below.x.label == panels[number].x.label)
+    };
+    let has_numbers: Vec<bool> = (0..panels.len())
+        .map(|number| is_over_same(number) != Some(true))
+        .collect();
+    if (0..panels.len()).any(|number| is_over_same(number) == Some(false)) {
+        layout.row_gap += NUMBERS;
+    }
     let heights: Vec<f64> = panels.iter().map(|panel| panel.height).collect();
     let (page, mut sheet) = layout.page(name, look, &legend, &heights);
     sheet.absent = absent.into_iter().map(|(_, name)| name).collect();
     for (number, panel) in panels.into_iter().enumerate() {
-        let frame = page.frame(number, panel.x, panel.y);
+        let frame = page.frame(number, panel.x, panel.y, has_numbers[number]);
         for layer in panel.layers {
             layer.draw(&mut sheet, &frame);
         }

@@ -107,6 +107,10 @@ impl PdfPage {
             } => {
                 self.with_opacity(*fill_opacity, |page| page.circles(cx, cy, *r, parts(fill)));
             }
+            Primitive::Path(path) => {
+                let fill = path.fill.as_ref().map_or([0.0; 3], parts);
+                self.with_opacity(path.opacity, |page| page.polygon(&path.d, fill));
+            }
             Primitive::Text {
                 x,
                 y,
@@ -154,6 +158,23 @@ impl PdfPage {
             };
         }
         self.content.stroke();
+    }
+
+    /// Of a path from corner to corner, as pictures write it.
+    fn polygon(&mut self, path: &str, fill: [f32; 3]) {
+        self.fill(fill);
+        let numbers: Vec<f32> = path
+            .split(' ')
+            .filter_map(|part| part.parse().ok())
+            .collect();
+        for (index, corner) in numbers.chunks_exact(2).enumerate() {
+            let _ = if index == 0 {
+                self.content.move_to(corner[0], corner[1])
+            } else {
+                self.content.line_to(corner[0], corner[1])
+            };
+        }
+        self.content.close_path().fill_nonzero();
     }
 
     fn fill(&mut self, [red, green, blue]: [f32; 3]) {

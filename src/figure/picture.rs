@@ -4,7 +4,7 @@ use super::BadOption;
 use super::pdf::{pdf, single};
 use super::style::{
     BLACK, Dot, FACE, Fill, HALF_DIGIT, Ink, Look, POINTS_PER_INCH, Size, Stroke, Style, Unit,
-    text_width,
+    outline_of, text_width,
 };
 use crate::table::shown::shown_text;
 use crate::table::value::words;
@@ -13,14 +13,14 @@ use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 pub(super) use kuva::render::render::TextAnchor as Anchor;
-use kuva::render::render::{Primitive, Scene};
+use kuva::render::render::{PathData, Primitive, Scene};
 use std::collections::BTreeSet;
 
 /// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
 
 /// Symbols whose subscripts are not letters of the font; their size, in tenths, and how far below the line they stand.
-const SUBSCRIPTED: [&str; 2] = ["K_d", "F_N"];
+const SUBSCRIPTED: [&str; 3] = ["K_d", "F_N", "F_S"];
 const SMALL: u32 = 7;
 const LOWER: f64 = 0.2;
 
@@ -28,7 +28,7 @@ const LOWER: f64 = 0.2;
 const MAX_PIXELS: f64 = 1e8;
 
 pub struct Picture {
-    name: String,
+    pub(super) name: String,
     pub(super) style: Style,
     unit: Unit,
     /// Whether the small print is part of it.
@@ -231,7 +231,13 @@ impl Picture {
         self.scene.add(Primitive::RectBatch { x, y, w, h, fills });
     }
 
-    pub(super) fn discs(&mut self, centres: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {
+    pub(super) fn dots(&mut self, centres: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {
+        if let Some(polygon) = dot.shape {
+            for centre in centres {
+                self.polygon(&outline_of(polygon, dot.radius, centre), dot);
+            }
+            return;
+        }
         let (cx, cy) = centres.into_iter().unzip();
         self.scene.add(Primitive::CircleBatch {
             cx,
@@ -242,6 +248,20 @@ impl Picture {
             stroke: None,
             stroke_width: None,
         });
+    }
+
+    /// A filled polygon, from corner to corner, in the look of a dot.
+    fn polygon(&mut self, corners: &[(f64, f64)], dot: Dot) {
+        let points = corners.iter().map(|(x, y)| format!("{x:.2} {y:.2}"));
+        let path = points.collect::<Vec<_>>().join(" L ");
+        self.scene.add(Primitive::Path(Box::new(PathData {
+            d: format!("M {path} Z"),
+            fill: Some(color(dot.ink)),
+            stroke: Color::None,
+            stroke_width: 0.0,
+            opacity: (dot.opacity < 1.0).then_some(dot.opacity),
+            stroke_dasharray: None,
+        })));
     }
 
     /// A text on its base line, always upright: the raster makes turned text bold.

@@ -314,6 +314,10 @@ impl CellGrid {
         Self { values, is_linear }
     }
 
+    pub(super) fn value(&self, index: usize) -> f64 {
+        self.values[index]
+    }
+
     /// An axis for cells: it ends half a step beyond the values.
     pub(super) fn axis(&self, label: &str) -> Axis {
         let low = self.cell(0).0;

@@ -169,7 +169,7 @@ impl Shared<'_> {
     fn force(&self, trace: &[Place]) -> Panel<'static> {
         let ends = bounds(trace.iter().map(|sample| sample.1));
         let (low, high) = widened(ends.unwrap_or((0.0, 0.0)));
-        let y = Axis::linear("Shear force Fₛ (N)", low, high);
+        let y = Axis::linear("Shear force F_S (N)", low, high);
         let samples = thinned(trace, self.width).into_iter();
         let places = samples.map(|(time, force)| (self.factor * time, force));
         let force = Layer::Curve(places.collect(), TRACE);
@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn the_requested_panels_are_drawn_and_labelled_once() {
-        let force = "Shear force Fₛ (N)<";
+        let force = "Shear force F<";
         let position = "Position x (mm), trailing edge at 0<";
         let bar = ">detached (%)<";
         let panels = [

@@ -209,6 +209,8 @@ pub(super) struct Dot {
     pub(super) ink: Ink,
     pub(super) radius: f64,
     pub(super) opacity: f64,
+    /// None of a disc.
+    pub(super) shape: Option<Polygon>,
 }
 
 impl Dot {
@@ -217,7 +219,12 @@ impl Dot {
             ink,
             radius,
             opacity: 1.0,
+            shape: None,
         }
+    }
+
+    pub(super) const fn with_shape(self, shape: Option<Polygon>) -> Self {
+        Self { shape, ..self }
     }
 
     pub(super) const fn with_opacity(self, opacity: f64) -> Self {
@@ -272,16 +279,34 @@ pub(super) const STRIPE: Fill = Fill {
 /// Radius of the dots of statistics.
 pub(super) const RADIUS: f64 = 4.2;
 
-/// The marks of other directories: corners, and where the first stands, in corners from the top. A diamond, a triangle,
-/// a pentagon, a triangle upside down, a square.
-pub(super) const HOLLOW: [(u32, f64); 5] = [(4, 0.0), (3, 0.0), (5, 0.0), (3, 0.5), (4, 0.5)];
+/// A regular polygon: its number of corners, and where the first lies, clockwise from the top, in steps from corner to
+/// corner.
+pub(super) type Polygon = (u32, f64);
 
-/// The outline, at a place of a sheet, of the mark of another directory by its number.
-pub(super) fn hollow(other: usize, (x, y): Place) -> Vec<Place> {
-    let (corners, first) = HOLLOW[other];
+const SQUARE: Polygon = (4, 0.5);
+const DIAMOND: Polygon = (4, 0.0);
+const TRIANGLE: Polygon = (3, 0.0);
+const TURNED_TRIANGLE: Polygon = (3, 0.5);
+const PENTAGON: Polygon = (5, 0.0);
+
+/// Of dots, so that they are told apart in grey, too.
+pub(super) const SHAPES: [Option<Polygon>; INKS.len()] = [
+    None,
+    Some(SQUARE),
+    Some(TRIANGLE),
+    Some(DIAMOND),
+    Some(TURNED_TRIANGLE),
+    Some(PENTAGON),
+];
+
+/// Of the hollow marks of other directories.
+pub(super) const HOLLOW: [Polygon; 5] = [DIAMOND, TRIANGLE, PENTAGON, TURNED_TRIANGLE, SQUARE];
+
+/// The outline of a polygon around a place of a sheet, about as large as a disc of this radius.
+pub(super) fn outline_of((corners, first): Polygon, radius: f64, (x, y): Place) -> Vec<Place> {
     let corner = |number: u32| {
         let turn = TAU * (f64::from(number) + first) / f64::from(corners);
-        let radius = 1.3 * RADIUS;
+        let radius = 1.3 * radius;
         (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
     };
     (0..=corners).map(corner).collect()

@@ -2,15 +2,16 @@
 //! amplitude; and the share of triggered slips against the amplitude. Both beside the drive alone.
 
 use super::axis::{Axis, bounds, widened};
+use super::common;
 use super::frame::{Ends, LEFT, Layout};
 use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
 use super::style::{
-    BAR_WIDTH, BLACK, Dot, INKS, Ink, Look, RADIUS, REFERENCE, Stroke, drive_alone,
+    BAR_WIDTH, BLACK, Dot, INKS, Look, RADIUS, REFERENCE, SHAPES, Stroke, drive_alone,
 };
-use crate::model::Symbol;
+use crate::model::{Parameters, Symbol};
 use crate::reduce::{Interval, PulseRow, ascending};
 use crate::sets::{Digits, label};
 
@@ -37,7 +38,7 @@ impl Mean {
 }
 
 struct DelayCurve {
-    ink: Ink,
+    dot: Dot,
     means: Vec<Mean>,
 }
 
@@ -55,16 +56,16 @@ impl DelayCurve {
         let bars = means().filter_map(Mean::bar).collect();
         // One point makes no curve.
         let by_drive = if let [mean] = &self.means[..] {
-            Layer::Level(mean.by_drive, drive_alone(self.ink))
+            Layer::Level(mean.by_drive, drive_alone(self.dot.ink))
         } else {
             let places = means().map(|mean| (mean.x, mean.by_drive));
-            Layer::Curve(places.collect(), drive_alone(self.ink))
+            Layer::Curve(places.collect(), drive_alone(self.dot.ink))
         };
         let dots = means().map(|mean| (mean.x, mean.seen)).collect();
         [
             by_drive,
-            Layer::Bars(bars, Stroke::solid(self.ink, BAR_WIDTH)),
-            Layer::Dots(dots, Dot::solid(self.ink, RADIUS)),
+            Layer::Bars(bars, Stroke::solid(self.dot.ink, BAR_WIDTH)),
+            Layer::Dots(dots, self.dot),
         ]
     }
 }
@@ -75,8 +76,8 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
     let value = |row: &PulseRow, symbol| row.pulse().get(symbol).number();
     let values = |symbol| ascending(whole().filter_map(|row| value(row, symbol)));
     let amplitudes = values(Symbol::Delta);
-    // High frequencies first.
-    let periods = values(Symbol::T);
+    // By frequency, as elsewhere.
+    let periods: Vec<f64> = values(Symbol::T).into_iter().rev().collect();
     let control = |row: &PulseRow| row.pulse().without_modulation();
     let mut pairs = whole().zip(whole().skip(1));
     let is_one = values(Symbol::PulseCycles).len() == 1
@@ -88,9 +89,13 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
         let own = [Symbol::Delta, Symbol::T].map(|symbol| value(row, symbol));
         own == [Some(amplitude), Some(period)]
     };
-    let inks = || periods.iter().copied().zip(INKS);
+    let marks = || {
+        let shaped = INKS.into_iter().zip(SHAPES);
+        let dots = shaped.map(|(ink, shape)| Dot::solid(ink, RADIUS).with_shape(shape));
+        periods.iter().copied().zip(dots)
+    };
     let responses = |amplitude: f64| {
-        let series = inks().map(|(period, ink)| {
+        let series = marks().map(|(period, dot)| {
             let own = rows.iter().filter(|row| is_of(row, amplitude, period));
             let parts = own.filter(|row| !row.is_of_whole_cycle());
             let of_parts = parts.filter_map(|row| {
@@ -102,7 +107,7 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
                 })
             });
             let means = of_parts.collect();
-            DelayCurve { ink, means }
+            DelayCurve { dot, means }
         });
         series.collect::<Vec<_>>()
     };
@@ -122,7 +127,7 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
     };
     let mut panels: Vec<Panel<'_>> = responses.into_iter().zip(&amplitudes).map(panel).collect();
     let (x_label, factor) = axis_of(Symbol::Delta.key(), amplitudes.iter().copied());
-    let shares = inks().map(|(period, ink)| {
+    let shares = marks().map(|(period, dot)| {
         let places = amplitudes.iter();
         let shares = places.filter_map(|&amplitude| {
             let row = whole().find(|row| is_of(row, amplitude, period))?;
@@ -134,7 +139,7 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
             })
         });
         let means = shares.collect();
-        DelayCurve { ink, means }
+        DelayCurve { dot, means }
     });
     let curves: Vec<DelayCurve> = shares.collect();
     let most = curves
@@ -152,18 +157,21 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
     last.heading = Some("within the pulse, later without it".to_owned());
     panels.push(last);
     let frequency = label("frequency");
-    let periods = inks().map(|(period, ink)| {
+    let periods = marks().map(|(period, dot)| {
         let text = frequency.setting(1.0 / period, Digits::THREE);
-        entry(Mark::Bar(Dot::solid(ink, RADIUS)), text)
+        entry(Mark::Bar(dot), text)
     });
     let drive = entry(Mark::Line(drive_alone(BLACK)), "by the drive alone");
-    let legend: Vec<LegendEntry> = periods.chain([drive]).collect();
+    let zero = entry(Mark::Line(REFERENCE), "no advance");
+    let legend: Vec<LegendEntry> = periods.chain([drive, zero]).collect();
     let layout = Layout {
         columns: COLUMNS.min(panels.len()),
         column_gap: LEFT + GAP,
         ..Layout::column(WIDTH)
     };
-    let noted = look.with_note("bars: 95 % over seeds");
+    let pulses: Vec<Parameters> = whole().map(PulseRow::pulse).collect();
+    let shared = common(pulses.iter(), &[]);
+    let noted = look.with_note(&format!("{shared}; bars: 95 % over seeds"));
     Some(panel::draw(NAME, &noted, layout, &legend, panels))
 }
 
@@ -181,7 +189,7 @@ mod tests {
                 by_drive: 0.1,
             };
             let series = DelayCurve {
-                ink: INKS[0],
+                dot: Dot::solid(INKS[0], RADIUS),
                 means: (0..amplitudes).map(mean).collect(),
             };
             match &series.layers()[0] {

@@ -37,10 +37,10 @@ pub(crate) use pool::{Pool, PooledJob};
 #[cfg(test)]
 pub(crate) use reduction::RoundOfSet;
 pub use reduction::{
-    HistogramBin, NoJobs, ReductionSummary, SetInRounds, advise, error_over_target, read_optional,
-    read_reduced, read_sets, read_sets_in_rounds, reduce, renew,
+    HistogramBin, NoJobs, ReductionSummary, SetInRounds, advise, error_over_target, read_control,
+    read_optional, read_reduced, read_sets, read_sets_in_rounds, reduce, renew,
 };
-pub use slips::{SlipOfSet, add_intervals, means_of_slips, sample_of_slips};
+pub use slips::{SlipOfSet, add_intervals, means_of_slips, points_of, sample_of_slips};
 #[cfg(test)]
 pub(crate) use triggers::Pulses;
 pub use triggers::{PulseRow, TriggerRow};

@@ -388,6 +388,15 @@ pub fn read_sets_in_rounds<'a>(
     rows.filter(|row| !matches!(row, Ok((set, _)) if set.is_control))
 }
 
+/// The control of all sets, if a single one was run as a control alone.
+pub fn read_control(layout: &Layout<'_>) -> Result<Option<SetRow>, ResultsError> {
+    let file = layout.reduced_file(SetRow::NAME);
+    let rows = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
+    let mut controls = rows.filter(|row| !matches!(row, Ok(set) if !set.is_control));
+    let first = controls.next().transpose()?;
+    Ok(first.filter(|_| controls.next().is_none()))
+}
+
 /// The rows of the reduced sets, controls left out, in order.
 pub fn read_sets<'a>(
     layout: &Layout<'a>,

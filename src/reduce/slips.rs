@@ -2,7 +2,7 @@
 
 use super::Condition;
 use super::estimate::{Estimate, Numbers};
-use super::gather::{Gathering, MAX_SLIPS as MAX_SLIPS_AT_ONCE, has_jobs};
+use super::gather::{Gathering, MAX_SLIPS as MAX_SLIPS_AT_ONCE, Point, has_jobs};
 use super::values::{Values, formula};
 use crate::model::Selected;
 use crate::observe::Slip;
@@ -62,30 +62,62 @@ fn each_slip(
     Ok(())
 }
 
+/// Every k-th of some slips: all of few, and at most [`MAX_SLIPS`].
+struct EveryKth<T> {
+    kept: Vec<T>,
+    /// k.
+    every: usize,
+    /// Slips that were given.
+    count: usize,
+}
+
+impl<T> EveryKth<T> {
+    const fn new() -> Self {
+        Self {
+            kept: Vec::new(),
+            every: 1,
+            count: 0,
+        }
+    }
+
+    fn push(&mut self, slip: T) {
+        if self.count.is_multiple_of(self.every) {
+            self.kept.push(slip);
+        }
+        self.count += 1;
+        if self.kept.len() > MAX_SLIPS {
+            self.every *= 2;
+            let mut is_kept = [true, false].into_iter().cycle();
+            self.kept.retain(|_| is_kept.next() == Some(true));
+        }
+    }
+}
+
 /// Every k-th slip of these sets for which a condition holds, with k and the number of all such slips.
 pub fn sample_of_slips(
     results: &Results<'_>,
     sets: &[SetRow],
     condition: Option<&Condition>,
 ) -> Result<(Vec<SlipOfSet>, usize, usize), ResultsError> {
-    let mut slips: Vec<SlipOfSet> = Vec::new();
-    let mut every = 1;
-    let mut matching = 0_usize;
+    let mut slips = EveryKth::new();
     each_slip(results, sets, |_, slip| {
-        if condition.is_some_and(|condition| !condition.holds(&slip)) {
-            return;
-        }
-        if matching.is_multiple_of(every) {
+        if condition.is_none_or(|condition| condition.holds(&slip)) {
             slips.push(slip);
         }
-        matching += 1;
-        if slips.len() > MAX_SLIPS {
-            every *= 2;
-            let mut is_kept = [true, false].into_iter().cycle();
-            slips.retain(|_| is_kept.next() == Some(true));
-        }
     })?;
-    Ok((slips, every, matching))
+    Ok((slips.kept, slips.every, slips.count))
+}
+
+/// Every k-th slip of these sets, as a point of the standing figures.
+pub fn points_of(results: &Results<'_>, sets: &[SetRow]) -> Result<Vec<Point>, ResultsError> {
+    let mut points = EveryKth::new();
+    each_slip(results, sets, |set, (_, (_, slip, _))| {
+        points.push(Point {
+            has_phase: sets[set].has_phase,
+            ..Point::of(&sets[set].parameters, &slip)
+        });
+    })?;
+    Ok(points.kept)
 }
 
 /// Gives the values of a formula of columns of sets their intervals, if these are statistics and parameters.

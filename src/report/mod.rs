@@ -12,7 +12,7 @@
 mod page_columns;
 
 use self::page_columns::{Census, Sets, Slips, backbone};
-use crate::figure::{INKS, SCALE, STANDING};
+use crate::figure::{INKS, SCALE, standing};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::model::{MODEL_VERSION, RNG_SCHEME, Selection as _, Symbol};
 use crate::reduce::{advise, renew};
@@ -123,7 +123,7 @@ fn asked(sweep: &Sweep) -> Vec<&'static str> {
 fn figures(layout: &Layout<'_>) -> Result<Vec<(&'static str, String)>, StorageError> {
     const LARGEST: usize = 500_000;
     let mut figures = Vec::new();
-    for &name in STANDING {
+    for name in standing() {
         let file = layout.figures().join(format!("{name}.svg"));
         if layout.storage.exists(&file)? {
             let text = String::from_utf8(layout.storage.read(&file)?).unwrap_or_default();

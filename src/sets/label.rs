@@ -293,7 +293,7 @@ mod tests {
         for column in SetRow::columns() {
             let Label { symbol, what, unit } = label(&column.name);
             let is_plain = !what.contains('_') || Symbol::from_key(&column.name).is_some();
-            let has_key = symbol.contains('_') && !matches!(&*symbol, "K_d" | "F_N");
+            let has_key = symbol.contains('_') && !matches!(&*symbol, "K_d" | "F_N" | "⟨F_S⟩");
             assert!(!has_key && is_plain, "{}: {symbol}, {what}", column.name);
             assert_eq!(unit, column.unit);
         }
@@ -391,7 +391,7 @@ mod tests {
             "Resultant length of the phase R"
         );
         assert_eq!(found[4], "Share of time within slips");
-        assert_eq!(axis("mean_friction", 300.0), "Mean friction ⟨Fₛ⟩ (N)");
+        assert_eq!(axis("mean_friction", 300.0), "Mean friction ⟨F_S⟩ (N)");
         assert_eq!(label("Delta").short("µm"), "Δ (µm)");
     }
 }

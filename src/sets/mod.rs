@@ -111,7 +111,7 @@ columns! {
         drop_variation as "drop_cv": Option<f64> = "", "drop_sd over drop_mean: the shape of drops in any unit", "cv(ΔF)" "Coefficient of variation of the stress drop", Class::Spread;
         peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips", "⟨F⟩ at onsets" "Mean peak force", Class::Mean;
         peak_force_interval as "peak_force_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
-        mean_friction: Option<f64> = "N", "shear force, over the time of all jobs", "⟨Fₛ⟩" "Mean friction", Class::Mean;
+        mean_friction: Option<f64> = "N", "shear force, over the time of all jobs", "⟨F_S⟩" "Mean friction", Class::Mean;
         mean_friction_interval as "mean_friction": Option<Interval> = "N",
             "lower end of its 95 % confidence interval, of jobs as units";
         friction_coefficient: Option<f64> = "", "mean_friction over the normal force FN", "μ" "Friction coefficient", Class::Mean;

@@ -49,7 +49,7 @@ fn run_ends_with_the_result_and_show_prints_it_again() {
     assert!(run.contains(&shown), "{run}\n{shown}");
     let lines: Vec<&str> = shown.lines().collect();
     assert_eq!(lines.len(), 5, "a head, three sets and a note: {shown}");
-    for head in ["Δ (µm)", "1/T (Hz)", "⟨τ⟩ (ms)", "⟨Fₛ⟩ (N)", "μ", "R"] {
+    for head in ["Δ (µm)", "1/T (Hz)", "⟨τ⟩ (ms)", "⟨F_S⟩ (N)", "μ", "R"] {
         assert!(lines[0].contains(head), "{head}: {shown}");
     }
     assert!(
@@ -228,7 +228,7 @@ fn directories_are_compared_seed_by_seed_where_all_that_varies_agrees() {
     let csv = folder.ends(0, "show a b --csv");
     assert_eq!(csv.stderr, head);
     // The values and differences of a row have one unit.
-    for statistic in ["⟨τ⟩", "⟨Fₛ⟩"] {
+    for statistic in ["⟨τ⟩", "⟨F_S⟩"] {
         let heads = [", A", ", B", ", B − A"].map(|end| {
             let head = shown
                 .stdout
