@@ -218,8 +218,11 @@ pub(super) mod tests {
             colour: Some("V0".into()),
             ..figure()
         });
+        assert!(scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = "));
+        let shapes = |svg: &str| svg.matches("<path").count();
         assert!(
-            scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = ") && !scale.contains("Δ = ")
+            scale.contains("Δ = ") && shapes(&scale) > 4,
+            "shapes show Δ"
         );
         let panels = svg(&CustomFigure {
             panels: Some("Delta".into()),
@@ -368,15 +371,16 @@ pub(super) mod tests {
             ..figure()
         };
         assert!(strokes(&figure()) > strokes(&measured));
-        let pooled = "pooled: sets that differ in Δ";
-        assert!(svg(&measured).contains(pooled) && !svg(&figure()).contains(pooled));
-        assert!(
-            !svg(&CustomFigure {
-                x: "V0*Delta".into(),
-                ..measured
-            })
-            .contains(pooled)
-        );
+        let pooled = "pooled: sets that differ in V₀";
+        let over = |x: &str| {
+            let figure = CustomFigure {
+                x: x.into(),
+                ..measured.clone()
+            };
+            drawn(12, &figure, &Look::default()).unwrap().svg()
+        };
+        assert!(over("Delta").contains(pooled), "more values than shapes");
+        assert!(!over("V0").contains(pooled) && !over("V0*Delta").contains(pooled));
     }
 
     #[test]
