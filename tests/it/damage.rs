@@ -732,11 +732,7 @@ fn what_others_leave_in_the_folders_is_passed_over_by_every_command_and_listed_b
             "{path}: {passed_over:?}"
         );
     }
-    let text = folder.ends(0, "verify parts").stdout;
-    assert!(
-        text.contains("passed over: parts/tables/jobs/.DS_Store\n"),
-        "{text}"
-    );
+    folder.screens("verify_passing_over", ["verify parts"]);
     // New parts are run beside them, in a directory begun beside them, too.
     folder.write("e.toml", &sweep("damaged", 4));
     folder.ends(0, "run e.toml --out parts");
@@ -757,12 +753,7 @@ fn a_part_that_is_gone_is_named_and_run_again() {
         for table in missing {
             fs::remove_file(path(&folder.path("parts"), table, EXTENSION)).unwrap();
         }
-        let text = folder.ends(3, "verify parts").stdout;
-        assert!(
-            text.contains("1 part, 1 job missing: part-001-000000")
-                && text.contains("  stickslip run parts\n"),
-            "{text}"
-        );
+        folder.screens("verify_without_a_part", ["verify parts"]);
         assert_eq!(
             json(&folder.ends(0, "run parts --json").stdout)["jobs_run"],
             1
@@ -820,11 +811,7 @@ fn what_is_not_yet_done_is_no_damage() {
         path(&folder.path("r"), "slips", FIRST),
     )
     .unwrap();
-    let text = folder.ends(3, "verify r").stdout;
-    assert!(
-        text.contains("missing  1 part, 1 job missing: part-000-000000\ndamaged  nothing\n"),
-        "{text}"
-    );
+    folder.screens("verify_unfinished", ["verify r"]);
     let report = json(&folder.ends(3, "verify r --json").stdout);
     assert_eq!(
         (report["parts"].as_u64(), report["jobs"].as_u64()),
@@ -835,10 +822,6 @@ fn what_is_not_yet_done_is_no_damage() {
     flip(&path(&folder.path("r"), "slips", FIRST), |length| {
         length / 2
     });
-    let text = folder.ends(4, "verify r").stdout;
-    assert!(
-        text.contains(&format!("r/tables/slips/{FIRST}: ")),
-        "{text}"
-    );
+    folder.screens("verify_unfinished_and_damaged", ["verify r", "status r"]);
     folder.ends(2, "verify missing");
 }

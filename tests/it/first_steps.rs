@@ -6,21 +6,11 @@ use std::fs;
 #[test]
 fn a_sweep_file_to_start_from_plans_unchanged_and_is_not_overwritten() {
     let folder = Folder::new();
-    let said = folder.ends(0, "init mine.toml").stderr;
-    assert!(said.contains("stickslip plan mine.toml"), "{said}");
-    let planned = folder.ends(0, "plan mine.toml").stdout;
-    assert!(
-        planned.contains("mine") && planned.contains("18 after conditions"),
-        "{planned}"
-    );
+    folder.screens("init", ["init mine.toml", "plan mine.toml --threads 2"]);
     let text = fs::read_to_string(folder.path("mine.toml")).unwrap();
-    let again = folder.ends(2, "init mine.toml --preset fig2");
-    assert!(
-        again
-            .stderr
-            .contains("is there already and was not changed"),
-        "{}",
-        again.stderr
+    folder.screens(
+        "init_of_a_file_that_is_there",
+        ["init mine.toml --preset fig2"],
     );
     assert_eq!(fs::read_to_string(folder.path("mine.toml")).unwrap(), text);
 }
@@ -28,29 +18,22 @@ fn a_sweep_file_to_start_from_plans_unchanged_and_is_not_overwritten() {
 #[test]
 fn a_sweep_of_the_paper_runs_without_a_file_and_can_be_changed() {
     let folder = Folder::new();
-    assert!(
-        folder
-            .ends(0, "plan --preset fig3 --axis seed=count:3")
-            .stdout
-            .contains("1521 after conditions")
-    );
     folder.ends(
         0,
         "run --preset fig4 --set Delta=0 --set seed=0 --set slips=2 --no-reduce",
     );
     assert_eq!(folder.table("results/fig4", "jobs").cells.len(), 1);
-    folder.ends(0, "init my-map.toml --preset locking-map");
-    assert!(folder.ends(0, "plan my-map.toml").stdout.contains("my-map"));
-    let unknown = folder.ends(2, "run --preset fig33");
-    assert!(unknown.stderr.contains("fig3"), "{}", unknown.stderr);
-    let both = folder.ends(2, "plan my-map.toml --preset fig3");
-    assert!(
-        both.stderr.contains("cannot be used with"),
-        "{}",
-        both.stderr
+    folder.screens(
+        "presets",
+        [
+            "plan --preset fig3 --axis seed=count:3 --threads 2",
+            "init my-map.toml --preset locking-map",
+            "plan my-map.toml --threads 2",
+            "run --preset fig33",
+            "plan my-map.toml --preset fig3",
+            "run",
+        ],
     );
-    let neither = folder.ends(2, "run");
-    assert!(neither.stderr.contains("SWEEP.toml"), "{}", neither.stderr);
 }
 
 #[test]
@@ -60,14 +43,11 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
     fs::write(folder.path("mine.toml"), text).unwrap();
     folder.ends(0, "run mine.toml --no-reduce");
     let flags = "--set V0=3e-4 --axis seed=count:3 --set slips=1";
-    let planned = folder.ends(0, &format!("plan mine.toml {flags}")).stdout;
-    assert!(
-        planned.contains("3 after conditions") && planned.contains("none yet"),
-        "{planned}"
+    let [plan, run] = ["plan", "run"].map(|command| format!("{command} mine.toml {flags}"));
+    folder.screens(
+        "varied_without_an_editor",
+        [&format!("{plan} --threads 2"), &run],
     );
-    let refused = folder.ends(2, &format!("run mine.toml {flags}")).stderr;
-    let choices = "results/mine holds another sweep; give a new directory with -o DIR, or -o results/mine to extend";
-    assert!(refused.contains(choices), "{refused}");
     folder.ends(0, &format!("run mine.toml {flags} -o other --no-reduce"));
     let jobs = folder.table("other", "jobs");
     assert_eq!(jobs.reals("V0"), [3e-4; 3]);
@@ -95,15 +75,12 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
     );
     let jobs = folder.table("results/sliding-velocity", "jobs");
     assert_eq!(jobs.counts("N"), [3]);
-    folder.ends(
-        0,
-        &format!("init other.toml --preset sliding-velocity {flags}"),
-    );
-    assert!(
-        folder
-            .ends(0, "plan other.toml")
-            .stdout
-            .contains("3 after conditions")
+    folder.screens(
+        "varied_preset",
+        [
+            &format!("init other.toml --preset sliding-velocity {flags}"),
+            "plan other.toml --threads 2",
+        ],
     );
     folder.ends(0, "simulate mine.toml --set V0=1e-4");
 }
@@ -111,20 +88,22 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
 #[test]
 fn each_question_is_a_sweep_that_plans() {
     let folder = Folder::new();
-    for (question, jobs) in [
-        ("friction", 296),
-        ("interval", 65),
-        ("locking", 560),
-        ("sliding", 200),
-    ] {
-        folder.ends(0, &format!("init {question}.toml --question {question}"));
-        let text = fs::read_to_string(folder.path(&format!("{question}.toml"))).unwrap();
+    folder.screens(
+        "questions",
+        [
+            "init friction.toml --question friction",
+            "plan friction.toml --threads 2",
+            "init interval.toml --question interval",
+            "plan interval.toml --threads 2",
+            "init locking.toml --question locking",
+            "plan locking.toml --threads 2",
+            "init sliding.toml --question sliding",
+            "plan sliding.toml --threads 2",
+        ],
+    );
+    for file in folder.contents("").into_values().flatten() {
+        let text = String::from_utf8(file).unwrap();
         assert!(text.lines().next().unwrap().ends_with('?'), "{text}");
-        let planned = folder.ends(0, &format!("plan {question}.toml")).stdout;
-        assert!(
-            planned.contains(&format!("{jobs} after conditions")),
-            "{planned}"
-        );
     }
 }
 

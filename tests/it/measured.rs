@@ -69,14 +69,11 @@ fn numbers(folder: &Folder, directory: &str) -> Vec<(String, Vec<Option<f64>>)> 
 fn slips_of_the_model_read_back_in_other_units_have_the_same_statistics() {
     let folder = Folder::new();
     folder.write("slips.csv", &experiment(&folder, 14));
-    let read = folder.ends(
-        0,
-        &format!("measured slips.csv -o out {COLUMNS} --set Kd=40:N/um"),
-    );
-    assert!(
-        read.stdout.contains("slips           1620"),
-        "{}",
-        read.stdout
+    folder.screens(
+        "measured_in_other_units",
+        [&format!(
+            "measured slips.csv -o out {COLUMNS} --set Kd=40:N/um"
+        )],
     );
     let expected = numbers(&folder, "model");
     let mut same = 0;
@@ -125,82 +122,60 @@ fn every_command_takes_a_directory_of_measured_slips_or_says_what_it_is() {
     let before = folder.tables("out");
     folder.ends(0, &command);
     assert_eq!(folder.tables("out"), before);
-    for command in [
-        "run out",
-        "plan out",
-        "batch slurm out --workers 2 --threads 2 --time 1h",
-    ] {
-        let refused = folder.ends(2, command);
-        assert!(
-            refused.stderr.contains("were measured"),
-            "{command}: {}",
-            refused.stderr
-        );
-    }
-    let other = folder.ends(
-        2,
-        "measured slips.csv -o out --decimal-comma --column run=id --column onset=t --set V0=1e-4 --set Delta=0",
+    folder.screens(
+        "commands_that_take_no_measured_slips",
+        [
+            "run out",
+            "plan out",
+            "batch slurm out --workers 2 --threads 2 --time 1h",
+            "run model.toml --out out",
+            "measured slips.csv -o out --decimal-comma --column run=id --column onset=t --set V0=1e-4 --set Delta=0",
+            "plot out --of slips --x onset --y size",
+            "show out --columns size",
+        ],
     );
-    assert!(
-        other.stderr.contains("holds other results"),
-        "{}",
-        other.stderr
-    );
-    folder.ends(2, "run model.toml --out out");
 
-    let verified = |code| folder.ends(code, "verify out").stdout;
-    assert!(verified(0).contains("slips.csv: as it was read"));
+    folder.screens("verify_measured", ["verify out"]);
     // What is damaged is read again, also under another name of the directory.
     fs::rename(folder.path("out"), folder.path("moved")).unwrap();
     let part = folder.parts("moved", "slips").remove(0);
     fs::write(&part, "damaged").unwrap();
-    let next = folder.ends(4, "verify moved").stdout;
-    assert!(
-        next.contains("stickslip measured ./slips.csv --column run=id"),
-        "{next}"
+    folder.screens(
+        "verify_measured_and_damaged",
+        ["verify moved", "verify moved --repair"],
     );
-    folder.ends(0, "verify moved --repair");
     folder.ends(0, &command.replace("-o out", "-o moved"));
     assert_eq!(folder.tables("moved"), before);
     fs::rename(folder.path("moved"), folder.path("out")).unwrap();
     // One byte in as many, and fewer.
     let read = fs::read_to_string(folder.path("slips.csv")).unwrap();
-    for changed in [read.replacen(';', ",", 1), "changed".to_owned()] {
-        folder.write("slips.csv", &changed);
-        assert!(verified(4).contains("slips.csv: differs from what was read"));
-    }
+    folder.write("slips.csv", &read.replacen(';', ",", 1));
+    folder.screens("verify_measured_and_changed", ["verify out"]);
+    folder.write("slips.csv", "changed");
+    folder.ends(4, "verify out");
     fs::remove_file(folder.path("slips.csv")).unwrap();
-    assert!(verified(0).contains("slips.csv: is not there"));
+    let [gone] = folder.screens("verify_measured_and_gone", ["verify out"]);
     fifo(&folder.path("slips.csv"));
-    assert!(verified(0).contains("slips.csv: is not there"));
+    assert_eq!(folder.ends(0, "verify out").stdout, gone.stdout);
 
-    for command in [
-        "status out",
-        "reduce out",
-        "report out",
-        "export out --out csv --format csv",
-        "show out --json",
-    ] {
-        folder.ends(0, command);
-    }
+    folder.screens(
+        "measured_directory",
+        [
+            "status out",
+            "reduce out",
+            "report out",
+            "export out --out csv --format csv",
+            "show out",
+            "show model out",
+        ],
+    );
+    folder.ends(0, "show out --json");
     assert!(
         !fs::read_to_string(folder.path("out/report.html"))
             .unwrap()
             .contains("simulate --set")
     );
-    let seeds = folder.ends(0, "show model out").stdout;
-    assert!(
-        seeds.contains("⟨τ⟩, B − A") && seeds.starts_with("A is model\nB is out\n"),
-        "{seeds}"
-    );
     assert_errors_add(&folder);
-    let unknown = folder.ends(2, "plot out --of slips --x onset --y size");
-    assert!(
-        unknown.stderr.contains("--y size: was not measured"),
-        "{}",
-        unknown.stderr
-    );
-    folder.ends(2, "show out --columns size");
 }
 
 /// The same slips on both sides, taken as independent: for the mean interval without modulation, an error and what was
@@ -315,37 +290,23 @@ fn in_what_directories_differ_is_said_wherever_they_stand_side_by_side() {
             "--set V0=1e-4 --set Kd=4e7 --set Delta=1e-6 --set frequency=29",
         ),
     ]);
-    let slow = "slow: K_d = 2254 N/m, V₀ = 2·10⁻⁵ m/s, T = 34.5 ms";
     let plot = "plot model --x frequency --y tau_mean --style print -o own.svg";
-    let said = folder.ends(0, &format!("{plot} --with slow")).stderr;
-    let (caption, said) = said.split_once("differs").unwrap();
-    for line in [slow, "model: K_d = 4·10⁷ N/m, V₀ = 10⁻⁴ m/s"] {
-        assert!(caption.contains(&format!("\n{line}\n")) && said.contains(&format!("  {line}\n")));
-    }
-    // What only the model knows is common to all that know it, and what all share is no difference.
-    assert!(
-        caption.contains("Nₛ = 5, ") && !said.contains("Nₛ"),
-        "{caption}"
+    folder.screens(
+        "plot_beside_measured",
+        [
+            &format!("{plot} --with slow"),
+            // What only the model knows is common to all that know it, and what all share is no difference.
+            &format!("{plot} --with same"),
+            "plot model --with slow",
+        ],
     );
-    let same = folder.ends(0, &format!("{plot} --with same")).stderr;
-    assert!(
-        same.contains("\nsame: T = 34.5 ms\n") && !same.contains("model: "),
-        "{same}"
-    );
-    let standing = folder.ends(0, "plot model --with slow");
-    assert!(standing.stderr.contains(slow), "{}", standing.stderr);
     let svg = fs::read_to_string(folder.path("model/figures/overview.svg")).unwrap();
     assert!(svg.contains(" = 2254 N/m, V₀ = 2·10⁻⁵ m/s"), "{svg}");
 
-    let shown = folder.ends(0, "show model slow");
-    assert!(
-        shown.stdout.starts_with("A is model: K_d = 4·10⁷ N/m, V₀ = 10⁻⁴ m/s\nB is slow: K_d = 2254 N/m, V₀ = 2·10⁻⁵ m/s\n")
-            && shown.stderr.contains("warning: A and B differ in V₀, which"),
-        "{} {}",
-        shown.stdout,
-        shown.stderr
+    folder.screens(
+        "show_beside_measured",
+        ["show model slow", "show model same"],
     );
-    assert_eq!(folder.ends(0, "show model same").stderr, "");
     // The size, which no experiment knows, hinders no pair, on either side; each side has its count of seeds.
     for (pair, seeds, difference) in [
         ("model slow", [3, 1], [1e-4, 2e-5]),
@@ -372,31 +333,32 @@ fn each_directory_with_a_mark_has_an_entry_of_its_name_and_others_are_named() {
         ("june/out", drive),
         ("still", "--set V0=1e-4 --set Delta=0"),
     ]);
-    let plot = |options: &str| {
-        let flags = "--with may/out --with june/out --with still -o own.svg";
-        folder.run(&format!("plot model --y tau_mean {flags} {options}"))
+    let flags = "--with may/out --with june/out --with still -o own.svg";
+    let svg_of = |name: &str, options: &str| {
+        folder.screens(
+            name,
+            [&format!("plot model --y tau_mean {flags} {options}")],
+        );
+        fs::read_to_string(folder.path("own.svg")).unwrap()
     };
-    let svg = || fs::read_to_string(folder.path("own.svg")).unwrap();
-    let said = plot("--x eta").stderr;
+    let svg = svg_of("plot_with_others", "--x eta");
     for name in ["model", "may/out", "june/out", "still"] {
-        assert!(svg().contains(&format!(">{name}<")), "{name}");
+        assert!(svg.contains(&format!(">{name}<")), "{name}");
     }
-    assert!(!said.contains("shows nothing"), "{said}");
-    let said = plot("--x frequency").stderr;
-    assert!(
-        !svg().contains(">still<")
-            && said.contains("figure tau_mean-frequency shows nothing of still\n")
+    let svg = svg_of("plot_without_one", "--x frequency");
+    assert!(!svg.contains(">still<"));
+    let svg = svg_of(
+        "plot_with_legends",
+        "--x eta --legend theory --legend first --legend second --legend third",
     );
-    plot("--x eta --legend theory --legend first --legend second --legend third");
-    assert!(svg().contains(">theory<") && svg().contains(">third<") && !svg().contains("out<"));
-    let few = plot("--x eta --legend theory --legend first");
-    assert!(
-        few.code == Some(2) && few.stderr.contains("4 directories are drawn"),
-        "{}",
-        few.stderr
+    assert!(svg.contains(">theory<") && svg.contains(">third<") && !svg.contains("out<"));
+    folder.screens(
+        "legends_refused",
+        [
+            &format!("plot model --y tau_mean {flags} --x eta --legend theory --legend first"),
+            "plot model --legend theory",
+        ],
     );
-    let alone = folder.ends(2, "plot model --legend theory").stderr;
-    assert!(alone.contains("--with"), "{alone}");
 }
 
 /// Ten slips, and what else a line holds.
@@ -720,36 +682,22 @@ fn series_are_refused_where_they_run_into_each_other_and_lines_are_counted_right
     let folder = Folder::new();
     let good = lines("onset,drop", |n| format!("{n},3"));
     folder.write("slips.csv", &good);
-    let without = folder.ends(2, "measured slips.csv -o out");
-    assert!(
-        without
-            .stderr
-            .contains("V0 is missing: --column V0=NAME:UNIT, or --set"),
-        "{}",
-        without.stderr
-    );
     folder.write(
         "runs.csv",
         &lines("onset,run", |n| format!("{n},{}", n / 3 % 2)),
     );
-    let again = folder.ends(2, "measured runs.csv -o out --set V0=1e-4 --set Delta=0");
-    assert!(
-        again.stderr.contains("line 7: run 0 begins again"),
-        "{}",
-        again.stderr
-    );
     // Lines count whatever ends them, and those without a row.
     let breaks = format!("# a\n\n{}", good.replace("\n4,3", "\n\n4,x")).replace('\n', "\r\n");
-    folder.write("slips.csv", &breaks);
-    let counted = folder.ends(2, "measured slips.csv -o out --set V0=1e-4 --set Delta=0");
-    assert!(
-        counted.stderr.contains("line 8: drop = x"),
-        "{}",
-        counted.stderr
+    folder.write("breaks.csv", &breaks);
+    folder.screens(
+        "series_refused",
+        [
+            "measured slips.csv -o out",
+            "measured runs.csv -o out --set V0=1e-4 --set Delta=0",
+            "measured breaks.csv -o out --set V0=1e-4 --set Delta=0",
+            "measured slips.csv -o fast --set V0=100 --set Delta=0",
+        ],
     );
-    folder.write("slips.csv", &good);
-    let fast = folder.ends(0, "measured slips.csv -o fast --set V0=100 --set Delta=0");
-    assert!(fast.stderr.contains("far too fast"), "{}", fast.stderr);
 }
 
 #[test]
@@ -757,14 +705,10 @@ fn a_missing_control_and_a_single_series_are_named() {
     let folder = Folder::new();
     folder.write("slips.csv", &lines("onset", |n| format!("{}", n * n)));
     let options = "--set V0=2e-4 --set Kd=3e7 --set Delta=1e-6 --set T=0.03 --maximum 10:ms";
-    let read = folder.ends(0, &format!("measured slips.csv -o out {options}"));
-    let expected = [
-        "R without a control, slips at Δ = 0 and V₀ = 2·10⁻⁴ m/s, K_d = 3·10⁷ N/m",
-        "1 set with a single series: the error is from the correlation within the series",
-    ];
-    for expected in expected {
-        assert!(read.stdout.contains(expected), "{}", read.stdout);
-    }
+    folder.screens(
+        "measured_without_a_control",
+        [&format!("measured slips.csv -o out {options}")],
+    );
     let phases = folder.table("out", "slips").reals("phase");
     let turns = (1.0 - 0.01) / 0.03_f64;
     let expected = std::f64::consts::TAU * (turns - turns.round());
@@ -787,17 +731,19 @@ fn a_missing_control_and_a_single_series_are_named() {
         &format!("run,onset,Delta,zero\n{}\n", rows.join("\n")),
     );
     let command = "measured series.csv --set V0=1e-6 --set T=3";
-    let aligned = folder.ends(0, &format!("{command} -o aligned --column maximum=zero"));
+    folder.screens(
+        "measured_from_maxima",
+        [
+            &format!("{command} -o aligned --column maximum=zero"),
+            &format!("{command} -o forgotten"),
+        ],
+    );
     assert!(
         folder
             .file("aligned/reduced/sets.parquet")
             .reals("resultant_length")[0]
             > 0.999
     );
-    let note = "1 set with less R than the drive alone makes";
-    assert!(!aligned.stdout.contains(note), "{}", aligned.stdout);
-    let forgotten = folder.ends(0, &format!("{command} -o forgotten"));
-    assert!(forgotten.stdout.contains(note), "{}", forgotten.stdout);
 }
 
 /// Irregular onsets, of which no two lists are equal.
@@ -828,19 +774,16 @@ fn the_same_slips_twice_are_refused_with_both_places() {
     folder.write("a.csv", &text);
     folder.write("b.csv", &format!("# another byte\n{text}"));
     let unmodulated = "--set V0=1e-4 --set Delta=0";
-    let twice = folder.ends(2, &format!("measured a.csv b.csv -o out {unmodulated}"));
-    let expected =
-        "b.csv, line 3: a series begins with the onsets and drops of that at a.csv, line 2";
-    assert!(twice.stderr.contains(expected), "{}", twice.stderr);
     // Within a table, under other parameters.
     let both = rows().map(|row| format!("{row},a,1e-4"));
     let both = both.chain(rows().map(|row| format!("{row},b,2e-4")));
     folder.write("both.csv", &table("onset,drop,run,V0", both));
-    let twice = folder.ends(2, "measured both.csv -o out --set Delta=0");
-    assert!(
-        twice.stderr.contains("both.csv, line 14"),
-        "{}",
-        twice.stderr
+    folder.screens(
+        "the_same_slips_twice",
+        [
+            &format!("measured a.csv b.csv -o out {unmodulated}"),
+            "measured both.csv -o out --set Delta=0",
+        ],
     );
     // Few slips, regular ones, and those of which only the times are known may be equal and others.
     let few = || rows().take(9);
@@ -909,8 +852,10 @@ fn a_tide_whose_amplitude_nobody_knows_has_phases_and_no_excess() {
         "tide.csv",
         &table("onset", onsets.iter().map(f64::to_string)),
     );
-    let read = folder.ends(0, "measured tide.csv -o out --set V0=1e-9 --set T=0.7");
-    assert!(read.stdout.contains("Delta   not given"), "{}", read.stdout);
+    folder.screens(
+        "measured_tide",
+        ["measured tide.csv -o out --set V0=1e-9 --set T=0.7"],
+    );
     let sets = folder.file("out/reduced/sets.parquet");
     for known in ["resultant_length", "locking_index", "phase_mean"] {
         assert_eq!(sets.reals(known).len(), 1, "{known}");
@@ -946,13 +891,13 @@ fn the_end_of_records_says_how_much_too_short_the_mean_is() {
     let text = table("onset", onsets.iter().map(f64::to_string));
     folder.write("slips.csv", &text);
     let command = "measured slips.csv --set V0=1e-4 --set Delta=0";
-    let without = folder.ends(0, &format!("{command} -o without")).stdout;
-    // cv^2/10 is 1 % there.
-    assert!(without.contains("variation of 0.32 on"), "{without}");
-    let with = folder
-        .ends(0, &format!("{command} -o with --set end=40:s"))
-        .stdout;
-    assert!(!with.contains("variation of"), "{with}");
+    folder.screens(
+        "measured_with_and_without_an_end",
+        [
+            &format!("{command} -o without"),
+            &format!("{command} -o with --set end=40:s"),
+        ],
+    );
     let off = |directory: &str| {
         let sets = folder.file(&format!("{directory}/reduced/sets.parquet"));
         sets.reals("tau_mean_off").first().copied()
@@ -1009,45 +954,20 @@ fn drops_that_are_no_force_have_a_shape_and_no_newtons() {
 #[test]
 fn what_is_read_is_said_before_anything_is_written() {
     let folder = Folder::new();
-    folder.write(
-        "slips.csv",
-        &lines("t (ms),amp,note,rig", |n| format!("{}.5,0.6,x,7", n * n)),
-    );
-    let command = |rest: &str| {
-        let mut words = vec![
-            "measured",
-            "slips.csv",
-            "-o",
-            "out",
-            "--column",
-            "onset=t (ms):ms",
-        ];
-        words.extend([
-            "--column",
-            "Delta=amp:um",
-            "--set",
-            "V0=100:um/s",
-            "--set",
-            "T=0.03",
-        ]);
-        words.extend(rest.split_whitespace());
-        let ended = folder.run_words(&words, "");
-        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-        ended.stdout
-    };
-    let said = command("--dry-run");
-    for line in [
-        "onset     column t (ms) (ms), 0.0015 to 0.1005 s",
-        "Delta     column amp (um), 6e-7 to 6e-7 m",
-        "V0        100 um/s",
-        "not used  note, rig",
-        "series    1",
-        "slips     10",
-    ] {
-        assert!(said.contains(line), "{said}");
-    }
+    let text = lines("t_(ms),amp,note,rig", |n| format!("{}.5,0.6,x,7", n * n));
+    folder.write("slips.csv", &text);
+    let command = "measured slips.csv -o out --column onset=t_(ms):ms --column Delta=amp:um --set V0=100:um/s --set T=0.03";
+    let dry = format!("{command} --dry-run");
+    let [said] = folder.screens("measured_dry_run", [&dry]);
     assert!(!folder.path("out").exists());
-    assert!(command("").starts_with(&said));
+    let [read] = folder.screens("measured", [command]);
+    assert!(read.stdout.starts_with(&said.stdout));
+    // With a space in the head, too.
+    let spaced = |text: &str| text.replace('_', " ");
+    folder.write("slips.csv", &spaced(&text));
+    let words: Vec<String> = dry.split(' ').map(spaced).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    assert_eq!(folder.run_words(&words, "").stdout, spaced(&said.stdout));
 }
 
 #[test]
@@ -1091,11 +1011,7 @@ fn what_is_no_file_is_refused_at_once_and_a_pipe_is_read_once() {
     let words: Vec<&str> = command.split_whitespace().collect();
     let piped = folder.run_words(&words, &text);
     assert_eq!(piped.code, Some(0), "{}", piped.stderr);
-    let verified = folder.ends(0, "verify out").stdout;
-    assert!(
-        verified.contains("/dev/stdin: came from a pipe, and is gone"),
-        "{verified}"
-    );
+    folder.screens("verify_measured_from_a_pipe", ["verify out"]);
 }
 
 #[test]

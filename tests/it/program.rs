@@ -6,6 +6,7 @@ use arrow_array::{Array, RecordBatch};
 use arrow_schema::{DataType, SchemaRef};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::collections::BTreeMap;
+use std::fmt::Write;
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -108,6 +109,34 @@ impl Folder {
             ended.stdout,
             ended.stderr
         );
+        ended
+    }
+
+    /// Runs commands one after the other and compares all that they print with a file in `tests/it/snapshots`, but for
+    /// times. `INSTA_UPDATE=always` writes the file again, after a change that is meant.
+    pub fn screens<const N: usize>(&self, name: &str, commands: [&str; N]) -> [Ended; N] {
+        let mut screens = String::new();
+        let ended = commands.map(|command| {
+            let ended = self.run(command);
+            write!(screens, "$ stickslip {command}\n{}", ended.stdout).unwrap();
+            if !ended.stderr.is_empty() {
+                write!(screens, "[stderr]\n{}", ended.stderr).unwrap();
+            }
+            if ended.code != Some(0) {
+                writeln!(screens, "[exit code {:?}]", ended.code.unwrap()).unwrap();
+            }
+            screens.push('\n');
+            ended
+        });
+        let mut settings = insta::Settings::new();
+        settings.set_prepend_module_to_snapshot(false);
+        settings.set_omit_expression(true);
+        settings.add_filter(r"(?m)^(CPU time|wall time)( +)[0-9.]+ \w+", "$1${2}TIME");
+        settings.add_filter(r"[0-9.]+ \w+ at the pace", "TIME at the pace");
+        // Of a run that takes long on a slow machine.
+        let progress = r"(?m)^(?:[0-9.]+ \w+, [0-9]+ %:|1 job has run) .*\n";
+        settings.add_filter(progress, "");
+        settings.bind(|| insta::assert_snapshot!(name, screens));
         ended
     }
 

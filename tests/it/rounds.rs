@@ -168,40 +168,14 @@ fn a_target_that_cannot_be_met_ends_at_the_cap_and_says_so() {
     let text = "name = \"hard\"\n[model]\nN = 10\nNs = 5\n[axes]\nV0 = [5e-5, 1e-4]\n[record]\nslips = 3\n\
                 [precision]\nof = [\"tau_mean\", \"mean_friction\"]\nrelative = 1e-9\nseeds = { from = 3, to = 11 }\n";
     folder.write("hard.toml", text);
-    let planned = folder.ends(0, "plan hard.toml");
-    assert!(
-        planned
-            .stderr
-            .contains("warning: seeds: from = 3 is raised to 11"),
-        "{}",
-        planned.stderr
-    );
-    let planned = planned.stdout;
-    assert!(
-        planned.contains("jobs                 22 ")
-            && planned.contains("at most 2 sets, 22 jobs; estimated"),
-        "{planned}"
-    );
-    let ended = folder.ends(0, "run hard.toml --out r");
-    assert!(
-        ended
-            .stderr
-            .contains("running 22 jobs of this round, 0 there already"),
-        "{}",
-        ended.stderr
-    );
-    assert!(
-        ended
-            .stdout
-            .contains("2 sets too uncertain, at the limit of seeds or jobs"),
-        "{}",
-        ended.stdout
-    );
-    assert!(
-        folder
-            .ends(0, "status r")
-            .stdout
-            .contains("1 (the last): 0 sets done, 0 open; 2 sets")
+    folder.screens(
+        "rounds_at_the_cap",
+        [
+            "plan hard.toml --threads 2",
+            "run hard.toml --out r --threads 1",
+            "status r",
+            "run hard.toml --out s --shard 1/2",
+        ],
     );
     let sets = folder.file("r/reduced/sets.parquet");
     assert_eq!(
@@ -211,12 +185,6 @@ fn a_target_that_cannot_be_met_ends_at_the_cap_and_says_so() {
             sets.counts("last_round")
         ),
         (vec![11; 2], vec![11; 2], vec![1; 2])
-    );
-    let refused = folder.ends(2, "run hard.toml --out s --shard 1/2");
-    assert!(
-        refused.stderr.contains("has no shards"),
-        "{}",
-        refused.stderr
     );
 }
 
@@ -229,13 +197,13 @@ fn edges_have_intervals_and_say_how_they_ended_and_rows_without_one_say_so() {
         &MAP.replace("jobs = 3000", "jobs = 150")
             .replace("threshold = 0.5", "threshold = 0.999"),
     );
-    let ended = folder.ends(0, "run map.toml --out r");
-    assert!(
-        ended
-            .stderr
-            .contains("warning: seeds: from = 8 is raised to 24"),
-        "{}",
-        ended.stderr
+    folder.screens(
+        "rounds_to_edges",
+        [
+            "plan map.toml --threads 2",
+            "run map.toml --out r --threads 2",
+            "status r",
+        ],
     );
     let edges = folder.file("r/reduced/edges.parquet");
     let (place, low, high) = (
@@ -294,8 +262,7 @@ fn edges_have_intervals_and_say_how_they_ended_and_rows_without_one_say_so() {
             .replace("[29, 58]", "[3, 5]"),
     );
     end("short", "no value");
-    let shown = folder.ends(0, "show short").stdout;
-    assert!(shown.contains("record more slips a job"), "{shown}");
+    folder.screens("rows_without_an_edge", ["show few", "show short"]);
 }
 
 #[test]
@@ -321,16 +288,7 @@ fn a_row_whose_end_is_not_clear_says_so_and_what_to_do() {
     let unclear = unclear.unwrap_or_else(|| panic!("{ended:?}"));
     assert_eq!(edges.counts("jobs")[unclear], 32, "it got all seeds");
     assert_eq!(edges.reals("bracket_low")[unclear], 5e-8);
-    let shown = folder.ends(0, "show r").stdout;
-    assert!(
-        shown.contains("unclear: raise seeds.to, or widen the axis"),
-        "{shown}"
-    );
-    let status = folder.ends(0, "status r").stdout;
-    assert!(
-        status.contains("too uncertain, at the limit of seeds or jobs"),
-        "{status}"
-    );
+    folder.screens("rows_with_an_unclear_end", ["show r", "status r"]);
 }
 
 #[test]

@@ -44,28 +44,27 @@ fn all_sets_of_a_value_of_an_eta_axis_have_that_value_one_bin_and_one_window_of_
 fn run_ends_with_the_result_and_show_prints_it_again() {
     let folder = Folder::new();
     folder.write("small.toml", SWEEP);
-    let run = folder.ends(0, "run small.toml --out out").stdout;
-    let shown = folder.ends(0, "show out").stdout;
-    assert!(run.contains(&shown), "{run}\n{shown}");
-    let lines: Vec<&str> = shown.lines().collect();
-    assert_eq!(lines.len(), 5, "a head, three sets and a note: {shown}");
-    for head in ["Δ (µm)", "1/T (Hz)", "⟨τ⟩ (ms)", "⟨F_S⟩ (N)", "μ", "R"] {
-        assert!(lines[0].contains(head), "{head}: {shown}");
-    }
-    assert!(
-        lines[1..4]
-            .iter()
-            .all(|line| line.contains(" ± ") && line.contains("stick-slip")),
-        "{shown}"
+    let [_, run, shown, ..] = folder.screens(
+        "sweep",
+        [
+            "plan small.toml --threads 2",
+            "run small.toml --out out --threads 2",
+            "show out",
+            "show out --columns frequency,tau_mean --csv",
+            // Each column stands once, whether it is asked for or goes with another.
+            "show out --csv --columns tau_sd_high,tau_sd,tau_sd_low",
+            "status out",
+            "verify out",
+            "reduce out",
+            "plot out",
+            "report out",
+            "export out -o exported",
+            "plan small.toml --out out --threads 2",
+            "run small.toml --out out --threads 2",
+        ],
     );
+    assert!(run.stdout.contains(&shown.stdout));
     // The numbers are those of the reduced table, in SI.
-    let csv = folder
-        .ends(0, "show out --columns frequency,tau_mean --csv")
-        .stdout;
-    assert!(
-        csv.starts_with("Delta,eta,frequency,tau_mean,tau_mean_low,tau_mean_high\n"),
-        "{csv}"
-    );
     let of_table = folder.file("out/reduced/sets.parquet").reals("tau_mean");
     let all = json(&folder.ends(0, "show out --json").stdout);
     let of_json: Vec<f64> = all["sets"]
@@ -75,14 +74,6 @@ fn run_ends_with_the_result_and_show_prints_it_again() {
         .map(|set| set["tau_mean"].as_f64().unwrap())
         .collect();
     assert_eq!(of_json, of_table);
-    // Each column stands once, whether it is asked for or goes with another.
-    let ends = "show out --csv --columns tau_sd_high,tau_sd,tau_sd_low";
-    assert!(
-        folder
-            .ends(0, ends)
-            .stdout
-            .starts_with("Delta,frequency,eta,tau_sd_high,tau_sd,tau_sd_low\n")
-    );
 }
 
 #[test]
@@ -118,43 +109,19 @@ fn sets_are_chosen_sorted_and_computed_with() {
         up.is_sorted() && down.iter().rev().eq(&up),
         "{up:?} {down:?}"
     );
-    // By heading, too; what was swept comes first.
-    let by_heading = folder
-        .ends(0, "show out --csv --columns R,⟨τ⟩ --where η>0")
-        .stdout;
-    assert!(
-        by_heading.starts_with("Delta,frequency,eta,resultant_length,"),
-        "{by_heading}"
+    folder.screens(
+        "show_chosen",
+        [
+            // By heading, too; what was swept comes first.
+            "show out --columns R,⟨τ⟩ --where η>0",
+            "show out --where ⟨τ⟩>90",
+            "show out --csv --where ⟨τ⟩>90",
+            "show out --json --where ⟨τ⟩>90",
+            "show out --columns tau_men",
+            "show out --where tau_mean",
+            "show out --sort colour",
+        ],
     );
-    assert!(by_heading.contains(",tau_mean,") && by_heading.lines().count() == 3);
-    // As in figures.
-    for form in ["", "--json", "--csv"] {
-        let none = folder.ends(2, &format!("show out {form} --where ⟨τ⟩>90"));
-        let problem = "error: --where ⟨τ⟩>90: none of 3 sets matches; tau_mean nearest to 90: 0.";
-        assert!(
-            none.stdout.is_empty() && none.stderr.starts_with(problem),
-            "{}",
-            none.stderr
-        );
-    }
-    for (arguments, problem) in [
-        (
-            "--columns tau_men",
-            "--columns tau_men: no such column; did you mean tau_mean?",
-        ),
-        (
-            "--where tau_mean",
-            "--where tau_mean: at character 1: a comparison is needed",
-        ),
-        ("--sort colour", "--sort colour: no such column"),
-    ] {
-        let ended = folder.run(&format!("show out {arguments}"));
-        assert!(
-            ended.code == Some(2) && ended.stderr.contains(problem),
-            "{}",
-            ended.stderr
-        );
-    }
 }
 
 #[test]
@@ -164,14 +131,10 @@ fn columns_of_rounds_are_columns_and_values_are_told_apart() {
                  relative = 0.5\nseeds = { from = 2, to = 4 }\n[record]\nslips = 6\n";
     folder.write("rounds.toml", sweep);
     folder.ends(0, "run rounds.toml --out out");
-    let columns = "seeds,target_met,first_round,last_round";
-    let shown = folder.ends(
-        0,
-        &format!("show out --columns {columns} --where seeds>=2 --sort -seeds"),
+    folder.screens(
+        "show_rounds",
+        ["show out --columns seeds,target_met,first_round,last_round --where seeds>=2 --sort -seeds"],
     );
-    for word in ["10025", "10027", "22540", "seeds", "target met"] {
-        assert!(shown.stdout.contains(word), "{word}: {}", shown.stdout);
-    }
     let all = folder.file("out/reduced/sets.parquet");
     let names = all.schema.as_ref().unwrap().fields().iter();
     let names: Vec<String> = names.map(|field| field.name().clone()).collect();
@@ -218,27 +181,7 @@ fn directories_are_compared_seed_by_seed_where_all_that_varies_agrees() {
     }
     let differences = &json(&folder.ends(0, "show a b --json").stdout)["differences"];
     assert_eq!(differences, &serde_json::json!({ "Kd": [4e7, 1e7] }));
-    let shown = folder.ends(0, "show a b");
-    let head = "A is a: K_d = 4·10⁷ N/m\nB is b: K_d = 10⁷ N/m\n";
-    assert!(
-        shown.stdout.starts_with(head) && shown.stderr.is_empty(),
-        "{}",
-        shown.stdout
-    );
-    let csv = folder.ends(0, "show a b --csv");
-    assert_eq!(csv.stderr, head);
-    // The values and differences of a row have one unit.
-    for statistic in ["⟨τ⟩", "⟨F_S⟩"] {
-        let heads = [", A", ", B", ", B − A"].map(|end| {
-            let head = shown
-                .stdout
-                .split(&format!("{statistic}{end} ("))
-                .nth(1)
-                .unwrap();
-            head.split(')').next().unwrap().to_owned()
-        });
-        assert!(heads.iter().all(|unit| *unit == heads[0]), "{heads:?}");
-    }
+    folder.screens("show_difference", ["show a b", "show a b --csv"]);
     let frequencies: Vec<_> = pairs.iter().map(|pair| number(pair, "frequency")).collect();
     assert!(frequencies.contains(&Some(58.0)), "{frequencies:?}");
     // As the table of sets says, also where runs end within an interval.
@@ -279,13 +222,13 @@ fn sets_of_a_zip_with_seeds_are_in_the_sweep_and_those_that_left_it_are_named() 
         "zip.toml",
         &sweep("[1e-4, 2e-4, 1e-4, 3e-4]", "[3, 4, 5, 3]"),
     );
-    let run = folder.ends(0, "run zip.toml --out out").stdout;
-    assert!(!run.contains("no longer in the sweep"), "{run}");
-    folder.write("zip.toml", &sweep("[1e-4, 2e-4]", "[7, 4]"));
-    let narrowed = folder.ends(0, "run zip.toml --out out").stdout;
-    assert!(
-        narrowed.contains("no longer in the sweep: 1 set of these: V₀ = 3·10⁻⁴ m/s\n"),
-        "{narrowed}"
+    folder.write("narrowed.toml", &sweep("[1e-4, 2e-4]", "[7, 4]"));
+    folder.screens(
+        "run_narrowed",
+        [
+            "run zip.toml --out out --threads 1",
+            "run narrowed.toml --out out --threads 1",
+        ],
     );
 }
 
@@ -296,7 +239,18 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
         "cut.toml",
         "name = \"cut\"\n[model]\nN = 5\nNs = 5\n[axes]\nseed = { count = 6 }\n[record]\nslips = 400\nmax_time = 0.4\n",
     );
-    let run = folder.ends(0, "run cut.toml --out out").stdout;
+    folder.screens(
+        "cut_by_max_time",
+        [
+            "run cut.toml --out out --threads 1",
+            "status out",
+            "run cut.toml --set max_time=0.01 --out early --threads 1",
+            "status early",
+            // Those that end at a time are whole.
+            "run cut.toml --set max_time=9 --set slips=4 --set time=0.4 --out whole --threads 1",
+            "status whole",
+        ],
+    );
     let columns = "--json --columns tau_mean,tau_sd,intervals,slips,jobs_cut,tau_mean_off";
     let set = &json(&folder.ends(0, &format!("show out {columns}")).stdout)["sets"][0];
     let number = |column: &str| set[column].as_f64().unwrap();
@@ -304,19 +258,6 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
     let off = -variation * variation * 6.0 / number("intervals");
     assert_eq!(number("jobs_cut"), 6.0);
     assert!((number("tau_mean_off") / off - 1.0).abs() < 1e-12);
-    let percent = format!("by up to about {:.1} %", -100.0 * off);
-    let note = format!(
-        "6 jobs of 1 set cut by max_time within an interval, which counts for nothing: tau_mean is too short, {percent}"
-    );
-    assert!(run.contains(&note), "{run}");
-    let each = format!("{:.1}", number("slips") / 6.0);
-    let status = folder.ends(0, "status out").stdout;
-    assert!(
-        status.contains(&format!(
-            "6, with {each} slips each: tau_mean is too short by about cv^2/{each}"
-        )),
-        "{status}"
-    );
     let status = json(&folder.ends(0, "status out --json").stdout);
     assert_eq!(
         (&status["cut"]["jobs"], status["cut"]["slips"].as_f64()),
@@ -327,23 +268,11 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
     let shown = census["tau_off"].as_f64().unwrap();
     assert_eq!(census["jobs_cut"], 6);
     assert!((shown / off - 1.0).abs() < 1e-12);
-    folder.ends(0, "run cut.toml --set max_time=0.01 --out early");
-    let status = folder.ends(0, "status early").stdout;
-    assert!(
-        status.contains("6, with 0.0 slips each: too few for tau_mean; make max_time longer"),
-        "{status}"
-    );
-    // Those that end at a time are whole.
-    folder.ends(
-        0,
-        "run cut.toml --set max_time=9 --set slips=4 --set time=0.4 --out whole",
-    );
     let set = &json(&folder.ends(0, &format!("show whole {columns}")).stdout)["sets"][0];
     assert_eq!(
         (set["jobs_cut"].as_u64(), set["tau_mean_off"].as_f64()),
         (Some(0), None)
     );
-    assert!(!folder.ends(0, "status whole").stdout.contains("cut by"));
 }
 
 #[test]
@@ -353,47 +282,16 @@ fn jobs_without_slips_are_reported_with_a_command_that_shows_one() {
         "fast.toml",
         "name = \"fast\"\n[model]\nN = 5\nNs = 5\n[axes]\nV0 = [1e-4, 1]\nseed = { count = 2 }\n[record]\nslips = 4\ngive_up_after = 0.5\n",
     );
-    let run = folder.ends(0, "run fast.toml --out out").stdout;
-    let note = "2 jobs of 1 set ended because no further slip came: the slider slides, or give_up_after is too short";
-    assert!(
-        run.contains(&format!(
-            "{note}; a job of one such set: stickslip simulate "
-        )),
-        "{run}"
-    );
-    assert!(run.contains("--set V0=1"), "{run}");
-    // Without an end of any interval, the unit is that of what it is at least.
-    let shown = folder
-        .ends(
-            0,
-            "show out --where V0==1 --columns tau_mean,tau_mean_bound",
-        )
-        .stdout;
-    let (head, of_set) = shown.split_once('\n').unwrap();
-    let units: Vec<&str> = head.split('(').skip(2).collect();
-    assert!(
-        head.trim_start().starts_with("V₀ (m/s)  ⟨τ⟩ (") && units.len() == 2,
-        "{head}"
-    );
-    assert_eq!(
-        units[0].split_once(')').map(|unit| unit.0),
-        units[1].strip_suffix(')')
-    );
-    let (_, bounds) = of_set.split_once("> ").unwrap();
-    let bounds = bounds.lines().next().unwrap().split_whitespace();
-    let bounds: Vec<f64> = bounds.map(|bound| bound.parse().unwrap()).collect();
-    assert!(
-        bounds[0] == bounds[1] && (1.0..1000.0).contains(&bounds[0]),
-        "{shown}"
-    );
     // A sweep that no longer has the set has no command for it.
     let fast = std::fs::read_to_string(folder.path("fast.toml")).unwrap();
-    folder.write("fast.toml", &fast.replace("[1e-4, 1]", "[1e-4]"));
-    let narrowed = folder.ends(0, "run fast.toml --out out").stdout;
-    assert!(
-        narrowed.contains(&format!(
-            "{note}\nno longer in the sweep: 1 set of these: V₀ = 1 "
-        )),
-        "{narrowed}"
+    folder.write("slow.toml", &fast.replace("[1e-4, 1]", "[1e-4]"));
+    folder.screens(
+        "jobs_without_slips",
+        [
+            "run fast.toml --out out --threads 1",
+            // Without an end of any interval, the unit is that of what it is at least.
+            "show out --where V0==1 --columns tau_mean,tau_mean_bound",
+            "run slow.toml --out out --threads 1",
+        ],
     );
 }

@@ -128,7 +128,7 @@ fn what_makes_no_trace_is_refused_with_its_row() {
     let good = csv(&samples);
     folder.write("good.csv", &good);
     let columns = format!("{UNMODULATED} --drop-size 30");
-    folder.ends(0, &format!("measured good.csv -o good {columns}"));
+    folder.screens("trace", [&format!("measured good.csv -o good {columns}")]);
     assert_eq!(folder.table("good", "slips").reals("onset").len(), 29);
     let without = |from: usize, to: usize| [&samples[..from], &samples[to..]].concat();
     let changed = |from: &str, to: &str| good.replacen(from, to, 1);
@@ -225,17 +225,22 @@ fn a_refused_trace_leaves_its_figure_and_a_directory_that_takes_another_size() {
     let folder = Folder::new();
     folder.write("trace.csv", &csv(&sawtooth(3000)));
     let command = format!("measured trace.csv -o out {UNMODULATED}");
-    folder.ends(2, &format!("{command} --drop-size 99 --dry-run"));
+    let too_large = format!("{command} --drop-size 99");
+    folder.screens(
+        "trace_without_a_plateau",
+        [&format!("{too_large} --dry-run")],
+    );
     assert!(!folder.path("out").exists());
-    folder.ends(2, &format!("{command} --drop-size 99"));
+    folder.ends(2, &too_large);
     let figure = || std::fs::read_to_string(folder.path("out/figures/drop-size.svg")).unwrap();
     let refused = figure();
     assert!(refused.contains("Number of slips<") && refused.contains("Mean interval (s)<"));
-    let said = folder.ends(0, &format!("{command} --drop-size auto"));
-    assert!(said.stdout.contains("on a plateau from"), "{}", said.stdout);
+    folder.screens(
+        "trace_with_its_own_size",
+        [&format!("{command} --drop-size auto"), "verify out"],
+    );
     assert_ne!(figure(), refused);
     assert_eq!(folder.table("out", "slips").reals("onset").len(), 29);
-    assert_eq!(folder.ends(0, "verify out").code, Some(0));
 }
 
 #[test]
@@ -255,11 +260,7 @@ fn runs_of_a_trace_are_series_and_a_drift_changes_nothing() {
     }
     folder.write("runs.csv", &text);
     let command = "measured runs.csv -o out --set V0=1e-4 --drop-size auto --column run=id";
-    let said = folder.ends(0, command).stdout;
-    assert!(
-        said.contains("series     2\n") && said.contains("stiffness"),
-        "{said}"
-    );
+    folder.screens("trace_of_two_runs", [command]);
     let slips = folder.table("out", "slips");
     assert_eq!(slips.reals("onset").len(), 28);
     assert_eq!(slips.reals("phase").len(), 14);
@@ -315,24 +316,18 @@ fn a_displacement_is_the_force_over_the_stiffness() {
         &format!("measured force.csv -o force {drive} --set Kd=1e7 --drop-size 30"),
     );
     let columns = "--column time=t:s --column displacement=x:um";
-    let found = folder.ends(
-        0,
-        &format!("measured displacement.csv -o displacement {drive} {columns} --drop-size 3:um"),
+    let measured = format!("measured displacement.csv -o displacement {drive} {columns}");
+    folder.screens(
+        "trace_of_a_displacement",
+        [
+            &format!("{measured} --drop-size 3:um"),
+            &format!("{measured} --drop-size 3:mN"),
+        ],
     );
-    for expected in ["to 2.89", "3e-6 m, on a plateau"] {
-        assert!(found.stdout.contains(expected), "{}", found.stdout);
-    }
     let [force, displacement] =
         ["force", "displacement"].map(|name| folder.table(name, "slips").reals("onset"));
     assert_eq!(force.len(), 29);
     assert_eq!(displacement, force);
-    let refused = format!("measured displacement.csv -o out {drive} {columns} --drop-size 3:mN");
-    assert!(
-        folder
-            .ends(2, &refused)
-            .stderr
-            .contains("its unit must be m")
-    );
 }
 
 #[test]
@@ -345,10 +340,7 @@ fn the_mean_of_some_samples_makes_a_plateau_of_a_noisy_trace() {
         .collect();
     folder.write("trace.csv", &csv(&noisy));
     let command = format!("measured trace.csv -o out {UNMODULATED} --drop-size 50");
-    let refused = folder.ends(2, &command).stderr;
-    assert!(refused.contains("--smooth by some samples"), "{refused}");
-    let said = folder.ends(0, &format!("{command} --smooth 8")).stdout;
-    assert!(said.contains("3750, every 0.008 s"), "{said}");
+    folder.screens("noisy_trace", [&command, &format!("{command} --smooth 8")]);
     assert_eq!(folder.table("out", "slips").reals("onset").len(), 299);
 }
 
