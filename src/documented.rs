@@ -6,7 +6,7 @@ use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, Tr
 use crate::reduce::{
     BackboneBin, EdgeRow, HistogramBin, Point, PulseRow, RoundOfSet, SetRow, TriggerRow,
 };
-use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
+use crate::results::tables::{JobRow, OptionalTable, PrecursorRow, RecordedTable, SlipRow};
 use crate::solver::{Solver, SolverKey};
 use crate::table::Table;
 use crate::table::columns::{Class, Column, Kind, Row};
@@ -189,6 +189,12 @@ fn documented_tables_are_those_written() {
     document! {
         SlipRow<'_> PrecursorRow<'_> JobRow SetRow RoundOfSet EdgeRow TriggerRow PulseRow HistogramBin BackboneBin Point TraceRow
         MapRow ProfileRow ContactRow
+    }
+    let recorded = RecordedTable::ALL.map(RecordedTable::word);
+    let optional = OptionalTable::ALL.map(OptionalTable::word);
+    for name in recorded.iter().chain(&optional) {
+        let is_there = earlier.iter().any(|(known, _)| known == name);
+        assert!(is_there, "`document!` above lacks the rows of {name}");
     }
     assert_documented("tables.md", &format!("{TABLES}{}", sections.join("\n")));
 }

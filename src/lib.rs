@@ -1,6 +1,34 @@
 //! Stick-slip friction of a slider held by breakable contacts: parameter sweeps of the model of Capozza et al.,
 //! "Stabilizing stick-slip friction", PRL 107, 024301 (2011).
 //!
+//! A sweep file has jobs, and a job has slips:
+//!
+//! ```
+//! use std::path::Path;
+//! use std::sync::atomic::AtomicBool;
+//! use stickslip::observe::measure;
+//! use stickslip::sweep::Sweep;
+//!
+//! let text = "
+//! name = \"two-velocities\"
+//! [axes]
+//! V0   = [1e-5, 1e-4]
+//! seed = { count = 3 }
+//! [record]
+//! slips = 4
+//! ";
+//! let sweep = Sweep::parse(text, Path::new("two-velocities.toml"))?;
+//! assert_eq!(sweep.jobs_of_grid().count(), 6);
+//!
+//! let job = sweep.jobs_of_grid().next().expect("there are six");
+//! let stop = AtomicBool::new(false);
+//! let measured = measure(&job.parameters, sweep.recording(), sweep.solver(), &stop)?;
+//! assert_eq!(measured.slips.len(), 4);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Ids, tables, JSON and exit codes are stable; this interface is not, as other programs use the command line or Python.
+//!
 //! ```text
 //! sweep file -> plan -> jobs -> measurements -> tables -> reduced data -> figures, report
 //!     sweep/             run/   physics/        results/   reduce/         figure/  report/
@@ -35,18 +63,18 @@
 //! | claim | which worker runs a part, reduces or decides a round |
 //! | shard | a share of the parts, run into a separate directory |
 
-pub mod accuracy;
+mod accuracy;
 pub mod cli;
 #[cfg(test)]
 mod documented;
 pub mod figure;
 pub mod measured;
 pub mod reduce;
-pub mod report;
+mod report;
 pub mod results;
 pub mod rounds;
 pub mod run;
-pub mod sets;
+mod sets;
 pub mod single_job;
 pub mod sweep;
 pub mod table;

@@ -7,6 +7,31 @@ from dataclasses import dataclass, field
 #: Longest line of text in characters; rows of tables are longer.
 WIDTH = 120
 
+#: What each picture shows.
+CAPTIONS = {
+    "fig2": "Histograms of the intervals between slips at 29, 58 and 116 Hz: our counterpart of Fig. 2d to f",
+    "fig3-tau-T": "Intervals in periods against the period: they lie on whole numbers",
+    "fig3-phase": "Density of slip phases against η with the backbone of Eq. 2: our counterpart of Fig. 3e",
+    "drive-alone": "Excess of the resultant length over the drive alone against η, by velocity and amplitude",
+    "friction": "Intervals, friction, slip share and resultant length against the amplitude at three frequencies",
+    "fig4d": "A precursor at the trailing edge and the slip that follows, in space and time: our counterpart of Fig. 4d",
+    "drag": "Intervals on a ramp of the period, there and back",
+    "drag-strong": "Intervals on the same ramp at three times the amplitude, there and back",
+    "locking-map": "Maps over frequency and amplitude of the periods per slip, the locking index and the excess",
+    "staircase": "Median interval in periods against the period, at three amplitudes, with whole numbers",
+    "size": "Statistics of slips by the number of blocks",
+    "contacts": "Statistics of slips by the number of contacts per block",
+    "disorder": "Statistics of slips by the spread of the thresholds",
+    "stiff-drive-phase": "Density of slip phases against η with a stiff drive, and the backbone of Eq. 2",
+    "triggering": "Advance of slips after a pulse against its place in the cycle, and the share of triggered slips",
+    "tide-phase": "Mean phase of slips against the period over the unmodulated interval",
+    "tide-excess": "Excess of the resultant length against the period over the unmodulated interval",
+    "correlation": "Resultant length against η at four amplitudes, beside random loads and the drive alone",
+    "weakening-threshold": "Amplitude, velocity and acceleration at which friction has fallen by 20 %, against frequency",
+    "weakening": "Mean friction against the amplitude at five frequencies, with the friction without modulation",
+    "weakening-velocity": "Mean friction against amplitude times frequency, at five frequencies",
+}
+
 
 @dataclass
 class Section:
@@ -67,7 +92,8 @@ def figure(title: str, sections: list[Section]) -> str:
     """Statements on the same figure: pictures, a list of all checks, tables, remarks."""
     sources = "; ".join(dict.fromkeys(section.source for section in sections))
     parts = [f"### {title}", paragraph(f"From {sources}.")]
-    parts += [f"![{picture}](../results/{picture}.png)" for section in sections for picture in section.pictures]
+    pictures = (picture for section in sections for picture in section.pictures)
+    parts += [f"![{CAPTIONS[picture]}](../results/{picture}.png)" for picture in pictures]
     checks = [checked(check) for section in sections for check in section.checks]
     parts += ["\n".join(checks)] if checks else []
     parts += [table(section.rows) for section in sections if section.rows]

@@ -31,7 +31,7 @@ Examples:
   stickslip run --preset fig3                    a sweep of the paper, without a file
   stickslip run sweeps/fig3.toml --set slips=100 --axis V0=1e-5,1e-4 -o finer    another sweep, without an editor
   stickslip run results/fig3                     resume, without the sweep file
-  stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk; see docs/clusters.md
+  stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk
   stickslip run sweeps/fig3.toml --report        with results/fig3/report.html, to watch it in a browser
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 

@@ -679,7 +679,7 @@ fn note_on_control(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
         "control = true".to_owned()
     };
     Some(format!(
-        "R without {control}: the drive alone makes some of it (docs/statistics.md)"
+        "R without {control}: the drive alone makes some of it, and what the slider adds is not known"
     ))
 }
 
@@ -689,7 +689,7 @@ fn note_on_drive(rows: &[SetRow]) -> Option<String> {
         let excess = row.resultant_excess_interval;
         excess.is_some_and(|excess| excess.low <= 0.0 && excess.high >= 0.0)
     };
-    let note = "with the R that the drive alone makes, within its interval (docs/statistics.md)";
+    let note = "whose R the drive alone explains: 0 lies within the interval of its excess";
     note_on_sets(rows, is_explained, note)
 }
 

@@ -1,5 +1,14 @@
 //! Reduction: the tables of a sweep become Fig. 3-style data: statistics per parameter set, the φ-η backbone,
 //! histograms of τ, and a sample of slips for scatter figures.
+//!
+//! ```text
+//! reduction.rs              a directory -> its reduced tables
+//!     gather.rs             jobs and slips, set by set; drive_alone.rs: slips by the drive alone
+//!     set.rs, estimate.rs   a set -> its row: values, and their intervals from units (jobs, or blocks of slips)
+//!     backbone.rs, crossings.rs, triggers.rs   bins of η, edges, pulses
+//! values.rs, slips.rs       columns and formulas of the rows, for figures and `show`; dimension.rs: their units
+//! compare.rs, differences.rs   directories side by side
+//! ```
 
 mod backbone;
 mod compare;

@@ -95,7 +95,7 @@ columns! {
         phase_mean: Option<f64> = "rad", "circular mean of the phase; if T is tau_mean or more, over whole cycles from the first onset of each job, and null below two of them a job", "⟨φ⟩" "Mean phase", Class::Mean;
         phase_interval as "phase_mean": Option<Interval> = "rad",
             "lower end of its 95 % confidence interval; the whole turn if the phases may have no direction";
-        has_phase: bool = "", "whether the interval of phase_mean is narrower than 3/2 pi", "has phase", Class::Category;
+        has_phase: bool = "", "whether the interval of phase_mean is narrower than the full circle", "has phase", Class::Category;
         shares_start: bool = "", "whether phases differ between slips of different number more than four times as much as between seeds: the jobs still share their start, and intervals of R and phase are too narrow", "shares start", Class::Category;
         resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase", "R" "Resultant length of the phase", Class::Share;
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";

@@ -161,9 +161,9 @@ fn bad_sweep_files_are_refused_by_plan_and_run_and_nothing_is_written() {
         ),
         // The solver.
         (
-            "[solver]\nmethod = \"leapfrog\"",
+            "[solver]\nmethod = \"no-such\"",
             3,
-            &["method = \"leapfrog\"", "event-driven", "fixed-step"],
+            &["method = \"no-such\"", "event-driven", "fixed-step"],
         ),
         (
             "[solver]\ntolerance = 0.5",

@@ -308,7 +308,7 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
         ),
         (
             "--size 5mmx5mm",
-            &["--size: figure phi-eta needs at least "],
+            &["--size: figure overview needs at least "],
         ),
         ("--size 2mx2m", &["must be WIDTHxHEIGHT"]),
         (
@@ -501,7 +501,9 @@ fn panels_are_full(folder: &Folder, directory: &str, sweep: &str) -> usize {
         // What is drawn inside a frame comes between the clip and its end, dots after it.
         for panel in svg.split("clip-path=\"").skip(1) {
             assert!(
-                ["<circle", "<rect"].iter().any(|mark| panel.contains(mark)),
+                ["<circle", "<rect", "stroke=\"none\""]
+                    .iter()
+                    .any(|mark| panel.contains(mark)),
                 "{sweep}"
             );
         }

@@ -2,6 +2,13 @@
 //!
 //! The entry point is [`simulate`]. An [`Observer`] sees contact events and, between them, [`Segment`]s: the shear
 //! force as a closed-form function of time. Nothing that it sees depends on which solver runs.
+//!
+//! ```text
+//! event_driven/      exact times of events: leap to leap, on a grid in time, or by Taylor series
+//! fixed_step.rs      the baseline
+//! segment.rs         F_S between events, from polynomial.rs or harmonic.rs
+//! ledger.rs          energies, and the balance that certifies a run
+//! ```
 
 mod event_driven;
 mod fixed_step;
