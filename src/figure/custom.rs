@@ -360,6 +360,29 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn the_control_is_a_level_where_it_lies_on_the_axis() {
+        let rows = rows(8);
+        let levels = |tau: f64| {
+            let control = SetRow {
+                tau_mean: Some(tau),
+                ..SetRow::default()
+            };
+            let quantity = |option, name: &str| Ok(Quantity::of(&rows, option, name)?);
+            let chart = ChartRows {
+                sets: &rows,
+                control: Some(&control),
+                swept: &swept(&rows),
+                beside: &Beside::default(),
+                others: Vec::new(),
+            };
+            let picture = custom(&quantity, chart, &figure(), &Look::default());
+            picture.unwrap().svg().matches(">Δ = 0<").count()
+        };
+        // Colours name sets of Δ = 0, too.
+        assert_eq!([levels(1.0), levels(1e6)], [2, 1]);
+    }
+
+    #[test]
     fn sets_of_one_measured_colour_are_not_joined_and_what_nothing_shows_is_said() {
         let strokes = |figure: &CustomFigure| {
             svg(figure)

@@ -544,3 +544,33 @@ fn the_sweeps_of_this_project_have_figures() {
         assert!(panels_are_full(&folder, &name, &name) > 0, "{name}");
     }
 }
+
+#[test]
+fn standing_figures_of_some_sets_stand_beside_those_of_all_and_show_the_slips_of_these() {
+    let folder = Folder::new();
+    folder.write(
+        "sweep.toml",
+        "name = \"s\"\n[model]\nN = 3\nNs = 4\nDelta = 1e-6\n[axes]\nV0 = [1e-5, 1e-4]\nfrequency = [40, 90]\n\
+         [record]\nslips = 4\n",
+    );
+    folder.ends(0, "run sweep.toml --out r");
+    let all = folder.contents("r/figures");
+    folder.screens(
+        "plot_where",
+        [
+            "plot r --where V0<5e-5 --format svg",
+            "plot r --where V0<1e-9",
+            "plot r --where no_column<1",
+            "plot r --where V0<1 --with r",
+        ],
+    );
+    let now = folder.contents("r/figures");
+    assert!(all.iter().all(|(path, bytes)| now[path] == *bytes));
+    let svg = |name: &str| {
+        let bytes = now[Path::new(name)].clone().unwrap();
+        String::from_utf8(bytes).unwrap()
+    };
+    let dots = |svg: &str| svg.matches("<circle").count() + svg.matches("stroke=\"none\"").count();
+    let (some, all) = (svg("tau-T-where.svg"), svg("tau-T.svg"));
+    assert!(some.contains("where V0") && dots(&some) > 0 && dots(&some) < dots(&all));
+}

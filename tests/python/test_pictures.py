@@ -19,7 +19,7 @@ CHEAP = ("drag", "drag-strong", "locking-contacts", "sliding-velocity")
 OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "predicted-cost.png", "speed-against-error.png", "weakening-threshold.png"}
 #: Custom figures: the flags of `stickslip plot`, as in scripts/reproduce, a line for each.
 OWN = {
-    "correlation": "--x eta --y resultant_length --colour frequency --log x",
+    "correlation": "--x eta --y resultant_length --colour Delta --log x",
     "fig3-precise": "--x eta --y phase_mean --colour V0 --log x",
     "locking-drive-alone": "--x eta --y resultant_excess --colour V0 --log x",
     "locking-staircase": "--x T --y tau_50/T --colour Delta --log y",
