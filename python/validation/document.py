@@ -9,12 +9,12 @@ WIDTH = 120
 
 #: What each picture shows.
 CAPTIONS = {
-    "fig2": "Histograms of the intervals between slips at 29, 58 and 116 Hz: our counterpart of Fig. 2d to f",
-    "fig3-tau-T": "Intervals in periods against the period: they lie on whole numbers",
+    "fig2": "Histograms of the intervals between slips at Δ = 0, 29 and 58 Hz: our counterpart of Fig. 2d to f",
+    "fig3-tau-T": "Intervals in periods against the period: they gather at whole numbers",
     "fig3-phase": "Density of slip phases against η with the backbone of Eq. 2: our counterpart of Fig. 3e",
     "drive-alone": "Excess of the resultant length over the drive alone against η, by velocity and amplitude",
     "friction": "Intervals, friction, slip share and resultant length against the amplitude",
-    "fig4d": "A precursor at the trailing edge and the slip after it: our counterpart of Fig. 4d",
+    "fig4d": "A precursor from the trailing edge and the slip after it: our counterpart of Fig. 4d",
     "drag": "Intervals on a ramp of the period, there and back",
     "drag-strong": "Intervals on the same ramp at three times the amplitude, there and back",
     "locking-map": "Periods per slip, locking index and excess over frequency and amplitude",

@@ -176,7 +176,7 @@ def tides(results: Path) -> Section:
         "[Zhou et al. 2026](https://arxiv.org/abs/2602.06703) find all three with rate-and-state friction.",
         f"At {speed(slow)} the intervals of the excess of R lie from {beyond_text(slow, 'resultant').split('; ')[1]}.",
     )
-    section.why = "the phases are those of the drive alone; only the fast drive locks, where T is a part of ⟨τ⟩"
+    section.why = "only the fast drive locks, where T is a part of ⟨τ⟩"
     return section
 
 
