@@ -9,7 +9,7 @@ WIDTH = 120
 
 #: What each picture shows.
 CAPTIONS = {
-    "fig2": "Histograms of the intervals between slips at Δ = 0, 29 and 58 Hz: our counterpart of Fig. 2d to f",
+    "fig2": "Histograms of intervals between slips at Δ = 0, 29 and 58 Hz: our counterpart of Fig. 2d to f",
     "fig3-tau-T": "Intervals in periods against the period: they gather at whole numbers",
     "fig3-phase": "Density of slip phases against η with the backbone of Eq. 2: our counterpart of Fig. 3e",
     "drive-alone": "Excess of the resultant length over the drive alone against η, by velocity and amplitude",

@@ -49,7 +49,7 @@ pub struct Arguments {
     /// 7.6]
     #[arg(long, value_name = "POINTS", value_parser = font)]
     font: Option<f64>,
-    /// Leave the small print to the caption, and print it
+    /// Leave the small print to the caption; that of a custom figure is printed
     #[arg(long)]
     no_caption: bool,
     /// Another results directory, computed or measured, as hollow marks in phi-eta, tau-T, overview and custom figures

@@ -689,7 +689,7 @@ fn note_on_drive(rows: &[SetRow]) -> Option<String> {
         let excess = row.resultant_excess_interval;
         excess.is_some_and(|excess| excess.low <= 0.0 && excess.high >= 0.0)
     };
-    let note = "whose R the drive alone explains: 0 lies within the interval of its excess";
+    let note = "whose R the data do not tell from that of the drive alone";
     note_on_sets(rows, is_explained, note)
 }
 
