@@ -112,17 +112,20 @@ impl<'a> Data<'a> {
 
     /// Those of the sets for which a condition holds, with their slips.
     fn retain(&mut self, results: &Results<'_>, condition: &str) -> Result<()> {
-        let refused = |problem: String| BadOption::new("where", condition, &problem);
-        let of_sets = Condition::read(condition, &SetRow::columns()).map_err(refused)?;
-        if !self.sets.iter().any(|set| of_sets.holds(set)) {
-            return Err(refused(of_sets.unmatched("sets", &self.sets)).into());
+        if self.sets.is_empty() {
+            return Ok(retain(&mut self.pulses, "pulses", condition)?);
         }
-        self.sets.retain(|set| of_sets.holds(set));
+        retain(&mut self.sets, "sets", condition)?;
         self.points = points_of(results, &self.sets)?;
         // Their bins hold the slips of all sets.
         self.backbone.clear();
-        retain(&mut self.edges, condition);
-        retain(&mut self.pulses, condition);
+        // What the condition does not know of, or holds for none, has no figure.
+        if retain(&mut self.edges, "edges", condition).is_err() {
+            self.edges.clear();
+        }
+        if retain(&mut self.pulses, "pulses", condition).is_err() {
+            self.pulses.clear();
+        }
         Ok(())
     }
 
@@ -177,14 +180,15 @@ fn overview_of_sets(data: &Data<'_>) -> Option<Picture> {
     is_shown.then(|| overview::overview(sets, of_control, data.beside, &data.of_all()))?
 }
 
-/// Leaves rows without the columns of a condition out, too.
-fn retain<R: Row>(rows: &mut Vec<R>, condition: &str) {
-    let condition = Condition::read(condition, &R::columns()).ok();
-    rows.retain(|row| {
-        condition
-            .as_ref()
-            .is_some_and(|condition| condition.holds(row))
-    });
+/// Keeps rows for which a condition holds; refused if there is none.
+fn retain<R: Row>(rows: &mut Vec<R>, of: &str, text: &str) -> Result<(), BadOption> {
+    let refused = |problem: String| BadOption::new("where", text, &problem);
+    let condition = Condition::read(text, &R::columns()).map_err(refused)?;
+    if !rows.iter().any(|row| condition.holds(row)) {
+        return Err(refused(condition.unmatched(of, rows)));
+    }
+    rows.retain(|row| condition.holds(row));
+    Ok(())
 }
 
 /// A figure that [`draw_all`] draws if its data are there.
@@ -391,7 +395,7 @@ fn draw_sets(
     };
     let rows = ChartRows {
         sets: &sets,
-        control: control.as_ref().filter(|_| others.is_empty()),
+        control: control.as_ref(),
         swept: &swept,
         beside: &beside,
         others,

@@ -13,6 +13,14 @@ fn pulses_advance_slips_beside_their_controls_and_the_drive_alone() {
     folder.write("pulses.toml", SWEEP);
     folder.ends(0, "run pulses.toml --out out");
     let [shown] = folder.screens("pulses", ["show out"]);
+    // Slips after pulses have no sets of their own.
+    folder.screens(
+        "plot_pulses_where",
+        [
+            "plot out --where Delta>5e-7 --format svg",
+            "plot out --where Delta>1",
+        ],
+    );
 
     let triggers = folder.file("out/reduced/triggers.parquet");
     assert_eq!(triggers.cells.len(), 6 * 2 * 9);
