@@ -83,7 +83,7 @@ pub(super) fn locking(sets: &[SetRow], look: &Look) -> Option<Picture> {
             ),
             entry(
                 Mark::Patch(UNCLEAR),
-                "(a) no phase; (c) 0 within the interval of the excess",
+                "(a) no preferred phase; (c) 0 within the interval of the excess",
             ),
         ],
     };
@@ -317,14 +317,17 @@ impl<'a> Map<'a> {
                 .filter(|one| is_same(one.0, n))
                 .map(|one| one.1);
             let own: Vec<Position> = own.collect();
-            let distance = |one: &Position| -> usize {
-                let squares = own
-                    .iter()
-                    .map(|other| one.0.abs_diff(other.0).pow(2) + one.1.abs_diff(other.1).pow(2));
-                squares.sum()
+            let count = own.len();
+            let columns: usize = own.iter().map(|one| one.0).sum();
+            let rows: usize = own.iter().map(|one| one.1).sum();
+            // From the centroid, in whole numbers.
+            let distance = |&(column, row): &Position| {
+                let [across, along] =
+                    [(column, columns), (row, rows)].map(|(own, sum)| (count * own).abs_diff(sum));
+                across.pow(2) + along.pow(2)
             };
             let middle = own.iter().copied().min_by_key(distance);
-            if let Some((column, row)) = middle.filter(|_| own.len() >= FEWEST) {
+            if let Some((column, row)) = middle.filter(|_| count >= FEWEST) {
                 let place = (self.columns.value(column), self.rows.value(row));
                 let ink = if scale.place(n) > 0.5 { WHITE } else { BLACK };
                 numbers.push((place, n.to_string(), ink));
