@@ -34,7 +34,7 @@ const PANEL_GAP: f64 = 26.0;
 /// Between columns, for the labels of their axes.
 const LABEL_GAP: f64 = 16.0;
 const CURVE_POINTS: usize = 200;
-/// Whole numbers of periods with a line: those that can be told apart.
+/// Whole numbers of periods with a line; those above lie too close.
 const WHOLE: std::ops::RangeInclusive<u32> = 1..=10;
 /// Lines between sets; more would be a net.
 const MAX_LINES: usize = 24;
@@ -50,7 +50,7 @@ const HOLE: f64 = 1.6;
 /// The sets of a chart, if each has a dot, and of which directories they are.
 pub(super) struct ChartRows<'a> {
     pub(super) sets: &'a [SetRow],
-    /// What all are compared with: the set without modulation that was run as a control alone.
+    /// The only set that was run as a control alone.
     pub(super) control: Option<&'a SetRow>,
     /// The swept parameters of the first directory, by which its sets are joined and told apart.
     pub(super) swept: &'a [Values],
@@ -81,8 +81,9 @@ struct Marks {
     free: Vec<usize>,
     /// The control on each axis of y, where it lies on it.
     control: Vec<Option<f64>>,
-    /// The parameter that shapes show, where colours leave one.
+    /// The parameter that shapes show, where colours leave one, and the place of each set among its values.
     shape: Option<Values>,
+    places: Vec<Option<usize>>,
 }
 
 impl<'a> Chart<'a> {
@@ -126,18 +127,21 @@ impl<'a> Chart<'a> {
         let axes = ys.iter().zip(&y_axes).chain([(x, &x_axis)]);
         let bars_cut = axes.map(cut).sum();
         let has_many = inside.len() > FEW_SETS;
+        let shape = self.shaped();
+        let control = self.control();
+        let level = |(y, axis): (&Quantity<'_>, &Axis)| {
+            let value = y.factor * control?.number(y.name())?;
+            Some(value).filter(|value| axis.contains(*value))
+        };
         let dots = Marks {
             hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
             radius: if has_many { SMALL_RADIUS } else { RADIUS },
             lines: self.lines(&sets),
             x_axis,
-            control: ys
-                .iter()
-                .zip(&y_axes)
-                .map(|(y, axis)| self.control(y, axis))
-                .collect(),
+            control: ys.iter().zip(&y_axes).map(level).collect(),
             free,
-            shape: self.shaped(),
+            places: shape.as_ref().map_or_else(Vec::new, Values::places),
+            shape,
         };
         let groups = groups(self.panels.as_ref(), &sets)?;
         let (layout, height) = layout(ys.len(), groups.len());
@@ -202,10 +206,13 @@ impl<'a> Chart<'a> {
         }
     }
 
-    /// The value of the control, on an axis of its column.
-    fn control(&self, y: &Quantity<'_>, axis: &Axis) -> Option<f64> {
-        let value = self.rows.control?.number(y.name())?;
-        Some(y.factor * value).filter(|value| axis.contains(*value))
+    /// The control, if it is that of all sets.
+    fn control(&self) -> Option<&'a SetRow> {
+        let is_of = |set: &SetRow, control: &SetRow| {
+            set.parameters.without_modulation() == *control.parameters
+        };
+        let is_of_all = |control: &&SetRow| self.rows.sets.iter().all(|set| is_of(set, control));
+        self.rows.control.filter(is_of_all)
     }
 
     /// Sets that differ in the x axis alone, in its order.
@@ -250,12 +257,16 @@ impl<'a> Chart<'a> {
 
     /// The shape of the dot of a set: of a parameter that colours do not show, else of its colour.
     fn shape(&self, dots: &Marks, set: usize) -> Option<Polygon> {
-        if let Some(shaped) = &dots.shape {
-            return shaped.places()[set].and_then(|place| SHAPES[place]);
+        if dots.shape.is_some() {
+            return dots.places[set].and_then(|place| SHAPES[place]);
         }
-        let value = self.colour.as_ref()?.number(set)?;
-        let hues = dots.hues.as_ref()?;
-        hues.shape(value).filter(|_| self.rows.others.is_empty())
+        self.shape_of_colour(dots, self.colour.as_ref()?.number(set)?)
+    }
+
+    /// That of a colour, unless shapes show something else.
+    fn shape_of_colour(&self, dots: &Marks, value: f64) -> Option<Polygon> {
+        let is_free = dots.shape.is_none() && self.rows.others.is_empty();
+        dots.hues.as_ref()?.shape(value).filter(|_| is_free)
     }
 
     fn ink(&self, dots: &Marks, set: usize) -> Ink {
@@ -400,7 +411,7 @@ impl<'a> Chart<'a> {
         let is_of_both = y.name() == "mean_friction" && self.x.symbol == Some(Symbol::Delta);
         let mut sets = self.rows.sets.iter();
         let own = sets.find(|row| row.parameters.modulation_period.is_none());
-        let control = own.or(self.rows.control);
+        let control = own.or_else(|| self.control());
         let free =
             control.filter(|_| is_of_both && is_fixed(Symbol::Kd) && is_fixed(Symbol::V0))?;
         let unit = self.x.factor * free.peak_force_mean? / free.parameters.drive_stiffness;
@@ -417,8 +428,7 @@ impl Chart<'_> {
             let shown = [inside, &dots.free].concat();
             let numbers: Vec<Option<f64>> = shown.iter().map(|&set| colour.number(set)).collect();
             let dot = |value| {
-                let is_shaped = dots.shape.is_none() && self.rows.others.is_empty();
-                let shape = hues.shape(value).filter(|_| is_shaped);
+                let shape = self.shape_of_colour(dots, value);
                 Dot::solid(hues.ink(value), RADIUS).with_shape(shape)
             };
             entries.extend(hues.entries(dot, |value| numbers.contains(&Some(value))));

@@ -360,18 +360,21 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_control_is_a_level_where_it_lies_on_the_axis() {
-        let rows = rows(8);
-        let levels = |tau: f64| {
+    fn the_control_of_all_sets_is_a_level_where_it_lies_on_the_axis() {
+        let mut rows = rows(8);
+        for row in &mut rows {
+            row.parameters.parameters.drive_velocity = 1e-5;
+        }
+        let levels = |rows: &[SetRow], tau: f64| {
             let control = SetRow {
                 tau_mean: Some(tau),
-                ..SetRow::default()
+                ..rows[1].clone()
             };
-            let quantity = |option, name: &str| Ok(Quantity::of(&rows, option, name)?);
+            let quantity = |option, name: &str| Ok(Quantity::of(rows, option, name)?);
             let chart = ChartRows {
-                sets: &rows,
+                sets: rows,
                 control: Some(&control),
-                swept: &swept(&rows),
+                swept: &swept(rows),
                 beside: &Beside::default(),
                 others: Vec::new(),
             };
@@ -379,7 +382,9 @@ pub(super) mod tests {
             picture.unwrap().svg().matches(">Δ = 0<").count()
         };
         // Colours name sets of Δ = 0, too.
-        assert_eq!([levels(1.0), levels(1e6)], [2, 1]);
+        assert_eq!([levels(&rows, 1.0), levels(&rows, 1e6)], [2, 1]);
+        rows[0].parameters.parameters.drive_velocity = 2e-5;
+        assert_eq!(levels(&rows, 1.0), 1, "another set has another control");
     }
 
     #[test]

@@ -60,7 +60,7 @@ impl Hues {
         }
     }
 
-    /// Each ink has its own, so that they are told apart in grey.
+    /// Each ink has its own, which distinguishes them in grey.
     pub(super) fn shape(&self, value: f64) -> Option<Polygon> {
         let place = INKS.iter().position(|ink| *ink == self.ink(value))?;
         SHAPES[place].filter(|_| matches!(self, Self::Inks(_)))

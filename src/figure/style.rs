@@ -289,7 +289,7 @@ const TRIANGLE: Polygon = (3, 0.0);
 const TURNED_TRIANGLE: Polygon = (3, 0.5);
 const PENTAGON: Polygon = (5, 0.0);
 
-/// Of dots, so that they are told apart in grey, too.
+/// Of dots: they distinguish series in grey, too.
 pub(super) const SHAPES: [Option<Polygon>; INKS.len()] = [
     None,
     Some(SQUARE),

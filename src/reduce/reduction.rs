@@ -388,7 +388,7 @@ pub fn read_sets_in_rounds<'a>(
     rows.filter(|row| !matches!(row, Ok((set, _)) if set.is_control))
 }
 
-/// The control of all sets, if a single one was run as a control alone.
+/// The set that was run as a control alone, if there is a single one.
 pub fn read_control(layout: &Layout<'_>) -> Result<Option<SetRow>, ResultsError> {
     let file = layout.reduced_file(SetRow::NAME);
     let rows = Dataset::new(layout.storage, vec![file]).rows::<SetRow>();
