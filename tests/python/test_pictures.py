@@ -5,6 +5,7 @@ that scripts/reproduce wrote to results/pictures.txt, and if their results exist
 """
 
 import hashlib
+import re
 import shutil
 import subprocess
 from dataclasses import dataclass
@@ -17,17 +18,8 @@ from conftest import ROOT
 CHEAP = ("drag", "drag-strong", "locking-contacts", "sliding-velocity")
 #: Pictures of a single simulation, which test_redraw.py draws, and of timings, which differ each time.
 OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "predicted-cost.png", "speed-against-error.png", "weakening-threshold.png"}
-#: Custom figures: the flags of `stickslip plot`, as in scripts/reproduce, a line for each.
-OWN = {
-    "correlation": "--x eta --y resultant_length --colour Delta --log x",
-    "fig3-precise": "--x eta --y phase_mean --colour V0 --log x",
-    "locking-drive-alone": "--x eta --y resultant_excess --colour V0 --log x",
-    "locking-staircase": "--x T --y tau_50/T --colour Delta --log y",
-    "tide": """--x T/tau_control --y phase_mean --colour V0 --log x
-        --x T/tau_control --y resultant_excess --colour V0 --log x""",
-    "weakening": """--x Delta --y mean_friction --colour frequency
-        --x Delta*frequency --y mean_friction --colour frequency --log x""",
-}
+#: Custom figures: the flags of `stickslip plot`, a line for each, by sweep.
+OWN = dict(re.findall(r'^    \[([\w-]+)\]="(--[^"]*)"', (ROOT / "scripts" / "reproduce").read_text(), re.MULTILINE))
 
 
 @dataclass(frozen=True)
