@@ -5,7 +5,7 @@ use crate::reduce::renew;
 use crate::results::Results;
 use crate::results::destination::NewFolder;
 use crate::table::formats::Format;
-use crate::table::shown::shown;
+use crate::table::shown::{shown, shown_bytes};
 use anyhow::Result;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -64,8 +64,8 @@ pub fn export(arguments: &Arguments) -> Result<Exit> {
     output::lines(exported.files.iter().map(|file| {
         let path = arguments.out.join(&file.name);
         let rows = output::count(file.rows, "row");
-        let megabytes = file.bytes as f64 / 1e6;
-        format!("{}  {rows}, {megabytes:.1} MB", shown(&path))
+        let size = shown_bytes(file.bytes as f64);
+        format!("{}  {rows}, {size}", shown(&path))
     }))?;
     if let Some(unfinished) = output::unfinished(&results)? {
         output::report(&format!("exported what is there: {unfinished}"));

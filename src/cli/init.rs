@@ -3,7 +3,7 @@
 use super::sweep::{Preset, Variation, changes, preset_parser, vary};
 use super::{Exit, output};
 use crate::results::destination::{Destination, THERE};
-use crate::sweep::Sweep;
+use crate::sweep::{KeyChange, Sweep};
 use crate::table::error::ResultsError;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
@@ -98,13 +98,7 @@ pub fn init(arguments: &Arguments) -> Result<Exit> {
     let of_question = changes(&Variation { settings, axes })?;
     let own = changes(&arguments.variation)?;
     let sweep = vary(vary(sweep, &of_question)?, &own)?;
-    // A key that is set need not stand as a comment with its default.
-    let is_set = |line: &str| {
-        let is_of = |key: &str| line.starts_with(&format!("# {key} = "));
-        own.iter().any(|change| is_of(&change.key))
-    };
-    let lines = sweep.text().split_inclusive('\n');
-    let mut text: String = lines.filter(|line| !is_set(line)).collect();
+    let mut text = without_comments_on(sweep.text(), &own);
     let question = arguments.question.and_then(|it| it.to_possible_value());
     if let Some(question) = question.as_ref().and_then(|question| question.get_help()) {
         let begin = text.find("name = ").unwrap_or(0);
@@ -120,6 +114,26 @@ pub fn init(arguments: &Arguments) -> Result<Exit> {
         "wrote {path}. See what it would run: stickslip plan {quoted}"
     ));
     Ok(Exit::Done)
+}
+
+/// Keys and sections that are set need not stand as comments with what they might be.
+fn without_comments_on(text: &str, changes: &[KeyChange]) -> String {
+    let section = |line: &str| {
+        changes
+            .iter()
+            .any(|change| line == format!("# [{}]", change.section))
+    };
+    let paragraphs = text
+        .split("\n\n")
+        .filter(|paragraph| !paragraph.lines().any(section));
+    let text = paragraphs.collect::<Vec<_>>().join("\n\n");
+    let key = |line: &str| {
+        let is_of = |key: &str| line.starts_with(&format!("# {key} = "));
+        changes.iter().any(|change| is_of(&change.key))
+    };
+    text.split_inclusive('\n')
+        .filter(|line| !key(line))
+        .collect()
 }
 
 /// A preset under the name of a file.
@@ -243,6 +257,14 @@ mod tests {
             "{text}"
         );
         assert_eq!(sweep(&text).jobs().count(), 2 * (1 + 2) * 2);
+    }
+
+    #[test]
+    fn a_section_that_is_set_is_no_comment_any_more() {
+        let changes = [KeyChange::setting("relative", "0.1")];
+        let text = without_comments_on(TEMPLATE.text, &changes);
+        assert!(!text.contains("# [precision]"), "{text}");
+        assert!(text.contains("# [refine]"), "{text}");
     }
 
     #[test]

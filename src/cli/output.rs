@@ -5,6 +5,7 @@ use crate::results::Results;
 use crate::results::destination::Destination;
 use crate::results::next_round::RoundsSoFar;
 use crate::run::Reasons;
+use crate::sets::Digits;
 use crate::table::shown::{is_plain, shown_text};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
@@ -114,7 +115,9 @@ impl fmt::Display for TextTable {
 
 /// A duration in the unit that suits it.
 pub fn duration(seconds: f64) -> String {
-    if seconds < 120.0 {
+    if seconds < 0.1 {
+        format!("{} ms", Digits::THREE.number(1e3 * seconds))
+    } else if seconds < 120.0 {
         format!("{seconds:.1} s")
     } else if seconds < 7200.0 {
         format!("{:.1} min", seconds / 60.0)

@@ -7,7 +7,6 @@ use crate::results::next_round::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
 use crate::run::limits::{self, Threads};
 use crate::run::{MAX_FAILURES, Overview, status};
-use crate::sets::Digits;
 use crate::sweep::{Bounds, Extension, LARGE, Plan, Sweep};
 use crate::table::shown::{serialize_path, shown, shown_bytes};
 use crate::table::storage::{Disk, Storage};
@@ -165,7 +164,12 @@ impl<'a> Forecast<'a> {
         };
         let cpu_time = self.predicted_cpu_seconds;
         let core_hours = cpu_time / 3600.0;
-        let cpu_time = format!("{}, {core_hours:.1} core-hours", output::duration(cpu_time));
+        let core_hours = if core_hours < 0.1 {
+            String::new()
+        } else {
+            format!(", {core_hours:.1} core-hours")
+        };
+        let cpu_time = output::duration(cpu_time) + &core_hours;
         let wall_time = output::duration(self.predicted_wall_seconds);
         let threads = output::count(self.threads as u64, "thread");
         let of_worker = shown_bytes(self.worker_memory_bytes);
@@ -186,10 +190,7 @@ impl<'a> Forecast<'a> {
             ("address space", address_space),
         ];
         if let Some(command) = &self.longest_job {
-            let time = match self.longest_job_cpu_seconds {
-                short if short < 0.1 => format!("{} ms", Digits::THREE.number(1e3 * short)),
-                long => output::duration(long),
-            };
+            let time = output::duration(self.longest_job_cpu_seconds);
             pairs.push(("longest job", format!("{time}: {command}")));
         }
         if let Some(bounds) = &self.at_most {

@@ -191,10 +191,10 @@ mod tests {
             progress.show(&RunEvent::Tick);
             progress.bar.message()
         };
-        assert_eq!(message(false), "3 of 0 jobs (3 by others), 0.0 s left");
+        assert_eq!(message(false), "3 of 0 jobs (3 by others), 0 ms left");
         assert_eq!(
             message(true),
-            "3 of 0 jobs (3 by others), 0.0 s left of this round"
+            "3 of 0 jobs (3 by others), 0 ms left of this round"
         );
     }
 }

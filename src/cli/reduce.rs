@@ -50,7 +50,11 @@ pub fn summary_lines(
     summary: &ReductionSummary,
     layout: &Layout<'_>,
 ) -> Vec<(&'static str, String)> {
-    let jobs = format!("{}, {} failed", summary.jobs, summary.failed_jobs);
+    let failed = match summary.failed_jobs {
+        0 => String::new(),
+        failed => format!(", {failed} failed"),
+    };
+    let jobs = format!("{}{failed}", summary.jobs);
     let sets = if summary.backbone.is_empty() {
         // There is no modulation.
         summary.sets.to_string()

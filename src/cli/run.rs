@@ -291,11 +291,11 @@ pub fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
 
 fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
     let jobs = report.jobs_run + report.jobs_spilled;
-    let jobs = format!("{jobs}, {} failed", report.jobs_failed);
-    let mut pairs = vec![
-        ("jobs run", jobs),
-        ("parts committed", report.parts_committed.to_string()),
-    ];
+    let mut pairs = vec![("jobs run", jobs.to_string())];
+    if report.jobs_failed > 0 {
+        pairs.push(("jobs failed", report.jobs_failed.to_string()));
+    }
+    pairs.push(("parts committed", report.parts_committed.to_string()));
     if let Some(rounds) = &report.rounds {
         pairs.push(("round", output::rounds(rounds)));
     }

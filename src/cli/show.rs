@@ -176,8 +176,9 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
         }
         all.retain(|row| condition.holds(row));
     }
-    if let Some(column) = &arguments.sort {
-        sort(&mut all, column)?;
+    match &arguments.sort {
+        Some(column) => sort(&mut all, column)?,
+        None => by_frequency(&mut all, |(row, _)| row),
     }
     let rows: Vec<SetRow> = all.iter().map(|(row, _)| row.clone()).collect();
     let columns = if arguments.columns.is_empty() {
@@ -203,7 +204,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
     let found = serde_json::json!({ "edges": edges, "pulses": pulses });
     arguments.print(&columns, rows.len(), &rows, found)?;
     if arguments.is_text() {
-        output::lines(notes(results, &rows))?;
+        output::lines(notes(results, &rows, &columns))?;
     }
     Ok(())
 }
@@ -211,7 +212,8 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
 /// The first of the `count` sets of a directory, and notes on its jobs. Memory: [`MAX_READ`] sets.
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let results = &renew(results)?;
-    let rows = sets(results, MAX_READ)?;
+    let mut rows = sets(results, MAX_READ)?;
+    by_frequency(&mut rows, |row| row);
     let columns = usual_columns(&usual_names(&rows.iter()), &rows);
     // A line that says how many more there are is as long as one of these.
     let first = FIRST + usize::from(count == FIRST as u64 + 1);
@@ -222,7 +224,7 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
         let root = output::quoted_path(results.layout().root());
         text = format!("{text}… {more} more: stickslip show {root}\n");
     }
-    for note in notes(results, &rows) {
+    for note in notes(results, &rows, &columns) {
         text += &(note + "\n");
     }
     Ok(text)
@@ -281,6 +283,21 @@ fn chosen_columns(
     all.retain(|values| columns.iter().all(|chosen| chosen.name() != values.name()));
     all.append(&mut columns);
     Ok(all)
+}
+
+/// Rows in the order of their parameters with frequencies, which are shown, in place of periods.
+fn by_frequency<R>(rows: &mut [R], set: impl Fn(&R) -> &SetRow) {
+    let all = AllButSeed::SYMBOLS.iter().copied();
+    let before_the_period: Vec<Symbol> = all.take_while(|symbol| *symbol != Symbol::T).collect();
+    let differ_in_period_at_most = |left: &R, right: &R| {
+        let [left, right] = [left, right].map(|row| &set(row).parameters);
+        let mut symbols = before_the_period.iter();
+        symbols.all(|symbol| left.get(*symbol) == right.get(*symbol))
+    };
+    for group in rows.chunk_by_mut(differ_in_period_at_most) {
+        let frequency = |row: &R| set(row).frequency.unwrap_or(0.0);
+        group.sort_by(|left, right| frequency(left).total_cmp(&frequency(right)));
+    }
 }
 
 fn sort(rows: &mut Vec<SetInRounds>, column: &str) -> Result<()> {
@@ -574,8 +591,12 @@ const SINGLE_SERIES: &str =
     "with a single series: the error is from the correlation within the series";
 const BELOW_DRIVE: &str = "with less R than the drive alone makes: are all times counted from a maximum of the modulation?";
 
-/// Notes on jobs that ended early, each kind with a command that shows one, and on sets that left the sweep.
-fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
+/// Columns that notes on the drive alone are about.
+const OF_DRIVE_ALONE: [&str; 3] = ["resultant_length", "resultant_drive", "resultant_excess"];
+
+/// Notes on jobs that ended early, each kind with a command that shows one, on sets that left the sweep, and on what is
+/// shown of R.
+fn notes(results: &Results<'_>, rows: &[SetRow], columns: &[Values]) -> Vec<String> {
     let sweep = results.sweep();
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
     let failed = (failed > 0).then(|| {
@@ -584,17 +605,21 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         format!("{jobs} failed: stickslip status {root} says why")
     });
     let measured = sweep.measured().map_or(&[][..], |_| rows);
+    let shows_r = columns
+        .iter()
+        .any(|column| OF_DRIVE_ALONE.contains(&column.name()));
+    let with_r = if shows_r { rows } else { &[] };
     let is_below_drive = |row: &SetRow| {
         let excess = row.resultant_excess_interval;
         excess.is_some_and(|excess| excess.high < 0.0)
     };
     let notes = [
         note_on_sliding(sweep, rows),
-        note_on_cut_jobs(rows),
+        note_on_cut_jobs(sweep, rows),
         note_on_few_cycles(rows),
         note_on_start(rows),
-        note_on_control(sweep, rows),
-        note_on_drive(rows),
+        note_on_control(sweep, with_r),
+        note_on_drive(with_r),
         note_on_sets(measured, |row| row.finished_jobs == 1, SINGLE_SERIES),
         note_on_sets(measured, is_below_drive, BELOW_DRIVE),
         note_on_model(sweep, rows),
@@ -627,16 +652,29 @@ fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     ))
 }
 
-fn note_on_cut_jobs(rows: &[SetRow]) -> Option<String> {
+/// Shares of `tau_mean` below this are not told, as their digits would be zeros.
+const SMALL_SHARE: f64 = 1e-3;
+
+fn note_on_cut_jobs(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
+    let jobs: u64 = rows.iter().map(|row| row.jobs_cut).sum();
+    if jobs == 0 {
+        return None;
+    }
+    let most_off = rows.iter().filter_map(|row| row.tau_off).reduce(f64::min);
+    let off = match most_off.map(|off| -off) {
+        None => String::new(),
+        Some(small) if small < SMALL_SHARE => ", by less than 0.1 %".to_owned(),
+        Some(share) => format!(", by up to about {:.1} %", 100.0 * share),
+    };
+    let too_short =
+        format!("within an interval, which counts for nothing: tau_mean is too short{off}");
+    if sweep.measured().is_some() {
+        let end = if jobs == 1 { "ends" } else { "end" };
+        return Some(format!("{jobs} series {end} {too_short}"));
+    }
     let jobs = jobs_of_sets(rows, |row| row.jobs_cut)?;
-    let cut = rows.iter().filter(|row| row.jobs_cut > 0);
-    let most_off = cut.filter_map(|row| row.tau_off).reduce(f64::min);
-    let off = most_off.map_or_else(String::new, |off| {
-        format!(", by up to about {:.1} %", -100.0 * off)
-    });
     Some(format!(
-        "{jobs} cut by max_time within an interval, which counts for nothing: tau_mean is too short{off}; `time` \
-         in place of max_time ends jobs with a slip"
+        "{jobs} cut by max_time {too_short}; `time` in place of max_time ends jobs with a slip"
     ))
 }
 

@@ -4,7 +4,7 @@ use super::{Exit, layout, output};
 use crate::measured::{Compared, compare_files};
 use crate::results::Results;
 use crate::results::verification::{Problem, Verification};
-use crate::table::shown::{shown, shown_text};
+use crate::table::shown::{shown, shown_bytes, shown_text};
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
@@ -101,8 +101,8 @@ impl Report<'_> {
         output::lines(verification.problems.iter().map(problem_in_words))?;
         let parts = output::count(verification.parts, "part");
         let jobs = output::count(verification.jobs, "job");
-        let megabytes = verification.bytes as f64 / 1e6;
-        let files = format!("{}, {megabytes:.1} MB", verification.files);
+        let size = shown_bytes(verification.bytes as f64);
+        let files = format!("{}, {size}", verification.files);
         output::pairs(&[
             ("intact", format!("{parts} with {jobs}")),
             ("files", files),

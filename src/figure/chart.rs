@@ -362,8 +362,11 @@ impl<'a> Chart<'a> {
             return;
         };
         let alone = line.iter().filter_map(|&set| self.drive_at(y, set));
-        let stroke = drive_alone(self.ink(dots, *first));
-        layers.push(Layer::Curve(alone.collect(), stroke));
+        let alone: Vec<Place> = alone.collect();
+        layers.push(match alone.len() {
+            1 => Layer::Dots(alone, ALONE),
+            _ => Layer::Curve(alone, drive_alone(self.ink(dots, *first))),
+        });
         let known: Vec<usize> = line.iter().copied().filter(|&set| y.has(set)).collect();
         for pair in known.windows(2) {
             let ink = self.ink(dots, pair[0]);
@@ -468,11 +471,18 @@ impl Chart<'_> {
             entries.push(entry(Mark::Line(GRID), "τ = nT"));
         }
         let has_drive = |set: &&usize| self.ys.iter().any(|y| self.drive_at(y, **set).is_some());
-        let explained = inside.iter().filter(has_drive);
+        let explained = inside.iter().filter(&has_drive);
         let (dotted, joined): (Vec<usize>, Vec<usize>) =
             explained.partition(|set| self.is_dotted(dots, **set));
+        let mut lines = dots.lines.iter();
+        let has_curve = lines.any(|line| line.iter().filter(&has_drive).count() > 1);
         if !joined.is_empty() {
-            entries.push(entry(Mark::Line(drive_alone(BLACK)), "by the drive alone"));
+            let mark = if has_curve {
+                Mark::Line(drive_alone(BLACK))
+            } else {
+                Mark::Dot(ALONE)
+            };
+            entries.push(entry(mark, "by the drive alone"));
         }
         if !dotted.is_empty() {
             let of = if joined.is_empty() {
@@ -502,10 +512,18 @@ impl Chart<'_> {
             .collect()
     }
 
-    /// Those that shapes do not show, either.
-    fn pooled(&self, dots: &Marks) -> Option<String> {
+    /// Those that shapes do not show, either, of which there are marks with several values.
+    fn pooled(&self, inside: &[usize], dots: &Marks) -> Option<String> {
         let shaped = usize::from(dots.shape.is_some());
-        let pooled = self.unshown().into_iter().skip(shaped);
+        let marked = inside
+            .iter()
+            .chain(&dots.free)
+            .map(|&set| &self.rows.sets[set]);
+        let is_several = |swept: &Values| {
+            let values = |symbol| marked.clone().map(move |set| set.parameters.get(symbol));
+            parameter(&swept.column).is_none_or(|symbol| !is_single(values(symbol)))
+        };
+        let pooled = self.unshown().into_iter().skip(shaped).filter(is_several);
         let symbols: Vec<String> = pooled.map(|swept| swept.label.symbol).collect();
         let symbols = distinct(symbols.iter().map(String::as_str));
         (!symbols.is_empty()).then(|| format!("pooled: sets that differ in {}", symbols.join(", ")))
@@ -551,9 +569,15 @@ impl Chart<'_> {
                 self.of
             ));
         }
-        notes.extend(self.pooled(dots));
+        notes.extend(self.pooled(inside, dots));
         notes.join("; ")
     }
+}
+
+/// Whether there is one value at most.
+fn is_single<V: PartialEq>(mut values: impl Iterator<Item = V>) -> bool {
+    let first = values.next();
+    values.all(|value| Some(&value) == first.as_ref())
 }
 
 /// Whether it is an interval in periods: a pure number of nothing but a statistic in s and the period.

@@ -35,6 +35,8 @@ const COLUMNS: f64 = 20.0;
 /// measured.
 const WIDEST: f64 = 1.06;
 const COLUMNS_IN_WORDS: &str = "columns hold slips within a twentieth of a decade of η";
+/// Least ratio of the ends of the axis of η, so that it has numbers also where there is one η.
+const NARROWEST: f64 = 2.0;
 /// Rows of the density in half a turn.
 const ROWS: f64 = 36.0;
 
@@ -66,13 +68,15 @@ pub(super) fn phase_eta(
     let etas = of_others.iter().flatten().map(|mean| mean.0);
     let ends = [columns.first()?.edges.0, columns.last()?.edges.1];
     let (low, high) = bounds(etas.chain(ends))?;
+    let margin = (NARROWEST * low / high).sqrt().max(1.0);
+    let (low, high) = (low / margin, high * margin);
     let x = Axis::logarithmic(&label("eta").axis(""), low, high);
     let has_curves = x.high > 1.0;
     let entries = [
         (
             !averages.is_empty(),
             Mark::Bar(AVERAGE),
-            "mean of all slips in a bin of η, 95 %",
+            "mean of all slips in a quarter of a decade of η, 95 %",
         ),
         (has_curves, Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         (has_curves, Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),

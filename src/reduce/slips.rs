@@ -167,6 +167,7 @@ pub fn add_intervals(
 }
 
 /// The means over the slips of each set of a column of slips, or a formula of such; `None` if it is neither.
+/// Angles are refused.
 pub fn means_of_slips(
     results: &Results<'_>,
     sets: &[SetRow],
@@ -181,6 +182,12 @@ pub fn means_of_slips(
     let Some(formula) = formula(name, &columns).ok().filter(is_known) else {
         return Ok(None);
     };
+    if matches!(formula, Expression::Name(place) if columns[place].unit == "rad") {
+        let problem = format!(
+            "{name}: an angle has no plain mean; phase_mean is the circular mean of the phase"
+        );
+        return Err(ResultsError::refused(results.layout().root(), problem));
+    }
     let mut jobs: Vec<BTreeMap<u64, Vec<f64>>> = vec![BTreeMap::new(); sets.len()];
     each_slip(results, sets, |place, slip| {
         let value = super::values::evaluate(&formula, &slip);

@@ -12,9 +12,11 @@ function writeSweep(report) {
   const failed = status.jobs_failed ? `, ${many(status.jobs_failed)} failed` : "";
   const missing = status.jobs_missing ? `, ${many(status.jobs_missing)} missing` : "";
   const done = `${counted(census.sets, "parameter set")}, ${counted(status.jobs_done, "job")} done${failed}${missing}`;
-  const off = census.tau_off === null ? "" : `, by up to about ${(-100 * census.tau_off).toFixed(1)} %`;
+  const share = -100 * census.tau_off;
+  const most = share < 0.1 ? "less than 0.1" : `up to about ${share.toFixed(1)}`;
+  const off = census.tau_off === null ? "" : `, by ${most} %`;
   const cut = census.jobs_cut
-    ? ` max_time cut ${counted(census.jobs_cut, "job")} within an interval: mean intervals are too short${off}.`
+    ? ` ${counted(census.jobs_cut, "job")} ended within an interval: mean intervals are too short${off}.`
     : "";
   element("summary").textContent = `Report of stickslip: ${done}, ${counted(census.slips, "slip")}.${cut}`;
   const axis = new Map(report.axes.flatMap(([keys, count]) => keys.split(", ").map((key) => [key, count])));

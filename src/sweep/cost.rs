@@ -11,7 +11,7 @@
 //! where the slider hardly slips.
 
 use crate::model::Parameters;
-use crate::model::theory::{total_strength, typical_interval};
+use crate::model::theory::{end_stiffness, loading_time, total_strength, typical_interval};
 use crate::observe::Recording;
 use crate::solver::{Method, Solver};
 use std::f64::consts::{PI, TAU};
@@ -24,37 +24,47 @@ const STEP_OVERHEAD: f64 = 45e-9;
 /// CPU time of a break with its reattachment on the grid, of a step on one block, and of a step beside its blocks, in
 /// s.
 const GRID_EVENT: f64 = 250e-9;
-const GRID_STEP_OF_A_BLOCK: f64 = 0.22e-9;
-const GRID_STEP_OVERHEAD: f64 = 10e-9;
+const GRID_STEP_OF_A_BLOCK: f64 = 0.29e-9;
+const GRID_STEP_OVERHEAD: f64 = 11e-9;
 /// How many times as long a ledger makes that.
-const GRID_WITH_LEDGER: f64 = 2.0;
+const GRID_WITH_LEDGER: f64 = 2.2;
+
+/// CPU time of a leap over quiet time, and of a leap of one block, in s.
+const LEAP: f64 = 410e-9;
+const LEAP_OF_A_BLOCK: f64 = 4e-9;
 
 /// CPU time in Taylor steps, in s: of a job beside its motion, a break with its reattachment, a step, and a step on one
 /// block. A ledger sets up a quadrature for each job.
-const TAYLOR: [f64; 4] = [0.0, 650e-9, 170e-9, 3.3e-9];
+const TAYLOR: [f64; 4] = [0.0, 400e-9, 230e-9, 4.8e-9];
 const TAYLOR_WITH_LEDGER: [f64; 4] = [4e-4, 1.4e-6, 100e-9, 30e-9];
-/// Taylor steps for each break at a tolerance of 1e-3; for each step of the grid that follows the modulation; and the
-/// share of resolved motion that they resolve.
-const TAYLOR_STEPS_OF_A_BREAK: f64 = 0.9;
-const TAYLOR_STEPS_OF_A_GRID_STEP: f64 = 0.3;
-const TAYLOR_SHARE: f64 = 0.6;
+/// Taylor steps for each break at a tolerance of 1e-3, and the share of resolved motion that they resolve.
+const TAYLOR_STEPS_OF_A_BREAK: f64 = 1.0;
+const TAYLOR_SHARE: f64 = 0.3;
 /// CPU time of a job beside its motion, in s.
-const JOB_OVERHEAD: f64 = 2e-5;
+const JOB_OVERHEAD: f64 = 6e-6;
 
-/// How long motion is resolved about a slip: in reattachment times, or durations of the slip if these are shorter, and
-/// in times in which damping slows it.
-const RESOLVED_REATTACHMENTS: f64 = 3.0;
-const RESOLVED_DAMPINGS: f64 = 100.0;
-/// Steps of the grid in a period of the modulation, if its amplitude were the way that the drive makes between slips.
-const STEPS_OF_A_PERIOD: f64 = 250.0;
-/// If the amplitude is more than the first share of that way, each period breaks the second share of the contacts, and
-/// motion is never quiet; if it is more than the third, the slider slips to and fro with the modulation.
-const SHAKEN: f64 = 0.4;
-const BREAKS_OF_A_PERIOD: f64 = 0.2;
+/// Share of the strength that the drive loads between slips, of a slider that moves as one. In a chain the first blocks
+/// bear the load, and it is less by the square root of the share of the contacts that they hold.
+const LOADED_SHARE: f64 = 0.72;
+/// How long motion is resolved after a slip, in s, and how many times that more for a modulation whose amplitude is the
+/// way that the drive makes between slips.
+const RESOLVED_OF_A_SLIP: f64 = 0.04;
+const RESOLVED_WITH_SWING: f64 = 2.0;
+/// If the amplitude is more than the first share of that way, each period breaks the second share of the contacts; if it
+/// is more than the third, the slider slips to and fro with the modulation.
+const SHAKEN: f64 = 0.38;
+const BREAKS_OF_A_PERIOD: f64 = 0.25;
 const FOLLOWS: f64 = 0.6;
-/// A slider that slides, or slips to and fro too fast to come to rest, does so by chance: after two reattachment times
-/// with few blocks, and much later with more than this.
-const RESTLESS_BLOCKS: f64 = 12.0;
+/// Steps in a quiet period of such a modulation.
+const STEPS_OF_A_PERIOD: f64 = 40.0;
+/// Leaps in an interval, and where motion is hardly ever quiet.
+const LEAPS: f64 = 6.0;
+const FEW_LEAPS: f64 = 2.0;
+/// Steps of the grid that resolve a break of a slider that slides.
+const STEPS_OF_A_SLIDING_BREAK: f64 = 80.0;
+/// A slider with fewer contacts than this comes to rest by chance, in so many times the interval between slips.
+const FEW_CONTACTS: f64 = 70.0;
+const REST: f64 = 1.3;
 
 /// Predicted CPU time of a job, in s.
 pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: Solver) -> f64 {
@@ -73,6 +83,7 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
                 1.0
             };
             with_ledger * (motion.breaks * GRID_EVENT + steps * of_a_step)
+                + motion.cost_of_leaps(blocks)
         }
         Method::EventDriven => {
             let finer = fourth_root(fourth_root(1e-3 / setting));
@@ -83,9 +94,10 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
             };
             let resolved = (TAYLOR_SHARE * finer * finer * motion.resolved).min(motion.time);
             let steps = TAYLOR_STEPS_OF_A_BREAK * finer * motion.breaks
-                + TAYLOR_STEPS_OF_A_GRID_STEP * motion.steps_of_periods
+                + motion.steps_of_periods
                 + resolved / longest_taylor_step(parameters);
-            of_a_job + motion.breaks * of_a_break + steps * (of_a_step + of_a_block * blocks)
+            let of_steps = steps * (of_a_step + of_a_block * blocks);
+            of_a_job + motion.breaks * of_a_break + of_steps + motion.cost_of_leaps(blocks)
         }
         Method::FixedStep => motion.time / setting * (STEP_OVERHEAD + STEP_OF_A_BLOCK * blocks),
     };
@@ -98,92 +110,165 @@ struct ExpectedMotion {
     time: f64,
     resolved: f64,
     breaks: f64,
+    leaps: f64,
     /// Steps beside those of the part that is not quiet.
     steps_of_periods: f64,
 }
 
 impl ExpectedMotion {
-    /// Motion with no steps beside those that resolve it.
-    const fn resolved(time: f64, resolved: f64, breaks: f64) -> Self {
+    fn cost_of_leaps(&self, blocks: f64) -> f64 {
+        self.leaps * (LEAP + LEAP_OF_A_BLOCK * blocks)
+    }
+
+    fn of(parameters: &Parameters, recording: &Recording) -> Self {
+        let longest = recording.max_time.unwrap_or(f64::INFINITY);
+        let given_up = recording.give_up_time(parameters).min(longest);
+        // A pulse is short.
+        let lasting = match parameters.pulse_start {
+            Some(_) => &parameters.without_modulation(),
+            None => parameters,
+        };
+        let scales = Scales::of(lasting);
+        if parameters.drive_velocity > critical_velocity(parameters) {
+            Self::sliding(&scales, parameters, recording, given_up)
+        } else if scales.swing > FOLLOWS {
+            Self::following(&scales, recording, given_up)
+        } else {
+            Self::stick_slip(&scales, recording)
+        }
+    }
+
+    fn stick_slip(scales: &Scales, recording: &Recording) -> Self {
+        let time = recording.expected_time(scales.interval);
+        let slips = time / scales.interval;
+        let shaking = (BREAKS_OF_A_PERIOD / scales.period).min(scales.breaks_of_sliding);
+        let of_shaking = if scales.swing > SHAKEN {
+            time * shaking
+        } else {
+            0.0
+        };
         Self {
             time,
-            resolved,
-            breaks,
+            resolved: scales.resolved(time, slips),
+            breaks: scales.contacts * (slips * scales.breaks_of_a_slip + of_shaking),
+            leaps: LEAPS * slips,
+            steps_of_periods: STEPS_OF_A_PERIOD * scales.swing * time / scales.period,
+        }
+    }
+
+    /// With the modulation, to and fro; until the job gives up, if that is too fast to come to rest.
+    fn following(scales: &Scales, recording: &Recording, given_up: f64) -> Self {
+        let between = scales.interval.min(0.5 * scales.period);
+        let comes_to_rest = scales.period > 2.0 * (scales.duration + scales.delay);
+        let time = if comes_to_rest {
+            recording.expected_time(between)
+        } else {
+            given_up
+        };
+        let slips = time / between;
+        let rate = (scales.breaks_of_a_slip / between).min(scales.breaks_of_sliding);
+        Self {
+            time,
+            resolved: scales.resolved(time, slips),
+            breaks: scales.contacts * (1.0 + time * rate),
+            leaps: FEW_LEAPS * slips,
             steps_of_periods: 0.0,
         }
     }
 
-    fn of(parameters: &Parameters, recording: &Recording) -> Self {
-        if parameters.pulse_start.is_some() {
-            // It is short.
-            return Self::of(&parameters.without_modulation(), recording);
+    fn sliding(
+        scales: &Scales,
+        parameters: &Parameters,
+        recording: &Recording,
+        given_up: f64,
+    ) -> Self {
+        let time = if scales.contacts < FEW_CONTACTS {
+            given_up.min(recording.expected_time(REST * scales.interval))
+        } else {
+            given_up
+        };
+        let breaks = scales.contacts * (1.0 + time * scales.breaks_of_sliding);
+        let about_breaks = STEPS_OF_A_SLIDING_BREAK * step_length(parameters) * breaks;
+        Self {
+            time,
+            resolved: time.min(about_breaks),
+            breaks,
+            leaps: FEW_LEAPS * time / scales.interval,
+            steps_of_periods: 0.0,
         }
-        let interval = typical_interval(parameters);
+    }
+}
+
+/// Times in s, rates in 1/s, and numbers that motion is expected from.
+struct Scales {
+    contacts: f64,
+    /// Between slips, and of one.
+    interval: f64,
+    duration: f64,
+    /// Of reattachment.
+    delay: f64,
+    /// Infinite without modulation.
+    period: f64,
+    /// Amplitude of the modulation over the way that the drive makes between slips.
+    swing: f64,
+    /// For each contact.
+    breaks_of_a_slip: f64,
+    breaks_of_sliding: f64,
+}
+
+impl Scales {
+    fn of(parameters: &Parameters) -> Self {
         let delay = parameters.reattachment_time;
         let velocity = parameters.drive_velocity;
         let reach = parameters.contact_reach();
-        let contacts = (parameters.blocks * parameters.contacts_per_block) as f64;
-        let longest = recording.max_time.unwrap_or(f64::INFINITY);
-        // A slip takes half a swing on the springs and the time in which damping slows it.
+        let loading = expected_loading(parameters);
+        let interval = loading + delay;
+        // Half a swing on the springs and the time in which damping slows it.
         let mass = parameters.slider_mass;
-        let damping = parameters.slider_mass * parameters.damping_rate;
         let stiffness =
             1.0 / (1.0 / parameters.drive_stiffness + 1.0 / parameters.slider_stiffness);
-        let duration = PI * (mass / stiffness).sqrt() + damping / stiffness;
-        // At a velocity v a contact holds for reach/v and is off for the delay, so that friction is half the strength
-        // times reach/(reach + v delay). Sliding is stable where damping grows faster with v than this falls.
-        let critical =
-            ((0.5 * total_strength(parameters) * reach * delay / damping).sqrt() - reach) / delay;
-
+        let duration = PI * (mass / stiffness).sqrt() + mass * parameters.damping_rate / stiffness;
         let amplitude = parameters
             .modulation_amplitude
             .max(parameters.turning_amplitude.unwrap_or(0.0));
         let period = TAU / parameters.largest_modulation_frequency();
-        let swing = amplitude / (velocity * (interval - delay));
-        let follows = swing > FOLLOWS;
-        let about_a_slip = RESOLVED_REATTACHMENTS * delay.min(duration)
-            + RESOLVED_DAMPINGS / parameters.damping_rate;
-        // In a slip each contact breaks, and again as often as it attaches again on the way.
-        let breaks_of_a_slip = 1.0 + 1.0 / (delay / duration + reach / (velocity * interval));
-        if velocity > critical || follows {
-            let is_restless = velocity > critical || period < 2.0 * duration + delay;
-            let crowd = parameters.blocks as f64 / RESTLESS_BLOCKS;
-            let rest = 2.0 * delay * (1.0 + crowd * crowd * crowd * crowd);
-            let given_up = recording.give_up_time(parameters);
-            let time = if !is_restless {
-                recording.expected_time(interval.min(0.5 * period))
-            } else if rest < given_up {
-                recording.expected_time(rest)
-            } else {
-                given_up.min(longest)
-            };
-            let fastest = velocity.max(4.0 * amplitude / period);
-            let sliding = 1.0 / (delay + reach / fastest);
-            // Without rest, each break is followed by motion.
-            let slips = if is_restless {
-                contacts * sliding
-            } else {
-                fastest / (velocity * (interval - delay))
-            };
-            let breaks = contacts * (1.0 + time * sliding.min(breaks_of_a_slip * slips));
-            return Self::resolved(time, time * (about_a_slip * slips).min(1.0), breaks);
-        }
-        let time = recording.expected_time(interval);
-        let slips = time / interval;
-        let periods = time / period;
-        let breaks = contacts * slips * breaks_of_a_slip;
-        if swing > SHAKEN {
-            let breaks_of_periods = contacts * periods * BREAKS_OF_A_PERIOD;
-            return Self::resolved(time, time, breaks + breaks_of_periods);
-        }
-        let resolved = time * (about_a_slip / interval).min(1.0);
+        let fastest = velocity.max(4.0 * amplitude / period);
         Self {
-            time,
-            resolved,
-            breaks,
-            steps_of_periods: STEPS_OF_A_PERIOD * swing * periods,
+            contacts: (parameters.blocks * parameters.contacts_per_block) as f64,
+            interval,
+            duration,
+            delay,
+            period,
+            swing: amplitude / (velocity * loading),
+            // Each contact breaks, and again as often as it attaches again on the way.
+            breaks_of_a_slip: 1.0 + 1.0 / (delay / duration + reach / (velocity * interval)),
+            breaks_of_sliding: 1.0 / (delay + reach / fastest),
         }
     }
+
+    /// How long motion is resolved, in s. What is resolved about one slip overlaps that about the next if they are close.
+    fn resolved(&self, time: f64, slips: f64) -> f64 {
+        let about_slips = RESOLVED_OF_A_SLIP * (1.0 + RESOLVED_WITH_SWING * self.swing) * slips;
+        time * about_slips / (time + about_slips)
+    }
+}
+
+/// The velocity of the drive above which sliding is stable, in m/s.
+///
+/// At a velocity v a contact holds for reach/v and is off for the delay, so that friction is half the strength times
+/// reach/(reach + v delay). Sliding is stable where damping grows faster with v than this falls.
+fn critical_velocity(parameters: &Parameters) -> f64 {
+    let reach = parameters.contact_reach();
+    let delay = parameters.reattachment_time;
+    let damping = parameters.slider_mass * parameters.damping_rate;
+    ((0.5 * total_strength(parameters) * reach * delay / damping).sqrt() - reach) / delay
+}
+
+/// Time in which the drive loads a slip, in s.
+fn expected_loading(parameters: &Parameters) -> f64 {
+    let contacts = parameters.blocks as f64 * parameters.block_contact_stiffness();
+    let share_of_first = end_stiffness(parameters) / contacts;
+    loading_time(parameters, LOADED_SHARE * share_of_first.sqrt())
 }
 
 /// About the largest frequency of the blocks, in rad/s.
@@ -280,7 +365,7 @@ mod tests {
             };
             predicted_cost(&parameters, &recording, Solver::default())
         };
-        let interval = typical_interval(&parameters);
+        let interval = expected_loading(&parameters) + parameters.reattachment_time;
         let of_time = cost(None, Some(3.0), None);
         let cut = cost(Some(1_000_000), None, Some(3.0 + interval));
         assert!((of_time / cut - 1.0).abs() < 1e-12, "{of_time} {cut}");
@@ -355,10 +440,12 @@ mod tests {
                 drive_velocity,
                 ..Parameters::default()
             };
-            ExpectedMotion::of(&parameters, &Recording::default()).time
-                / typical_interval(&parameters)
+            let recording = Recording::default();
+            let time = ExpectedMotion::of(&parameters, &recording).time;
+            time / recording.give_up_time(&parameters)
         };
-        assert_eq!((at(1e-4).round(), at(1e-2).round()), (45.0, 20.0));
+        assert_eq!(at(1e-2), 1.0);
+        assert!(at(1e-4) > 2.0);
     }
 
     fn sized(blocks: usize, contacts_per_block: usize) -> Parameters {

@@ -29,7 +29,7 @@ const ROUNDING: f64 = 1e-9;
 pub const PART_JOBS: usize = 4096;
 /// Version of how sweeps become parts: values of axes, order, cost and limits. A directory keeps the one that it was
 /// started with.
-pub const PLAN_VERSION: u32 = 8;
+pub const PLAN_VERSION: u32 = 9;
 
 /// A sweep of a directory, and what of it counts there.
 #[derive(Clone, Debug)]

@@ -133,7 +133,11 @@ pub fn varied(text: &str, changes: &[KeyChange]) -> String {
     }
     for change @ KeyChange { key, value, .. } in changes {
         let section = section_of(change);
-        let table = document.entry(section).or_insert_with(toml_edit::table);
+        if !document.contains_key(section) {
+            document.insert(section, toml_edit::table());
+            set_below_last_comments(&mut document, section);
+        }
+        let table = &mut document[section];
         let Ok(mut value) = value.parse::<Value>() else {
             continue;
         };
@@ -152,6 +156,15 @@ pub fn varied(text: &str, changes: &[KeyChange]) -> String {
         }
     }
     document.to_string()
+}
+
+/// A new table at the end comes after the comments there, which are about what stands above them.
+fn set_below_last_comments(document: &mut DocumentMut, section: &str) {
+    let comments = document.trailing().as_str().unwrap_or_default().to_owned();
+    if let Some(table) = document[section].as_table_mut() {
+        table.decor_mut().set_prefix(comments + "\n");
+        document.set_trailing("");
+    }
 }
 
 #[cfg(test)]
@@ -192,6 +205,16 @@ mod tests {
                 .count(),
             2 * 5
         );
+    }
+
+    #[test]
+    fn a_new_section_comes_after_the_comments_at_the_end() {
+        let text = format!("{TEXT}# time = 3\n");
+        let changes = ["of=tau_mean", "relative=0.1"]
+            .map(|change| change.split_once('=').unwrap())
+            .map(|(key, value)| KeyChange::setting(key, value));
+        let section = "\n[precision]\nof = \"tau_mean\"  # --set\nrelative = 0.1  # --set\n";
+        assert_eq!(varied(&text, &changes), text + section);
     }
 
     #[test]

@@ -46,9 +46,11 @@ pub fn is_plain(c: char) -> bool {
     !c.is_control() && !turns && !has_no_width && (c == ' ' || !c.is_whitespace())
 }
 
-/// Bytes of memory in the unit that suits them, rounded up.
+/// Bytes in the unit that suits them, rounded up.
 pub fn shown_bytes(bytes: f64) -> String {
-    if bytes < 1e9 {
+    if bytes < 1e6 {
+        format!("{:.0} kB", (1e-3 * bytes).ceil())
+    } else if bytes < 1e9 {
         format!("{:.0} MB", (1e-6 * bytes).ceil())
     } else {
         format!("{:.1} GB", 1e-9 * bytes)

@@ -11,7 +11,7 @@ use std::{iter, thread};
 pub fn small_sweep(seeds: u64) -> Sweep {
     let text = format!(
         "name = \"small\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = {seeds} }}\n\
-         [record]\nslips = 90\nprecursors = true\n[solver]\nmethod = \"fixed-step\"\ndt = 4.68e-7\n"
+         [record]\nslips = 90\nprecursors = true\n[solver]\nmethod = \"fixed-step\"\ndt = 5.59e-7\n"
     );
     Sweep::parse(&text, Path::new("small.toml")).unwrap()
 }

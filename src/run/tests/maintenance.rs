@@ -137,7 +137,7 @@ fn a_disk_that_cannot_be_read_is_not_damaged_and_its_repair_moves_nothing() {
 fn sweep(seeds: u64) -> Sweep {
     let text = format!(
         "name = \"test\"\n[axes]\nseed = {{ count = {seeds} }}\nV0 = [1e-4, 2e-4]\n[record]\nslips = 3\n\
-         [solver]\nmethod = \"fixed-step\"\ndt = 4.68e-7\n"
+         [solver]\nmethod = \"fixed-step\"\ndt = 5.59e-7\n"
     );
     Sweep::parse(&text, Path::new("test.toml")).unwrap()
 }

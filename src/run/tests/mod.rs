@@ -47,7 +47,7 @@ pub(crate) fn run(
 fn sweep(seeds: u64, model: &str) -> Sweep {
     let text = format!(
         "name = \"test\"\n[model]\n{model}\n[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = {seeds} }}\n\
-         [record]\nslips = 3\nprecursors = true\n[solver]\nmethod = \"fixed-step\"\ndt = 4.68e-7\n"
+         [record]\nslips = 3\nprecursors = true\n[solver]\nmethod = \"fixed-step\"\ndt = 5.59e-7\n"
     );
     Sweep::parse(&text, Path::new("test.toml")).unwrap()
 }

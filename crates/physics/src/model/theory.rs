@@ -63,17 +63,24 @@ pub fn total_strength(parameters: &Parameters) -> f64 {
 /// 0.1115 s apart, of which 0.005 s are reattachment, and the shear force grows at 3827 N/s: 0.1065 · 3827/1918.
 const LOADED_SHARE: f64 = 0.2125;
 
-/// Typical interval between slips, in s: the time to load `LOADED_SHARE` of the strength, and one reattachment.
-pub fn typical_interval(parameters: &Parameters) -> f64 {
+/// Stiffness at the driven end of a slider with all contacts attached, in N/m: that of an endless chain, exact also for
+/// one block; a short chain moves as one.
+pub fn end_stiffness(parameters: &Parameters) -> f64 {
     let contacts = parameters.block_contact_stiffness();
-    // Stiffness at the end of an endless chain, exact also for one block; a short chain moves as one.
     let endless =
         0.5 * contacts + (contacts * (parameters.coupling_stiffness() + 0.25 * contacts)).sqrt();
-    let slider = endless.min(contacts * parameters.blocks as f64);
-    let stiffness = 1.0 / (1.0 / parameters.drive_stiffness + 1.0 / slider);
-    let loading =
-        LOADED_SHARE * total_strength(parameters) / (stiffness * parameters.drive_velocity);
-    loading + parameters.reattachment_time
+    endless.min(contacts * parameters.blocks as f64)
+}
+
+/// Time in which the drive loads a share of the total strength, in s.
+pub fn loading_time(parameters: &Parameters, share: f64) -> f64 {
+    let stiffness = 1.0 / (1.0 / parameters.drive_stiffness + 1.0 / end_stiffness(parameters));
+    share * total_strength(parameters) / (stiffness * parameters.drive_velocity)
+}
+
+/// Typical interval between slips, in s: the time to load `LOADED_SHARE` of the strength, and one reattachment.
+pub fn typical_interval(parameters: &Parameters) -> f64 {
+    loading_time(parameters, LOADED_SHARE) + parameters.reattachment_time
 }
 
 #[cfg(test)]

@@ -148,9 +148,11 @@ pub struct Survey {
 
 impl Survey {
     /// The standard deviation of the noise: the median absolute second difference of Gaussian noise is 1/1.4826 of its
-    /// standard deviation, and this the square root of 6 times that of the noise.
+    /// standard deviation, and this the square root of 6 times that of the noise. 0 where it is that of rounding.
     pub fn noise(&self) -> f64 {
-        1.4826 * self.noise.median()
+        let noise = 1.4826 * self.noise.median();
+        let rounding = f64::EPSILON * self.low.abs().max(self.high.abs());
+        if noise > rounding { noise } else { 0.0 }
     }
 
     /// The slope of the loading parts over the velocity of the drive, in N/m.
