@@ -51,12 +51,11 @@ def document(results: Path) -> str:
         paragraph(
             "For readers who ask which statements of the paper the model confirms.",
             "`scripts/reproduce` writes this page from measured results.",
-            "Brackets have 95 % intervals: jackknife over seeds or parameter sets, bootstrap where a statistic is not smooth,"
-            " Wilson's for shares ([`statistics.py`](../python/stickslip/statistics.py)).",
+            "Brackets have 95 % intervals: jackknife over seeds or sets, bootstrap where a statistic is not smooth, Wilson's"
+            " for shares ([`statistics.py`](../python/stickslip/statistics.py)).",
             "Where the paper gives no number, the criterion is a choice. *Undecided*: the interval includes the limit.",
-            "*Control*: the run without modulation. *Drive alone*: slips at the loads of the control. *Excess*: what is"
-            " measured less that of the drive alone. *Random loads*: slips at independent loads. R is the resultant length of"
-            " the phases φ ([definitions](model.md#phase-and-locking)).",
+            "*Random loads*: slips at independent loads. The [glossary](glossary.md#statistics) has the other terms, the"
+            " [model](model.md#phase-and-locking) the definitions.",
         ),
         table(summary),
         "## The paper's statements",

@@ -66,8 +66,8 @@ def locking_map(results: Path) -> Section:
             }
         )
     section.remark(
-        f"Means over {len(sets)} sets with {sets['intervals'].sum()} intervals. All have the same control of two seeds, so they"
-        " err together.",
+        f"Means over {len(sets)} sets with {sets['intervals'].sum()} intervals. They share a control of two seeds, so they err"
+        " together.",
     )
     return section
 
@@ -98,7 +98,7 @@ def staircase(results: Path) -> Section:
         section.rows.append({"Δ (µm)": f"{1e6 * amplitude:.1f}", "on a step": shares[amplitude].text(2)} | steps)
     widens = shares[max(shares)].low > shares[min(shares)].high
     section.remark(
-        "A period is on a step if the median τ is within 0.05 T of nT; 0.1 of them are by chance.",
+        "A period is on a step if the median τ is within 0.05 T of nT; 0.1 are by chance.",
         f"The steps {'widen' if widens else 'do not widen beyond their errors'} with the amplitude.",
     )
     return section
@@ -183,7 +183,7 @@ def choices(results: Path) -> Section:
     levels = (0.4, 0.5, 0.6, 0.9, 0.95, 0.99)
     edges = 1e3 * numpy.interp(levels, shares["slip_share"], shares["V0"])
     section.item(
-        "Edges of the regimes, in mm/s by their share of time within slips:"
+        "Edges of the regimes in mm/s, by the share of time within slips:"
         f" {', '.join(f'{edge:.2f} at {level:g}' for edge, level in zip(edges, levels, strict=True))}."
     )
     phases = Sweep(results / "fig3").slips()

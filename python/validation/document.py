@@ -9,26 +9,26 @@ WIDTH = 120
 
 #: What each picture shows.
 CAPTIONS = {
-    "fig2": "Histograms of intervals between slips at Δ = 0, 29 and 58 Hz: our counterpart of Fig. 2d to f",
-    "fig3-tau-T": "Intervals in periods against the period: they gather at whole numbers",
-    "fig3-phase": "Density of slip phases against η with the backbone of Eq. 2: our counterpart of Fig. 3e",
+    "fig2": "Intervals between slips at Δ = 0, 29 and 58 Hz: our counterpart of Fig. 2d to f",
+    "fig3-tau-T": "Intervals in periods against the period",
+    "fig3-phase": "Slip phases against η with the backbone of Eq. 2: our counterpart of Fig. 3e",
     "drive-alone": "Excess of the resultant length over the drive alone against η, by velocity and amplitude",
     "friction": "Intervals, friction, slip share and resultant length against the amplitude",
     "fig4d": "A precursor from the trailing edge and the slip after it: our counterpart of Fig. 4d",
     "drag": "Intervals on a ramp of the period, there and back",
-    "drag-strong": "Intervals on the same ramp at three times the amplitude, there and back",
+    "drag-strong": "Intervals on the ramp at three times the amplitude",
     "locking-map": "Periods per slip, locking index and excess over frequency and amplitude",
-    "staircase": "Median interval in periods against the period, at three amplitudes, with whole numbers",
+    "staircase": "Median interval in periods against the period, at three amplitudes",
     "size": "Statistics of slips by the number of blocks",
     "contacts": "Statistics of slips by the number of contacts per block",
     "disorder": "Statistics of slips by the spread of the thresholds",
-    "stiff-drive-phase": "Density of slip phases against η with a stiff drive, and the backbone of Eq. 2",
+    "stiff-drive-phase": "Slip phases against η with a stiff drive, and the backbone of Eq. 2",
     "triggering": "Advance of slips against the place of a pulse in the cycle, and triggered slips",
     "tide-phase": "Mean phase of slips against the period over the unmodulated interval",
     "tide-excess": "Excess of the resultant length against the period over the unmodulated interval",
     "correlation": "Resultant length against η at four amplitudes, beside random loads and the drive alone",
     "weakening-threshold": "Where friction has fallen by 20 %: amplitude, velocity, acceleration",
-    "weakening": "Mean friction against the amplitude at five frequencies, and without modulation",
+    "weakening": "Mean friction against the amplitude at five frequencies",
     "weakening-velocity": "Mean friction against amplitude times frequency, at five frequencies",
 }
 

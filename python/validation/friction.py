@@ -43,9 +43,9 @@ def friction(results: Path) -> Section:
     )
     section.remark(
         f"In the control the mean peak force F_m is {peak:.1f} N, the mean friction {reference:.1f} N.",
-        "Weak modulation can raise friction, as slips wait for a maximum of the load:"
+        "Weak modulation can raise it, as slips wait for a maximum of the load:"
         f" {waits:.0f} ms at 29 Hz and ΔF/F_m = {stiffness * 6e-7 / peak:.2f}, instead of {free:.0f} ms.",
-        f"Strong modulation lowers it, by 10 % {weakest} and {strongest}.",
+        f"Strong modulation lowers it by 10 % {weakest} and {strongest}.",
     )
     return section
 
@@ -125,7 +125,7 @@ def slow_fronts(results: Path) -> Section:
     )
     section.check(
         "but fast rupture, 58 Hz",
-        f"more slips with a precursor of {LARGE} breaks than in the control",
+        f"more slips with a precursor of {LARGE} breaks",
         f"{fast[58].text(2)}; control {fast[None].text(2)}",
         fast[58].low > fast[None].high,
     )
@@ -218,7 +218,7 @@ def edge(results: Path) -> Section:
         given["N"] * carried >= 5,
     )
     section.remark(
-        "Until the first break a slow modulation spreads over the blocks as their displacement does: the first carries"
+        "Until the first break a slow modulation spreads as the displacement does: the first block carries"
         f" {carried:.3f} of F_S. For it, 4 to 5 % of the peak force are {parts}.",
     )
     section.why = "the paper does not say of what its 20 % are"

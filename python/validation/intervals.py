@@ -71,8 +71,8 @@ def stick_slip(results: Path) -> Section:
     slips = without_modulation(sweep.slips())
     spread = jackknife(lambda rows: rows["interval"].std() / rows["interval"].mean(), slips)
     section.check(
-        "intervals of the control are stochastic",
-        "s.d. over mean from 0.05 to 0.3",
+        "intervals are stochastic",
+        "s.d. over mean of the control from 0.05 to 0.3",
         spread.text(),
         spread.lies(above=0.05, below=0.3),
     )
@@ -94,7 +94,7 @@ def stick_slip(results: Path) -> Section:
     numbers = {size: [of_slips(count, rows) for rows in of_modes] for size, count in counts.items()}
     section.check(
         "the peaks differ in their precursors",
-        f"different mean numbers of precursors of at least {', '.join(map(str, SIZES))} breaks",
+        f"different mean numbers of those of at least {', '.join(map(str, SIZES))} breaks",
         "; ".join(", ".join(one.text(1) for one in found) for found in numbers.values()),
         *(before.high < after.low for found in numbers.values() for before, after in pairwise(found)),
     )
@@ -153,14 +153,14 @@ def integer_multiples(results: Path) -> Section:
         for row in reduced
     )
     section.check(
-        "more than the drive alone makes",
+        "",
         "excess of the locking index above 0",
         f"{', '.join(excesses)}; drive alone {', '.join(by_drive)}",
         *(row["locking_index_excess_low"] > 0 for row in reduced),
     )
     for what, intervals, column in (
-        ("so do times from the largest precursor to the slip", lead_times(sweep), "lead"),
-        ("so do times between precursors, if longer than T/2", precursors, "interval"),
+        ("so do times from largest precursor to slip", lead_times(sweep), "lead"),
+        ("so do times between precursors above T/2", precursors, "interval"),
     ):
         found = [index_of(column, select(intervals, T=1 / frequency), frequency) for frequency in FREQUENCIES]
         chances = [index_of(column, of_same_jobs(intervals, still), frequency) for frequency in FREQUENCIES]
@@ -229,12 +229,12 @@ def stress_drops(results: Path) -> Section:
         chances.append(jackknife(index, still))
     section.check(
         "",
-        "locking index of the drops, in units of what the force gains in T, above the control's",
+        "locking index of drops, in units of the force gained in T, above the control's",
         f"{texts(modulated)}; control {texts(chances)}",
         *(one.low > chance.high for one, chance in zip(modulated, chances, strict=True)),
     )
     section.remark(
-        "Drops follow τ, as the force grows at the rate K_d V0: the square of their correlation is"
+        "Drops follow τ, as the force grows at the rate K_d V0: their squared correlation is"
         f" {texts(of_tau[1:])}; control {of_tau[0].text()}.",
     )
     section.verdict = "restates statement 3"

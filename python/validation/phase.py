@@ -33,13 +33,13 @@ def phase(results: Path) -> Section:
     slips = slips.assign(first=nucleation_phase(slips))
     high = slips[slips["eta"] > 2]
     under = first_breaks(
-        section, high, "fewer than 0.02 of the first breaks (modulo 2π) more than 0.15 rad below φ_min, for η > 2"
+        section, high, "fewer than 0.02 of first breaks (modulo 2π) more than 0.15 rad below φ_min, for η > 2"
     )
     sets = Sweep(results / "locking-drive-alone").sets()
     above = sets[sets["eta"] > 1]
     seen = share(above["resultant_length_low"] > 0.5, above.index)
     section.check(
-        "slips lock above η = 1, as seen",
+        "slips lock, as seen",
         "R above 0.5 with its interval in more than 0.9 of the sets",
         f"{seen.text(2)} of {len(above)} sets",
         seen.lies(above=0.9),
@@ -55,7 +55,7 @@ def phase(results: Path) -> Section:
     chance = float(random_load_phases(least, ENVELOPE))
     section.check(
         "slips appear with a phase of −π for small η",
-        "at the least η > 1 the lower envelope is within 0.5 rad of −π",
+        "lower envelope at the least η > 1 within 0.5 rad of −π",
         f"{start.text(2)} rad at η = {least:.2f}; random loads {chance:.2f} rad".replace("-", "−"),
         start.lies(above=-numpy.pi - 0.5, below=0.5 - numpy.pi),
     )
@@ -74,7 +74,7 @@ def phase(results: Path) -> Section:
     )
     section.note = "; for slow drives the drive alone makes it so"
     section.why = (
-        f"{under[0].value:.2f} of the first breaks lie below φ_min where T > τ_r, {under[1].value:.2f} where T < τ_r;"
+        f"{under[1].value:.2f} of first breaks lie below φ_min where T < τ_r;"
         f" up to 1e-5 m/s the excess of R is {bounds_text(above, 'resultant')}"
     )
     return section
@@ -162,7 +162,7 @@ def below_one(results: Path) -> Section:
     absent = {velocity: False if one.low > 0 else one.lies(below=0.1) for velocity, one in off.items()}
     section.check(
         "oscillations have no influence",
-        "excess of the mean vector of the load phase, root mean square over sets: interval from 0 to below 0.1",
+        "rms over sets of the excess of the mean vector of the load phase: interval from 0 to below 0.1",
         texts,
         *absent.values(),
     )
@@ -201,5 +201,5 @@ def stiff_drive(results: Path) -> Section:
     under = first_breaks(section, high, "as in statement 5")
     claim, _, *found = envelope(high)
     section.check(claim, "as in statement 5", *found)
-    section.why = f"{under[1].text(2)} of the first breaks lie below φ_min where T < τ_r"
+    section.why = f"{under[1].value:.2f} of first breaks lie below φ_min where T < τ_r"
     return section

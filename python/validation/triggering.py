@@ -71,7 +71,7 @@ def pulses(results: Path) -> Section:
     }
     section.check(
         "pulses trigger slips",
-        "excess of their share above 0, at 1 µm",
+        "excess of the share above 0, at 1 µm",
         texts(excess, 2),
         *(found.lies(above=0) for found in excess.values()),
     )
@@ -86,8 +86,8 @@ def pulses(results: Path) -> Section:
     )
     later = {frequency: of_thirds(mine).among(COMPARISONS) for frequency, mine in by_frequency.items()}
     section.check(
-        "beyond the drive alone, they trigger most late in the cycle",
-        "excess of the share greater in the last third of the cycle than in the middle third, at 1 µm",
+        "beyond the drive alone, most late in the cycle",
+        "excess of the share greater in the last third than in the middle third, at 1 µm",
         f"by {texts(later, 2)}",
         *(found.lies(above=0) for found in later.values()),
     )
@@ -95,7 +95,7 @@ def pulses(results: Path) -> Section:
     advance, more = of_mean(late, "advance").among(COMPARISONS), of_mean(late, "advance", "advance_drive")
     section.check(
         "weak pulses advance slips before they trigger any",
-        "mean advance above 0 in the last third of the cycle, at 0.1 µm",
+        "mean advance above 0 in the last third, at 0.1 µm",
         f"{advance.text()} ⟨τ⟩, excess {more.text()}",
         advance.lies(above=0),
     )
@@ -123,15 +123,15 @@ def pulses(results: Path) -> Section:
     both = strongest.dropna(subset=["next_advance"])
     kept = jackknife(lambda rows: numpy.polyfit(rows["advance"], rows["next_advance"], 1)[0], both)
     section.remark(
-        "The first three are known of faults with rate-and-state friction ([van der Elst and Savage"
-        " 2015](https://doi.org/10.1002/2014JB011611)), responses of either sign of block chains ([Franović et al."
+        "The first three are known from rate-and-state friction ([van der Elst and Savage"
+        " 2015](https://doi.org/10.1002/2014JB011611)), responses of either sign from block chains ([Franović et al."
         " 2016](https://arxiv.org/abs/1606.03079)).",
         f"The slip after the next keeps {kept.text(2)} of the advance.",
         f"Negligible pulses (1e-15 m) shift slips by up to {1e3 * all_rows['noise'].max():.1f} ms: rounding errors grow (chaos).",
     )
     section.remark(
-        f"Intervals of the criteria are corrected for {COMPARISONS} comparisons (Bonferroni): the columns of the table, as"
-        " measured and as excess."
+        f"Intervals of criteria are corrected for {COMPARISONS} comparisons (Bonferroni): the columns of the table, measured and"
+        " excess."
     )
     section.why = (
         "weak pulses do what the drive alone does; in the middle of the cycle strong ones hold slips up at 29 Hz, and"

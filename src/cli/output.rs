@@ -115,7 +115,7 @@ impl fmt::Display for TextTable {
 
 /// A duration in the unit that suits it.
 pub fn duration(seconds: f64) -> String {
-    if seconds < 0.1 {
+    if seconds < 1.0 {
         format!("{} ms", Digits::THREE.number(1e3 * seconds))
     } else if seconds < 120.0 {
         format!("{seconds:.1} s")

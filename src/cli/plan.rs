@@ -109,7 +109,10 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     } else {
         output::pairs(&forecast.pairs(&sweep))?;
     }
-    Ok(Exit::Done)
+    // As `run` would.
+    let directory = forecast.directory.as_ref();
+    let is_refused = directory.is_some_and(|directory| directory.refused.is_some());
+    Ok(if is_refused { Exit::Usage } else { Exit::Done })
 }
 
 impl<'a> Forecast<'a> {

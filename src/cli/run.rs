@@ -120,15 +120,19 @@ impl Arguments {
         if let Some(out) = &self.out {
             return Ok((sweep, out.clone()));
         }
+        if changes.is_empty() || !Disk.exists(&root)? {
+            return Ok((sweep, root));
+        }
+        let layout = Layout::new(&Disk, &root);
         let is_own = |results: Results<'_>| results.sweep().text() == sweep.text();
-        if !changes.is_empty()
-            && Disk.exists(&root)?
-            && !Results::read(&Layout::new(&Disk, &root)).is_ok_and(is_own)
-        {
+        if !Results::read(&layout).is_ok_and(is_own) {
             let there = shown(&root);
-            let out = output::quoted_path(&root);
+            let extending = match Results::preview(&layout, &sweep) {
+                Ok(_) => format!(", or -o {} to extend that one", output::quoted_path(&root)),
+                Err(_) => String::new(),
+            };
             let problem = format!(
-                "--set, --axis: {there} holds another sweep; give a new directory with -o DIR, or -o {out} to extend that one"
+                "--set, --axis: {there} holds another sweep; give a new directory with -o DIR{extending}"
             );
             return Err(UsageError(problem).into());
         }

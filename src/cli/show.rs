@@ -9,7 +9,9 @@ use crate::reduce::{
     means_of_slips, pairs_of_edges, read_optional, read_sets, read_sets_in_rounds, renew,
 };
 use crate::results::Results;
-use crate::sets::{AllButSeed, Digits, FOUND, column_of, label, symbol_of, with_decimals};
+use crate::sets::{
+    AllButSeed, Digits, FOUND, by_frequency, column_of, label, symbol_of, with_decimals,
+};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
 use crate::table::columns::{Kind, Row as _};
@@ -178,7 +180,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
     }
     match &arguments.sort {
         Some(column) => sort(&mut all, column)?,
-        None => by_frequency(&mut all, |(row, _)| row),
+        None => by_frequency(&mut all, |(row, _)| &row.parameters),
     }
     let rows: Vec<SetRow> = all.iter().map(|(row, _)| row.clone()).collect();
     let columns = if arguments.columns.is_empty() {
@@ -213,7 +215,7 @@ fn show_sets(arguments: &Arguments, results: &Results<'_>) -> Result<()> {
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let results = &renew(results)?;
     let mut rows = sets(results, MAX_READ)?;
-    by_frequency(&mut rows, |row| row);
+    by_frequency(&mut rows, |row| &row.parameters);
     let columns = usual_columns(&usual_names(&rows.iter()), &rows);
     // A line that says how many more there are is as long as one of these.
     let first = FIRST + usize::from(count == FIRST as u64 + 1);
@@ -283,21 +285,6 @@ fn chosen_columns(
     all.retain(|values| columns.iter().all(|chosen| chosen.name() != values.name()));
     all.append(&mut columns);
     Ok(all)
-}
-
-/// Rows in the order of their parameters with frequencies, which are shown, in place of periods.
-fn by_frequency<R>(rows: &mut [R], set: impl Fn(&R) -> &SetRow) {
-    let all = AllButSeed::SYMBOLS.iter().copied();
-    let before_the_period: Vec<Symbol> = all.take_while(|symbol| *symbol != Symbol::T).collect();
-    let differ_in_period_at_most = |left: &R, right: &R| {
-        let [left, right] = [left, right].map(|row| &set(row).parameters);
-        let mut symbols = before_the_period.iter();
-        symbols.all(|symbol| left.get(*symbol) == right.get(*symbol))
-    };
-    for group in rows.chunk_by_mut(differ_in_period_at_most) {
-        let frequency = |row: &R| set(row).frequency.unwrap_or(0.0);
-        group.sort_by(|left, right| frequency(left).total_cmp(&frequency(right)));
-    }
 }
 
 fn sort(rows: &mut Vec<SetInRounds>, column: &str) -> Result<()> {

@@ -69,7 +69,13 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     if is_damaged {
         commands.push(format!("stickslip verify {root} --repair"));
     }
-    if !verification.whole || !verification.missing.is_empty() {
+    // A repair may have restored all.
+    let is_unfinished = if arguments.repair {
+        results.overview()?.jobs_missing > 0
+    } else {
+        !verification.whole || !verification.missing.is_empty()
+    };
+    if is_unfinished {
         commands.push(output::command(&results));
     }
     let report = Report {
@@ -88,10 +94,10 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     }
     Ok(if is_damaged || has_changed {
         Exit::Damaged
-    } else if verification.missing.is_empty() {
-        Exit::Done
-    } else {
+    } else if is_unfinished {
         Exit::Stopped
+    } else {
+        Exit::Done
     })
 }
 

@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, bounds, logarithmic_bounds, widened};
 use super::frame;
-use super::legend::{Mark, entry};
+use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Picture, PictureFormat};
 use super::style::{BLUE, Look, Place, RED, REFERENCE, Stroke};
@@ -27,15 +27,22 @@ fn drop_size(sizes: &DropSizes, look: &Look) -> Option<Picture> {
     let counts = || sizes.counts.iter().filter(|count| count.slips > 0);
     let (low, high) = logarithmic_bounds(counts().map(|count| count.least))?;
     let x = Axis::logarithmic(&format!("Drop size ({})", sizes.unit), low, high);
+    let chosen = (sizes.chosen, Stroke::solid(RED, 1.6), "the drop size");
+    let noise = (Some(10.0 * sizes.noise), REFERENCE, "ten times the noise");
+    let lines = [noise, chosen].into_iter();
+    let marked: Vec<(f64, Stroke, &str)> = lines
+        .filter_map(|(size, stroke, text)| {
+            Some((size.filter(|size| x.contains(*size))?, stroke, text))
+        })
+        .collect();
     let panel = |label: &str, places: Vec<Place>| {
         let (least, most) = widened(bounds(places.iter().map(|place| place.1))?);
         let y = Axis::linear(label, least.max(0.0), most);
-        let chosen = sizes
-            .chosen
-            .map(|size| Layer::Upright(size, Stroke::solid(RED, 1.6)));
-        let noise = Layer::Upright(10.0 * sizes.noise, REFERENCE);
         let curve = Layer::Curve(places, Stroke::solid(BLUE, 1.6));
-        let layers = [noise, curve].into_iter().chain(chosen);
+        let lines = marked
+            .iter()
+            .map(|(size, stroke, _)| Layer::Upright(*size, *stroke));
+        let layers = [curve].into_iter().chain(lines);
         Some(Panel::inside(200.0, x.clone(), y, layers))
     };
     let number = counts().map(|count| (count.least, count.slips as f64));
@@ -45,10 +52,10 @@ fn drop_size(sizes: &DropSizes, look: &Look) -> Option<Picture> {
         panel("Number of slips", number.collect())?,
         panel("Mean interval (s)", mean.collect())?,
     ];
-    let legend = [
-        entry(Mark::Line(Stroke::solid(RED, 1.6)), "the drop size"),
-        entry(Mark::Line(REFERENCE), "ten times the noise"),
-    ];
+    let legend: Vec<LegendEntry> = marked
+        .iter()
+        .map(|(_, stroke, text)| entry(Mark::Line(*stroke), *text))
+        .collect();
     Some(panel::draw(
         "drop-size",
         look,

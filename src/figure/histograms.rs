@@ -171,7 +171,7 @@ fn legend(panels: &[HistogramPanel<'_>]) -> Vec<LegendEntry> {
     let overlay = has_overlay.then(|| entry(Mark::Line(OVERLAY), "identical contacts, Δfₛ = 0"));
     let has_period = panels.iter().any(|panel| panel.period.is_some());
     let multiples = has_period.then(|| entry(Mark::Line(REFERENCE), "τ = nT"));
-    [entry(Mark::Patch(BAR), "slips of all seeds")]
+    [entry(Mark::Patch(BAR), "all slips")]
         .into_iter()
         .chain(overlay)
         .chain(multiples)

@@ -12,7 +12,7 @@ use super::values::Values;
 use crate::model::{Parameters, Symbol};
 use crate::results::tables::RecordedTable;
 use crate::results::{Results, ResultsError};
-use crate::sets::{SetRow, column_of, label};
+use crate::sets::{SetRow, by_frequency, column_of, label};
 use crate::table::columns::Kind;
 use std::collections::{BTreeMap, HashMap};
 
@@ -30,6 +30,7 @@ fn sets_in(results: &Results<'_>) -> Result<Vec<SetJobs>, ResultsError> {
         !plan.is_control(set)
     })?;
     sets.retain(|set| !set.finished.is_empty());
+    by_frequency(&mut sets, |set| &set.parameters);
     Ok(sets)
 }
 

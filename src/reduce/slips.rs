@@ -10,7 +10,7 @@ use crate::results::tables::{JobOfSlip, Loading, RecordedTable, gaps};
 use crate::results::{Results, ResultsError};
 use crate::sets::{AllButSeed, SetRow, Statistic};
 use crate::sweep::Expression;
-use crate::table::columns::{Row, columns};
+use crate::table::columns::{ANGLE, Row, columns};
 use std::collections::{BTreeMap, HashMap};
 
 /// Most slips in a figure: more hide each other, and make a picture of some megabytes.
@@ -182,7 +182,7 @@ pub fn means_of_slips(
     let Some(formula) = formula(name, &columns).ok().filter(is_known) else {
         return Ok(None);
     };
-    if matches!(formula, Expression::Name(place) if columns[place].unit == "rad") {
+    if matches!(formula, Expression::Name(place) if columns[place].unit == ANGLE) {
         let problem = format!(
             "{name}: an angle has no plain mean; phase_mean is the circular mean of the phase"
         );

@@ -5,7 +5,7 @@ mod label;
 
 pub use label::{Digits, Label, is_same, label, power_of_ten, setting, symbol_of, with_decimals};
 
-use crate::model::{Selected, Selection, Symbol};
+use crate::model::{Parameters, Selected, Selection, Symbol};
 use crate::observe::Regime;
 use crate::table::columns::{ANGLE, Class, Column, Interval, Row, columns, has_interval};
 use crate::table::tables;
@@ -50,6 +50,21 @@ pub struct AllButSeed;
 
 impl Selection for AllButSeed {
     const SYMBOLS: &'static [Symbol] = Symbol::ALL.split_last().expect("there are parameters").1;
+}
+
+/// Sorts sets, which are in the order of their parameters, by frequencies, which are shown, in place of periods.
+pub fn by_frequency<R>(sets: &mut [R], parameters: impl Fn(&R) -> &Parameters) {
+    let all = AllButSeed::SYMBOLS.iter().copied();
+    let before_the_period: Vec<Symbol> = all.take_while(|symbol| *symbol != Symbol::T).collect();
+    let differ_in_period_at_most = |left: &R, right: &R| {
+        let [left, right] = [left, right].map(&parameters);
+        let mut symbols = before_the_period.iter();
+        symbols.all(|symbol| left.get(*symbol) == right.get(*symbol))
+    };
+    for group in sets.chunk_by_mut(differ_in_period_at_most) {
+        let frequency = |set: &R| parameters(set).frequency().unwrap_or(0.0);
+        group.sort_by(|left, right| frequency(left).total_cmp(&frequency(right)));
+    }
 }
 
 columns! {

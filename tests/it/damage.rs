@@ -641,7 +641,7 @@ fn a_part_under_the_name_of_another_ends_every_command_that_reads_it_with_code_4
             );
         }
         folder.ends(4, "verify parts");
-        folder.ends(0, "verify parts --repair");
+        folder.ends(3, "verify parts --repair");
         assert_eq!(
             json(&folder.ends(0, "run parts --json").stdout)["jobs_run"],
             1

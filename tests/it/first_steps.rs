@@ -59,7 +59,7 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
     ] {
         let ended = folder.ends(0, &format!("{again} --no-reduce"));
         assert!(
-            ended.stdout.contains("jobs run") && ended.stdout.contains(" 0, 0 failed"),
+            ended.stdout.starts_with("jobs run         0\n"),
             "{again}: {}",
             ended.stdout
         );

@@ -419,7 +419,7 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
         }
         // The way out that the message gives.
         folder.ends(4, "verify r");
-        folder.ends(0, "verify r --repair");
+        folder.ends(3, "verify r --repair");
         let report = json(
             &folder
                 .ends(0, "run many.toml --out r --no-reduce --json")
