@@ -513,31 +513,33 @@ fn write(
     Ok(files)
 }
 
-/// What some parameters have in common, in symbols, but those left out.
+/// What some parameters have in common, in symbols, but those left out; of the modulation, what those with one have.
 pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>, left_out: &[Symbol]) -> String {
     let all: Vec<&Parameters> = all.collect();
-    let Some(first) = all.first() else {
-        return String::new();
-    };
+    let mut modulated = all.clone();
+    modulated.retain(|parameters| parameters.modulation_amplitude > 0.0);
     // What is off, or enters nothing that figures show, is left out, and the default of what the paper has no symbol
     // for.
-    let is_shown = |symbol: &Symbol| {
-        let value = first.get(*symbol);
-        !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
-            && !left_out.contains(symbol)
+    let shown = |symbol: Symbol| {
+        let is_of_modulation = matches!(symbol, Symbol::Delta | Symbol::T);
+        let those = if is_of_modulation && !modulated.is_empty() {
+            &modulated
+        } else {
+            &all
+        };
+        let value = those.first()?.get(symbol);
+        let is_shown = !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
+            && !left_out.contains(&symbol)
             && value != Value::Null
-            && (value != Parameters::default().get(*symbol)
+            && (value != Parameters::default().get(symbol)
                 || !symbol.description().symbol.is_empty())
-            && all
+            && those
                 .iter()
-                .all(|parameters| parameters.get(*symbol) == value)
+                .all(|parameters| parameters.get(symbol) == value);
+        is_shown.then(|| setting(symbol, value, value.number().as_slice()))?
     };
-    let setting = |symbol: Symbol| {
-        let value = first.get(symbol);
-        setting(symbol, value, value.number().as_slice())
-    };
-    let shown = Symbol::ALL.into_iter().filter(is_shown);
-    shown.filter_map(setting).collect::<Vec<_>>().join(", ")
+    let all = Symbol::ALL.into_iter().filter_map(shown);
+    all.collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -715,5 +717,13 @@ mod tests {
         );
         let symbols = [Symbol::RampTime, Symbol::Seed, Symbol::TauR, Symbol::V0].map(symbol_of);
         assert_eq!(symbols, ["ramp time", "seed", "τᵣ", "V₀"]);
+    }
+
+    #[test]
+    fn what_modulated_sets_have_in_common_is_said_beside_their_controls() {
+        let sets = [0.0, 1e-6, 1e-6].map(|amplitude| set(amplitude, 0.02, 4.0));
+        let found = common(sets.iter().map(|set| &*set.parameters), &[]);
+        let found = found.replace('\u{a0}', " ");
+        assert!(found.contains("Δ = 1 µm"), "{found}");
     }
 }

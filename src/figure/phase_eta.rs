@@ -76,7 +76,7 @@ pub(super) fn phase_eta(
         (
             !averages.is_empty(),
             Mark::Bar(AVERAGE),
-            "mean of all slips in a quarter of a decade of η, 95 %",
+            "mean in ¼ decade of η, 95 %",
         ),
         (has_curves, Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         (has_curves, Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),

@@ -213,7 +213,7 @@ columns! {
         breaks: Option<u64> = "", "contacts broken";
         reattachments: Option<u64> = "", "contacts reattached";
         averaged_time: Option<f64> = "s", "time that the three averages which follow are over";
-        mean_friction: Option<f64> = "N", "time average of the shear force: over whole cycles past start-up, and over what was slid after the last slip";
+        mean_friction: Option<f64> = "N", "time average of the shear force: from the last slip of start-up to the last slip, and over what was slid after it";
         attached_fraction: Option<f64> = "", "time average of the fraction of contacts that are attached, over the same time";
         slip_share: Option<f64> = "", "share of that time within slips, or sliding without one";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, by that share";

@@ -681,7 +681,7 @@ fn coverage_is_measured() {
          With fewer jobs the median is {:.1} %, and the half-width {:.2} in the median, {:.2} at most.\n\n\
          {}\n\
          ## Worst cells\n\n\
-         Sets with cells outside these limits, each statistic with its least coverage or greatest half-width.\n\
+         Sets with cells outside the limits of the columns, each statistic with its least coverage or greatest half-width.\n\
          τ_r is 5 ms, and 50 ms without modulation.\n\n{worst}\n\n\
          ## By statistic\n\n\
          From {MANY} jobs on, cells below {MIN_COVERAGE} %, coverage and the greatest half-width; and coverage with fewer.\n\
