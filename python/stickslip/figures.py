@@ -100,7 +100,7 @@ class Plot(Guessed):
         low, high = 0.8 * points["eta"].min(), 1.25 * points["eta"].max()
         axes.axvspan(min(low, 1), 1, color="0.9", zorder=0, label=r"$\eta$ < 1")
         _scatter(axes, points, "eta", "phase")
-        label = r"mean of all slips in a bin of $\eta$, 95 %"
+        label = r"mean in ¼ decade of $\eta$, 95 %"
         label = f"{described[0][0]}: {label}" if described else label
         _mark(axes, self._mean_phases(points), fmt="o", color=AVERAGE, markersize=4.5, label=label)
         for other, (name, _), marker in zip(others, described[1:], "Dsv^p", strict=False):
