@@ -5,9 +5,9 @@ import datetime
 import decimal
 import json
 import math
+import os
 import pathlib
 import random
-import os
 import re
 import resource
 import shlex
