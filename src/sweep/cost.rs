@@ -122,8 +122,10 @@ impl ExpectedMotion {
     }
 
     fn of(parameters: &Parameters, recording: &Recording) -> Self {
-        let longest = recording.max_time.unwrap_or(f64::INFINITY);
-        let given_up = recording.give_up_time(parameters).min(longest);
+        let given_up = || {
+            let longest = recording.max_time.unwrap_or(f64::INFINITY);
+            recording.give_up_time(parameters).min(longest)
+        };
         // A pulse is short.
         let lasting = match parameters.pulse_start {
             Some(_) => &parameters.without_modulation(),
@@ -131,9 +133,9 @@ impl ExpectedMotion {
         };
         let scales = Scales::of(lasting);
         if parameters.drive_velocity > critical_velocity(parameters) {
-            Self::sliding(&scales, parameters, recording, given_up)
+            Self::sliding(&scales, parameters, recording, given_up())
         } else if scales.swing > FOLLOWS {
-            Self::following(&scales, recording, given_up)
+            Self::following(&scales, recording, given_up())
         } else {
             Self::stick_slip(&scales, recording)
         }
@@ -268,8 +270,8 @@ fn critical_velocity(parameters: &Parameters) -> f64 {
 /// Time in which the drive loads a slip, in s.
 fn expected_loading(parameters: &Parameters) -> f64 {
     let contacts = parameters.blocks as f64 * parameters.block_contact_stiffness();
-    let share_of_first = end_stiffness(parameters) / contacts;
-    loading_time(parameters, LOADED_SHARE * share_of_first.sqrt())
+    let end = end_stiffness(parameters);
+    loading_time(parameters, LOADED_SHARE * (end / contacts).sqrt(), end)
 }
 
 /// About the largest frequency of the blocks, in rad/s.

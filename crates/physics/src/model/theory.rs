@@ -72,15 +72,16 @@ pub fn end_stiffness(parameters: &Parameters) -> f64 {
     endless.min(contacts * parameters.blocks as f64)
 }
 
-/// Time in which the drive loads a share of the total strength, in s.
-pub fn loading_time(parameters: &Parameters, share: f64) -> f64 {
-    let stiffness = 1.0 / (1.0 / parameters.drive_stiffness + 1.0 / end_stiffness(parameters));
+/// Time in which the drive loads a share of the total strength, in s, against the stiffness at the end of the slider.
+pub fn loading_time(parameters: &Parameters, share: f64, end_stiffness: f64) -> f64 {
+    let stiffness = 1.0 / (1.0 / parameters.drive_stiffness + 1.0 / end_stiffness);
     share * total_strength(parameters) / (stiffness * parameters.drive_velocity)
 }
 
 /// Typical interval between slips, in s: the time to load `LOADED_SHARE` of the strength, and one reattachment.
 pub fn typical_interval(parameters: &Parameters) -> f64 {
-    loading_time(parameters, LOADED_SHARE) + parameters.reattachment_time
+    let loading = loading_time(parameters, LOADED_SHARE, end_stiffness(parameters));
+    loading + parameters.reattachment_time
 }
 
 #[cfg(test)]
