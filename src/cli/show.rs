@@ -639,7 +639,7 @@ fn note_on_sliding(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
     ))
 }
 
-/// Shares of `tau_mean` below this are not told, as their digits would be zeros.
+/// A bias of `tau_mean` below this share is given as a bound, as its digits would be zeros.
 const SMALL_SHARE: f64 = 1e-3;
 
 fn note_on_cut_jobs(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {

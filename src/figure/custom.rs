@@ -409,6 +409,22 @@ pub(super) mod tests {
         };
         assert!(over("Delta").contains(pooled), "more values than shapes");
         assert!(!over("V0").contains(pooled) && !over("V0*Delta").contains(pooled));
+        // What has no mark is not pooled.
+        let mut of_one_velocity = rows(12);
+        let velocity = of_one_velocity[0].parameters.drive_velocity;
+        for row in &mut of_one_velocity {
+            row.tau_mean = row
+                .tau_mean
+                .filter(|_| row.parameters.drive_velocity == velocity);
+        }
+        let figure = CustomFigure {
+            x: "Delta".into(),
+            y: "tau_mean".into(),
+            ..measured.clone()
+        };
+        let all = drawn(12, &figure, &Look::default()).unwrap().svg();
+        let one = drawn_of(&of_one_velocity, &figure, &Look::default());
+        assert!(all.contains(pooled) && !one.unwrap().svg().contains(pooled));
     }
 
     #[test]

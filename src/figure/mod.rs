@@ -180,7 +180,7 @@ fn overview_of_sets(data: &Data<'_>) -> Option<Picture> {
     is_shown.then(|| overview::overview(sets, of_control, data.beside, &data.of_all()))?
 }
 
-/// Keeps rows for which a condition holds; refused if there is none.
+/// Keeps the rows for which a condition holds; an error if it holds for none.
 fn retain<R: Row>(rows: &mut Vec<R>, of: &str, text: &str) -> Result<(), BadOption> {
     let refused = |problem: String| BadOption::new("where", text, &problem);
     let condition = Condition::read(text, &R::columns()).map_err(refused)?;

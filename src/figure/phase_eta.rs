@@ -68,9 +68,7 @@ pub(super) fn phase_eta(
     let etas = of_others.iter().flatten().map(|mean| mean.0);
     let ends = [columns.first()?.edges.0, columns.last()?.edges.1];
     let (low, high) = bounds(etas.chain(ends))?;
-    let margin = (NARROWEST * low / high).sqrt().max(1.0);
-    let (low, high) = (low / margin, high * margin);
-    let x = Axis::logarithmic(&label("eta").axis(""), low, high);
+    let x = axis_of_eta(low, high);
     let has_curves = x.high > 1.0;
     let entries = [
         (
@@ -121,6 +119,12 @@ pub(super) fn phase_eta(
     let layout = Layout::column(WIDTH);
     let look = look.with_note(COLUMNS_IN_WORDS);
     Some(panel::draw(NAME, &look, layout, &entries, vec![panel]))
+}
+
+/// From `low` to `high`, or wider.
+fn axis_of_eta(low: f64, high: f64) -> Axis {
+    let margin = (NARROWEST * low / high).sqrt().max(1.0);
+    Axis::logarithmic(&label("eta").axis(""), low / margin, high * margin)
 }
 
 /// η and phase of slips under modulation.
@@ -223,6 +227,16 @@ mod tests {
             assert_eq!(column.values, (eta, eta));
             assert_eq!(column.edges, (eta / WIDEST, eta * WIDEST));
         }
+    }
+
+    #[test]
+    fn the_axis_of_one_eta_has_numbers() {
+        for eta in [0.037, 0.5, 1.0, 3.64, 9.1, 130.0, 1e4] {
+            let axis = axis_of_eta(eta / WIDEST, eta * WIDEST);
+            assert!(axis.ticks.len() >= 2, "{eta}: {:?}", axis.ticks);
+        }
+        let wide = axis_of_eta(0.2, 1000.0);
+        assert_eq!((wide.low, wide.high), (0.2, 1000.0));
     }
 
     #[test]

@@ -7,9 +7,9 @@
 //!
 //! `scripts/predicted-cost` measures jobs of all sweeps of this project, their axes wider by a factor of 3 at both ends,
 //! and random ones with 1 to 500 blocks of 1 to 160 contacts at 3e-7 to 6e-4 m/s, whose springs, delays and dampings
-//! vary by factors of 16 to 40. Of 332, 94 % cost a fifth to five times the prediction. Half to twice cost 92 % of those
-//! of sweeps and 69 % of random ones; 80 % of 679 others drawn in the same way, of which the numbers here were fitted to
-//! 240. What it cannot know is when chance ends a job: with few contacts, and where the slider hardly slips.
+//! vary by factors of 16 to 40. Of 332, 94 % cost a fifth to five times the prediction; half to twice cost 92 % of those
+//! of sweeps and 69 % of random ones. The numbers here were fitted to others, drawn in the same way. What it cannot know
+//! is when chance ends a job: with few contacts, and where the slider hardly slips.
 
 use crate::model::Parameters;
 use crate::model::theory::{end_stiffness, loading_time, total_strength, typical_interval};
@@ -45,8 +45,9 @@ const TAYLOR_SHARE: f64 = 0.3;
 const JOB_OVERHEAD: f64 = 6e-6;
 
 /// Share of the strength that the drive loads between slips, of a slider that moves as one. In a chain the first blocks
-/// bear the load, and it is less by the square root of the share of the contacts that they hold.
-const LOADED_SHARE: f64 = 0.72;
+/// bear the load, and it is less by the square root of the share of the contacts that they hold. Closer than the typical
+/// interval, which stays as it is because jobs give up by it.
+const LOADED_BY_ONE: f64 = 0.72;
 /// How long motion is resolved after a slip, in s, and how many times that more for a modulation whose amplitude is the
 /// way that the drive makes between slips.
 const RESOLVED_OF_A_SLIP: f64 = 0.04;
@@ -63,7 +64,8 @@ const LEAPS: f64 = 6.0;
 const FEW_LEAPS: f64 = 2.0;
 /// Steps of the grid that resolve a break of a slider that slides.
 const STEPS_OF_A_SLIDING_BREAK: f64 = 80.0;
-/// A slider with fewer contacts than this comes to rest by chance, in so many times the interval between slips.
+/// With fewer contacts than this, a sliding slider may come to rest by chance: at the latest after so many times the
+/// interval for each slip.
 const FEW_CONTACTS: f64 = 70.0;
 const REST: f64 = 1.3;
 
@@ -271,7 +273,7 @@ fn critical_velocity(parameters: &Parameters) -> f64 {
 fn expected_loading(parameters: &Parameters) -> f64 {
     let contacts = parameters.blocks as f64 * parameters.block_contact_stiffness();
     let end = end_stiffness(parameters);
-    loading_time(parameters, LOADED_SHARE * (end / contacts).sqrt(), end)
+    loading_time(parameters, LOADED_BY_ONE * (end / contacts).sqrt(), end)
 }
 
 /// About the largest frequency of the blocks, in rad/s.

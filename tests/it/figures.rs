@@ -121,7 +121,10 @@ fn each_slip_is_a_dot_with_the_unit_of_its_column_or_formula() {
     assert!(means.contains(">Precursors before the slip<") && means.contains("bars: 95 %"));
     folder.screens(
         "show_means_of_slips",
-        ["show r --columns next_interval,drop/peak_force"],
+        [
+            "show r --columns next_interval,drop/peak_force",
+            "show r --columns phase",
+        ],
     );
     for (options, words) in [
         (
