@@ -99,17 +99,6 @@ impl Axis {
         !self.is_log && self.minor.len() as f64 * CLOSE > length
     }
 
-    /// For data: logarithmic where these lie decades apart, and a little wider than they are; `None` without any.
-    pub(super) fn of_data(label: &str, values: impl Iterator<Item = f64> + Clone) -> Option<Self> {
-        let ends = bounds(values.clone())?;
-        let ends = if is_wide(ends) {
-            logarithmic_bounds(values)?
-        } else {
-            widened(ends)
-        };
-        Some(Self::spanning(label, ends))
-    }
-
     /// From `low` to `high`: logarithmic if these lie decades apart.
     pub(super) fn spanning(label: &str, (low, high): (f64, f64)) -> Self {
         Self::of_scale(is_wide((low, high)), label, low, high)

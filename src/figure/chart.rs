@@ -3,7 +3,7 @@
 
 use super::axis::Axis;
 use super::frame::{Ends, LEFT, Layout};
-use super::hues::Hues;
+use super::hues::{ColourBar, Hues};
 use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
@@ -52,12 +52,15 @@ pub(super) struct ChartRows<'a> {
     pub(super) sets: &'a [SetRow],
     /// The only set that was run as a control alone.
     pub(super) control: Option<&'a SetRow>,
-    /// The swept parameters of the first directory, by which its sets are joined and told apart.
+    /// The swept parameters of the first directory, by which its sets are joined and told apart. Of other rows, what
+    /// makes series of them; none of rows that are dots alone.
     pub(super) swept: &'a [Values],
     pub(super) beside: &'a Beside,
     /// Which of the sets are those of each other directory.
     pub(super) others: Vec<Range<usize>>,
 }
+
+static NOTHING_BESIDE: Beside = Beside::none();
 
 /// Sets against a column: a panel for each quantity and each value of another column.
 pub(super) struct Chart<'a> {
@@ -75,8 +78,9 @@ struct Marks {
     x_axis: Axis,
     hues: Option<Hues>,
     radius: f64,
-    /// Sets that are joined, line by line.
+    /// Sets that are joined, line by line, and whether each set is one of them.
     lines: Vec<Vec<usize>>,
+    is_on_line: Vec<bool>,
     /// Sets without modulation that are levels.
     free: Vec<usize>,
     /// The control on each axis of y, where it lies on it.
@@ -86,8 +90,65 @@ struct Marks {
     places: Vec<Option<usize>>,
 }
 
+/// The panels of a chart, quantity by quantity, without a height, and what explains them.
+pub(super) struct ChartParts {
+    pub(super) panels: Vec<Panel<'static>>,
+    bar: Option<ColourBar>,
+    pub(super) legend: Vec<LegendEntry>,
+    note: String,
+}
+
 impl<'a> Chart<'a> {
+    /// Of rows that are no sets: the first of what makes series of them gives colours, the second shapes.
+    pub(super) fn of_series(
+        of: &'static str,
+        series: &'a [Values],
+        x: Quantity<'a>,
+        y: Quantity<'a>,
+    ) -> Self {
+        Self {
+            of,
+            rows: ChartRows {
+                sets: &[],
+                control: None,
+                swept: series,
+                beside: &NOTHING_BESIDE,
+                others: Vec::new(),
+            },
+            x,
+            ys: vec![y],
+            colour: series
+                .first()
+                .map(|colour| Quantity::of_values("colour", colour.clone())),
+            panels: None,
+        }
+    }
+
     pub(super) fn draw(&self, name: &str, look: &Look) -> Result<Picture, BadOption> {
+        let ChartParts {
+            mut panels,
+            bar,
+            legend,
+            note,
+        } = self.parts()?;
+        let (layout, height) = layout(self.ys.len(), panels.len() / self.ys.len());
+        for (place, panel) in panels.iter_mut().enumerate() {
+            panel.height = height;
+            if panel.heading.is_some() && !place.is_multiple_of(layout.columns) {
+                panel.y.label.clear();
+            }
+        }
+        panels[layout.columns - 1].bar = bar;
+        Ok(panel::draw(
+            name,
+            &look.with_note(&note),
+            layout,
+            &legend,
+            panels,
+        ))
+    }
+
+    pub(super) fn parts(&self) -> Result<ChartParts, BadOption> {
         let Self { x, ys, .. } = self;
         let sets: Vec<usize> = (0..self.count())
             .filter(|&set| x.has(set) && ys.iter().any(|y| y.has(set)))
@@ -133,10 +194,16 @@ impl<'a> Chart<'a> {
             let value = y.factor * control?.number(y.name())?;
             Some(value).filter(|value| axis.contains(*value))
         };
+        let lines = self.lines(&sets);
+        let mut is_on_line = vec![false; self.count()];
+        for &set in lines.iter().flatten() {
+            is_on_line[set] = true;
+        }
         let dots = Marks {
             hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
             radius: if has_many { SMALL_RADIUS } else { RADIUS },
-            lines: self.lines(&sets),
+            lines,
+            is_on_line,
             x_axis,
             control: ys.iter().zip(&y_axes).map(level).collect(),
             free,
@@ -144,7 +211,6 @@ impl<'a> Chart<'a> {
             shape,
         };
         let groups = groups(self.panels.as_ref(), &sets)?;
-        let (layout, height) = layout(ys.len(), groups.len());
         let mut panels: Vec<Panel<'_>> = Vec::new();
         for ((y, axis), control) in ys.iter().zip(y_axes).zip(&dots.control) {
             for (title, members) in &groups {
@@ -153,22 +219,17 @@ impl<'a> Chart<'a> {
                     .into_iter()
                     .chain(self.layers(y, &dots, members))
                     .collect();
-                let mut panel = Panel::new(height, dots.x_axis.clone(), axis.clone(), layers);
-                if groups.len() > 1 {
-                    if !panels.len().is_multiple_of(layout.columns) {
-                        panel.y.label.clear();
-                    }
-                    panel.heading = Some(title.clone());
-                }
-                if panels.len() + 1 == layout.columns {
-                    panel.bar = dots.hues.as_ref().and_then(Hues::bar);
-                }
+                let mut panel = Panel::new(0.0, dots.x_axis.clone(), axis.clone(), layers);
+                panel.heading = (groups.len() > 1).then(|| title.clone());
                 panels.push(panel);
             }
         }
-        let noted = look.with_note(&self.note(&inside, &dots, bars_cut));
-        let legend = self.legend(&inside, &dots);
-        Ok(panel::draw(name, &noted, layout, &legend, panels))
+        Ok(ChartParts {
+            panels,
+            bar: dots.hues.as_ref().and_then(Hues::bar),
+            legend: self.legend(&inside, &dots),
+            note: self.note(&inside, &dots, bars_cut),
+        })
     }
 
     fn count(&self) -> usize {
@@ -215,20 +276,20 @@ impl<'a> Chart<'a> {
         self.rows.control.filter(is_of_all)
     }
 
-    /// Sets that differ in the x axis alone, in its order.
+    /// Sets that differ in the x axis alone, in its order; or the rows of each series.
     fn lines(&self, sets: &[usize]) -> Vec<Vec<usize>> {
-        let Some(symbol) = self.x.joined_along(self.rows.swept) else {
-            return Vec::new();
-        };
+        let Self { x, rows, .. } = self;
+        let is_series = rows.sets.is_empty() && !rows.swept.is_empty();
+        let along = x.joined_along(rows.swept);
         // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.
         let mut colour = self.colour.iter();
-        if colour.any(|colour| colour.symbol.is_none())
-            || self.ys.iter().any(|y| y.symbol.is_some())
-        {
+        let is_measured = colour.any(|colour| colour.symbol.is_none())
+            || self.ys.iter().any(|y| y.symbol.is_some());
+        if !is_series && (is_measured || along.is_none()) {
             return Vec::new();
         }
-        let is_other = |swept: &&Values| parameter(&swept.column) != Some(symbol);
-        let others = self.rows.swept.iter().filter(is_other);
+        let is_other = |swept: &&Values| along.is_none() || parameter(&swept.column) != along;
+        let others = rows.swept.iter().filter(is_other);
         let of_others: Vec<_> = others.map(Values::places).collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
         for &set in sets.iter().filter(|set| self.other(**set).is_none()) {
@@ -278,13 +339,13 @@ impl<'a> Chart<'a> {
     }
 
     /// Sets as dots, joined, with their intervals along both axes, over those without modulation and the drive's part.
-    fn layers(&self, y: &Quantity<'_>, dots: &Marks, members: &[usize]) -> Vec<Layer<'a>> {
+    fn layers(&self, y: &Quantity<'_>, dots: &Marks, members: &[usize]) -> Vec<Layer<'static>> {
         let level = |set: &usize| {
             let hues = dots.hues.as_ref();
             let ink = hues.map_or(GREY, |_| self.ink(dots, *set));
             Some(Layer::Level(y.number(*set)?, Stroke { ink, ..REFERENCE }))
         };
-        let mut layers: Vec<Layer<'a>> = Vec::new();
+        let mut layers: Vec<Layer<'static>> = Vec::new();
         layers.extend(self.reduction(y).map(|ends| Layer::Stripe(ends, STRIPE)));
         if y.column.column.class == Class::Excess {
             layers.push(Layer::Level(0.0, GRID));
@@ -306,7 +367,7 @@ impl<'a> Chart<'a> {
             of_members.retain(|set| members.contains(set));
             self.add_line(&mut layers, y, dots, &of_members);
         }
-        let dotted = members.iter().filter(|set| self.is_dotted(dots, **set));
+        let dotted = members.iter().filter(|set| Self::is_dotted(dots, **set));
         let alone = dotted.filter_map(|&set| self.drive_at(y, set));
         layers.push(Layer::Dots(alone.collect(), ALONE));
         for &set in members {
@@ -341,8 +402,8 @@ impl<'a> Chart<'a> {
     }
 
     /// Whether what the drive alone explains of a set is a dot, and not on a line.
-    fn is_dotted(&self, dots: &Marks, set: usize) -> bool {
-        dots.lines.is_empty() || self.other(set).is_some()
+    fn is_dotted(dots: &Marks, set: usize) -> bool {
+        !dots.is_on_line[set]
     }
 
     /// The place of what the drive alone explains.
@@ -353,7 +414,7 @@ impl<'a> Chart<'a> {
     /// Joins sets, those of one colour, and what the drive alone explains of them.
     fn add_line(
         &self,
-        layers: &mut Vec<Layer<'a>>,
+        layers: &mut Vec<Layer<'static>>,
         y: &Quantity<'_>,
         dots: &Marks,
         line: &[usize],
@@ -378,7 +439,13 @@ impl<'a> Chart<'a> {
     }
 
     /// The intervals of a set along both axes.
-    fn add_bars(&self, layers: &mut Vec<Layer<'a>>, y: &Quantity<'_>, dots: &Marks, set: usize) {
+    fn add_bars(
+        &self,
+        layers: &mut Vec<Layer<'static>>,
+        y: &Quantity<'_>,
+        dots: &Marks,
+        set: usize,
+    ) {
         let Some((at_x, at_y)) = self.place(y, set) else {
             return;
         };
@@ -473,7 +540,7 @@ impl Chart<'_> {
         let has_drive = |set: &&usize| self.ys.iter().any(|y| self.drive_at(y, **set).is_some());
         let explained = inside.iter().filter(&has_drive);
         let (dotted, joined): (Vec<usize>, Vec<usize>) =
-            explained.partition(|set| self.is_dotted(dots, **set));
+            explained.partition(|set| Self::is_dotted(dots, **set));
         let mut lines = dots.lines.iter();
         let has_curve = lines.any(|line| line.iter().filter(&has_drive).count() > 1);
         if !joined.is_empty() {
@@ -485,10 +552,11 @@ impl Chart<'_> {
             entries.push(entry(mark, "by the drive alone"));
         }
         if !dotted.is_empty() {
-            let of = if joined.is_empty() {
-                ""
-            } else {
+            let is_of_others = dotted.iter().all(|&set| self.other(set).is_some());
+            let of = if is_of_others && !joined.is_empty() {
                 ", for hollow marks"
+            } else {
+                ""
             };
             entries.push(entry(Mark::Dot(ALONE), format!("by the drive alone{of}")));
         }
@@ -503,13 +571,12 @@ impl Chart<'_> {
     fn unshown(&self) -> Vec<Values> {
         let quantities = self.ys.iter().chain([&self.x]).chain(&self.colour);
         let asked = quantities.map(|quantity| &quantity.column);
-        let sources = asked.chain(&self.panels).flat_map(|values| &values.sources);
-        let shown: Vec<Option<Symbol>> = sources.map(parameter).collect();
+        let all_asked: Vec<&Values> = asked.chain(&self.panels).collect();
+        let is_shown = |swept: &Values| all_asked.iter().any(|values| values.shows(&swept.column));
         let ranges = self.rows.others.iter();
         let others = ranges.flat_map(|sets| swept(&self.rows.sets[sets.clone()]));
         let all = self.rows.swept.iter().cloned().chain(others);
-        all.filter(|swept| !shown.contains(&parameter(&swept.column)))
-            .collect()
+        all.filter(|swept| !is_shown(swept)).collect()
     }
 
     /// Those that shapes do not show, either, of which there are marks with several values.

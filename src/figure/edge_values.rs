@@ -1,95 +1,106 @@
 //! Edges with their intervals against the one other quantity in which rows differ, a colour for each statistic.
 
-use super::axis::Axis;
+use super::chart::Chart;
 use super::frame::Layout;
-use super::legend::{Mark, entry};
-use super::panel::{self, Layer, Panel};
+use super::legend::{LegendEntry, Mark, entry};
+use super::panel::{self, Layer};
 use super::picture::Picture;
-use super::quantity::{axis_of, distinct};
-use super::style::{BAR_WIDTH, Dot, INKS, Look, RADIUS, Stroke};
-use crate::model::{Selection as _, Symbol};
-use crate::reduce::{EdgeRow, Ended, FREQUENCY, Interval, ascending};
-use crate::sets::{AllButSeed, column_of};
+use super::quantity::{Quantity, distinct};
+use super::style::{Look, Stroke};
+use crate::model::Selection as _;
+use crate::reduce::{EdgeRow, Ended, FREQUENCY, Values};
+use crate::sets::{AllButSeed, column_of, label};
 
 pub(super) const NAME: &str = "edges";
-
-/// A parameter of a row, or the frequency.
-fn value(key: &str, edge: &EdgeRow) -> Option<f64> {
-    match Symbol::from_key(key) {
-        Some(symbol) => edge.parameters.get(symbol).number(),
-        None => edge.parameters.modulation_period.map(|period| 1.0 / period),
-    }
-}
+const HEIGHT: f64 = 300.0;
 
 /// `None` if nothing else differs, or more than one quantity.
 pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let refined = edges.first()?.axis.as_str();
     let is_refined =
         |key: &str| key == refined || (key == FREQUENCY && ["T", "eta"].contains(&refined));
-    let differs = |key: &str| ascending(edges.iter().filter_map(|edge| value(key, edge))).len() > 1;
     let keys = AllButSeed::SYMBOLS.iter().copied().map(column_of);
-    let [key] = keys
-        .filter(|key| !is_refined(key) && differs(key))
-        .collect::<Vec<_>>()[..]
-    else {
-        return None;
+    let others = keys.filter(|key| !is_refined(key));
+    let values = others.filter_map(|key| Values::of(edges, key).ok());
+    let differing = values.filter(|values| values.distinct.len() > 1);
+    let [x] = <[Values; 1]>::try_from(differing.collect::<Vec<_>>()).ok()?;
+    let y = Values {
+        label: label(refined),
+        ..Values::of(edges, "edge").ok()?
     };
-    let (x_label, x_factor) = axis_of(key, edges.iter().filter_map(|edge| value(key, edge)));
-    let (y_label, y_factor) = axis_of(refined, edges.iter().filter_map(|edge| edge.edge));
-    let place = |edge: &EdgeRow| Some((x_factor * value(key, edge)?, y_factor * edge.edge?));
-    let bar = |edge: &EdgeRow| {
-        let Interval { low, high } = edge.edge_interval?;
-        Some((place(edge)?.0, (y_factor * low, y_factor * high)))
-    };
-    let places = || edges.iter().filter_map(place);
-    let ends = edges
-        .iter()
-        .filter_map(bar)
-        .flat_map(|(_, ends)| [ends.0, ends.1]);
-    // What has no edge is seen over all that was searched, or where it is unclear.
-    let searched = |edge: &EdgeRow| {
-        let ends = (y_factor * edge.bracket_low, y_factor * edge.bracket_high);
-        Some((x_factor * value(key, edge)?, ends))
-    };
-    let rows = edges.iter().filter_map(|edge| value(key, edge));
-    let x = Axis::of_data(&x_label, rows.map(|value| x_factor * value))?;
-    let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
-    let statistics = distinct(edges.iter().map(|edge| &*edge.statistic));
-    let mut legend = Vec::new();
-    let mut layers = Vec::new();
-    let mut without_edge = Vec::new();
-    for (statistic, ink) in statistics.into_iter().zip(INKS) {
-        let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
-        let crossed = of_it().next()?.crossed();
-        let without = || of_it().filter(|edge| edge.edge.is_none());
-        for ended in distinct(without().map(|edge| edge.ended.word())) {
-            let is_clear = ended == Ended::NoCrossing.word();
-            let stroke = Stroke::dashed(ink, 1.4, if is_clear { (6.0, 4.0) } else { (2.0, 2.0) });
-            legend.push(entry(Mark::Line(stroke), format!("{crossed}: {ended}")));
-            let ended_so = without().filter(|edge| edge.ended.word() == ended);
-            let bars = Layer::Bars(ended_so.filter_map(searched).collect(), stroke);
-            without_edge.push(bars);
-        }
-        let text = format!("{crossed}, 95 %");
-        legend.push(entry(Mark::Bar(Dot::solid(ink, RADIUS)), text));
-        let stroke = Stroke::solid(ink, BAR_WIDTH);
-        layers.push(Layer::Bars(of_it().filter_map(bar).collect(), stroke));
-        let dot = Dot::solid(ink, 0.7 * RADIUS);
-        layers.push(Layer::Dots(of_it().filter_map(place).collect(), dot));
+    let mut y = Quantity::of_values("y", y);
+    y.holds_bars = true;
+    let crossed: Vec<String> = edges.iter().map(EdgeRow::crossed).collect();
+    let crossed = Values::of_words("statistic", &crossed);
+    let directions = edges.iter().map(|edge| match edge.rises {
+        Some(false) => "falls at the edge".to_owned(),
+        _ => "rises at the edge".to_owned(),
+    });
+    let rises = Values::of_words("rises", &directions.collect::<Vec<_>>());
+    let is_both = rises.distinct.len() > 1;
+    let mut series = vec![crossed];
+    series.extend(Some(rises).filter(|_| is_both));
+    let chart = Chart::of_series("edges", &series, Quantity::of_values("x", x), y);
+    let mut parts = chart.parts().ok()?;
+    let all: Vec<usize> = (0..edges.len()).collect();
+    let searched = without_edge(edges, &chart);
+    for panel in &mut parts.panels {
+        panel.height = HEIGHT;
+        panel.x = chart.x.axis(&all).ok()?;
     }
-    if !without_edge.is_empty() {
-        layers.insert(0, Layer::Inside(without_edge));
+    let (explained, bars): (Vec<LegendEntry>, Vec<Layer<'_>>) = searched.into_iter().unzip();
+    parts.legend.extend(explained);
+    if let Some(Layer::Inside(layers)) = parts.panels[0].layers.first_mut() {
+        layers.splice(..0, bars);
     }
+    let noted = look.with_note("bars: 95 %");
     let layout = Layout::column(490.0);
-    let panels = vec![Panel::new(300.0, x, y, layers)];
-    Some(panel::draw(NAME, look, layout, &legend, panels))
+    Some(panel::draw(
+        NAME,
+        &noted,
+        layout,
+        &parts.legend,
+        parts.panels,
+    ))
+}
+
+/// What has no edge is seen over all that was searched, or where it is unclear.
+fn without_edge(edges: &[EdgeRow], chart: &Chart<'_>) -> Vec<(LegendEntry, Layer<'static>)> {
+    let factor = chart.ys[0].factor;
+    let text = |edge: &EdgeRow| format!("{}: {}", edge.crossed(), edge.ended.word());
+    let without = || {
+        edges
+            .iter()
+            .enumerate()
+            .filter(|(_, edge)| edge.edge.is_none())
+    };
+    let texts: Vec<String> = without().map(|(_, edge)| text(edge)).collect();
+    let of_text = |shown: &str| {
+        let own = || without().filter(|(_, edge)| text(edge) == shown);
+        let (first, edge) = own().next()?;
+        let colour = chart.colour.as_ref()?;
+        let ink = colour.hues().ok()?.ink(colour.number(first)?);
+        let dashes = match edge.ended {
+            Ended::NoCrossing => (6.0, 4.0),
+            _ => (2.0, 2.0),
+        };
+        let ends = |edge: &EdgeRow| (factor * edge.bracket_low, factor * edge.bracket_high);
+        let bars = own().filter_map(|(place, edge)| Some((chart.x.number(place)?, ends(edge))));
+        let stroke = Stroke::dashed(ink, 1.4, dashes);
+        let bars = Layer::Bars(bars.collect(), stroke);
+        Some((entry(Mark::Line(stroke), shown), bars))
+    };
+    let shown = distinct(texts.iter().map(String::as_str)).into_iter();
+    shown.filter_map(of_text).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::style::{BLACK, INKS};
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
+    use crate::reduce::Interval;
 
     fn edge(drive_velocity: f64, statistic: &str, edge: Option<f64>) -> EdgeRow {
         EdgeRow {
@@ -127,9 +138,9 @@ mod tests {
         for without in [">R, drive = 0.5: no crossing<", ">R = 0.5: unclear end<"] {
             assert!(svg.contains(without), "{without}");
         }
-        assert!(svg.contains(">R = 0.5, 95 %<") && svg.contains(">R, drive = 0.5, 95 %<"));
+        assert!(svg.contains(">R = 0.5<") && svg.contains(">R, drive = 0.5<"));
         assert!(
-            [INKS[0], INKS[1]]
+            [BLACK, INKS[0]]
                 .iter()
                 .all(|ink| svg.matches(&ink.to_string()).count() > 2)
         );

@@ -145,7 +145,9 @@ impl Layout {
 /// A text in lines that fit a width, broken at spaces that may be broken at.
 fn wrapped(text: &str, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split(' ').filter(|word| !word.is_empty()) {
+    // A percent sign stays with its number.
+    let kept = text.replace(" %", "\u{a0}%");
+    for word in kept.split(' ').filter(|word| !word.is_empty()) {
         match lines.last_mut() {
             Some(line) if text_width(&format!("{line} {word}"), NOTE_TEXT) <= width => {
                 line.push(' ');
@@ -500,10 +502,10 @@ mod tests {
     #[test]
     fn small_print_is_wrapped_at_spaces_and_complete() {
         let lines = wrapped(
-            "alpha beta  gamma\u{a0}delta epsilon",
+            "alpha beta  gamma\u{a0}delta 95 % epsilon",
             text_width("alpha beta g", NOTE_TEXT),
         );
-        assert_eq!(lines, ["alpha beta", "gamma delta", "epsilon"]);
+        assert_eq!(lines, ["alpha beta", "gamma delta", "95 %", "epsilon"]);
         assert_eq!(wrapped("longerthanaline", 10.0), ["longerthanaline"]);
         assert!(wrapped("", 10.0).is_empty());
     }

@@ -34,6 +34,8 @@ pub(super) struct Quantity<'a> {
     pub(super) unit: Cow<'static, str>,
     pub(super) is_log: bool,
     pub(super) limits: AxisLimits,
+    /// Whether the axis holds all error bars, however much longer they are than others.
+    pub(super) holds_bars: bool,
     pub(super) label: Option<&'a str>,
 }
 
@@ -86,6 +88,7 @@ impl Quantity<'_> {
             unit,
             is_log,
             limits: (None, None),
+            holds_bars: false,
             label: None,
         }
     }
@@ -207,8 +210,9 @@ impl Quantity<'_> {
         lengths.sort_by(f64::total_cmp);
         // Bars that are far longer than others run out of the frame.
         let longest = FAR_LONGER * quantile(&lengths, 0.5).unwrap_or(0.0);
+        let is_held = |bar: &Ends| self.holds_bars || length(*bar) <= longest;
         let shown = |&set: &usize| {
-            let bar = self.interval(set).filter(|&bar| length(bar) <= longest);
+            let bar = self.interval(set).filter(is_held);
             let ends = bar.map(|(low, high)| [low, high]);
             let drive = self.drive.as_ref().and_then(|drive| drive.numbers[set]);
             self.number(set)

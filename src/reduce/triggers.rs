@@ -11,7 +11,7 @@ use super::gather::Gathered;
 use crate::model::{Drive, Parameters, Selected};
 use crate::results::tables::All;
 use crate::sets::AllButSeed;
-use crate::table::columns::{Interval, columns};
+use crate::table::columns::{Class, Interval, columns};
 use crate::table::tables;
 use crate::table::value::words;
 use std::collections::{BTreeMap, BTreeSet};
@@ -67,14 +67,15 @@ columns! {
         place_low: f64 = "", "share of the cycle from which on they begin";
         place_high: f64 = "", "the share before which they begin; 0 and 1: the whole cycle";
         jobs: u64 = "", "jobs with such a pulse and a slip to compare";
-        advance_mean: Option<f64> = "", "mean advance over the mean interval of the control";
+        advance_mean: Option<f64> = "", "mean advance over the mean interval of the control",
+            "advance / ⟨τ⟩" "Advance / ⟨τ⟩", Class::Mean;
         advance_interval as "advance_mean": Option<Interval> = "", "lower end of its 95 % confidence interval; null with fewer than 8 seeds";
-        advance_drive: Option<f64> = "", "the same by the drive alone";
+        advance_drive: Option<f64> = "", "the same by the drive alone", "advance, drive", Class::ByDrive("advance_mean");
         advance_excess: Option<f64> = "", "advance_mean less advance_drive";
         advance_excess_interval as "advance_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        triggered_share: f64 = "", "share of slips that the pulse triggers";
+        triggered_share: f64 = "", "share of slips that the pulse triggers", "triggered" "Share of triggered slips", Class::Share;
         triggered_interval as "triggered_share": Option<Interval> = "", "lower end of its 95 % confidence interval; null with fewer than 8 seeds";
-        triggered_drive: f64 = "", "the same by the drive alone";
+        triggered_drive: f64 = "", "the same by the drive alone", "triggered, drive", Class::ByDrive("triggered_share");
         triggered_excess: f64 = "", "triggered_share less triggered_drive";
         triggered_excess_interval as "triggered_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
     }

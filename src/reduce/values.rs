@@ -36,7 +36,11 @@ impl Values {
     pub fn of<R: Row>(rows: &[R], name: &str) -> Result<Self, String> {
         let columns = R::columns();
         let Some(column) = place(name, &columns) else {
-            return Self::of_formula(rows, name, &columns);
+            return if name == FREQUENCY {
+                Self::frequencies(rows, &columns)
+            } else {
+                Self::of_formula(rows, name, &columns)
+            };
         };
         let mut numbers = Vec::new();
         let mut intervals = Vec::new();
@@ -95,6 +99,18 @@ impl Values {
         Ok(Self::of_numbers(text, &expression, columns, found))
     }
 
+    /// Of rows that have a period alone.
+    fn frequencies<R: Row>(rows: &[R], columns: &[Column]) -> Result<Self, String> {
+        let of_sets = SetRow::columns();
+        let place = of_sets.iter().position(|column| column.name == FREQUENCY);
+        let place = place.ok_or_else(|| unknown(FREQUENCY, columns))?;
+        Ok(Self {
+            column: of_sets[place].clone(),
+            label: Label::of(&of_sets, place),
+            ..Self::of_formula(rows, "1/T", columns)?
+        })
+    }
+
     /// The numbers of a formula of columns, with their unit, and their intervals.
     pub(super) fn of_numbers(
         text: &str,
@@ -114,7 +130,7 @@ impl Values {
     }
 
     /// A column of computed values and their intervals.
-    pub(super) fn computed(
+    pub fn computed(
         name: &str,
         label: Label,
         kind: Kind,
@@ -127,6 +143,37 @@ impl Values {
         };
         let (numbers, intervals) = found.into_iter().unzip();
         Self::new(column, label, numbers, intervals, Vec::new())
+    }
+
+    /// Words that need no symbol.
+    pub fn of_words(name: &str, given: &[String]) -> Self {
+        let mut words: Vec<String> = Vec::new();
+        let place = |word: &String| {
+            let known = words.iter().position(|known| known == word);
+            let place = known.unwrap_or_else(|| {
+                words.push(word.clone());
+                words.len() - 1
+            });
+            (Some(place as f64), None)
+        };
+        let found: Vec<_> = given.iter().map(place).collect();
+        let label = Label {
+            symbol: String::new(),
+            ..Label::new(name)
+        };
+        Self {
+            words,
+            ..Self::computed(name, label, Kind::Text, found)
+        }
+    }
+
+    /// Whether it is made of this column, or of one that stands for the same parameter.
+    pub fn shows(&self, column: &Column) -> bool {
+        let is_same = |source: &Column| {
+            let symbol = parameter(source);
+            source.name == column.name || symbol.is_some() && symbol == parameter(column)
+        };
+        self.sources.iter().any(is_same)
     }
 
     /// The same without η = 0, which stands for no modulation: as the period, it has no value there.
@@ -175,7 +222,10 @@ impl Values {
     pub fn setting(&self, value: f64) -> String {
         self.word(value).map_or_else(
             || self.label.setting(value, self.digits()),
-            |word| format!("{}: {word}", self.label.symbol),
+            |word| match &*self.label.symbol {
+                "" => word.to_owned(),
+                symbol => format!("{symbol}: {word}"),
+            },
         )
     }
 
