@@ -564,13 +564,9 @@ fn extremes<'a>(
 }
 
 /// A line for each set with cells that are off what is promised: their statistics with the least coverage or the
-/// greatest half-width. And a line for each of the other sets, with its least coverage.
-fn by_set(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> [String; 2] {
+/// greatest half-width.
+fn by_set(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> String {
     let mut off = Vec::new();
-    let mut others = vec![
-        format!("{SET} least |"),
-        "|---|---|---|---|---|---|---|".to_owned(),
-    ];
     for (index, set) in sets.iter().enumerate() {
         let own = || cells.iter().filter(move |cell| cell.set == index);
         let many = CellSummary::of(own().filter(|cell| cell.is_of_many()));
@@ -582,9 +578,7 @@ fn by_set(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> [String; 2] {
         let few = extremes(few, coverage, f64::min, 0);
         let wide = own().filter(|cell| cell.is_wide());
         let wide = extremes(wide, |cell| cell.width, f64::max, 2);
-        if [&low, &few, &wide].iter().all(|text| text.is_empty()) {
-            others.push(format!("{name} {least:.1} |"));
-        } else {
+        if [&low, &few, &wide].iter().any(|text| !text.is_empty()) {
             off.push((least, format!("{name} {low} | {few} | {wide} |")));
         }
     }
@@ -597,7 +591,7 @@ fn by_set(cells: &[CellOfSet], sets: &[(Parameters, SetRow)]) -> [String; 2] {
         "|---|---|---|---|---|---|---|---|---|".to_owned(),
     ];
     worst.extend(off.into_iter().map(|(_, line)| line));
-    [worst, others].map(|lines| lines.join("\n"))
+    worst.join("\n")
 }
 
 /// Every cell, for `docs/coverage.csv`.
@@ -673,7 +667,7 @@ fn coverage_is_measured() {
     let pulses = folder.join("coverage-pulses");
     let triggers: Vec<TriggerRow> = read_optional(&Layout::new(&Disk, &pulses)).unwrap();
     let seeds = SEEDS_OF_PULSES.map(|count| count.to_string()).join(", ");
-    let [worst, others] = by_set(&all, &sets);
+    let worst = by_set(&all, &sets);
     let text = format!(
         "{}\n\
          From {MANY} jobs on, {low} of {} cells lie below {MIN_COVERAGE} %, the least at {:.1} %; the median is {:.1} %.\n\
@@ -681,12 +675,11 @@ fn coverage_is_measured() {
          With fewer jobs the median is {:.1} %, and the half-width {:.2} in the median, {:.2} at most.\n\n\
          {}\n\
          ## Worst cells\n\n\
-         Sets with cells outside the limits of the columns, each statistic with its least coverage or greatest half-width.\n\
-         τ_r is 5 ms, and 50 ms without modulation.\n\n{worst}\n\n\
+         Those of {} sets with cells outside the limits of the columns, each statistic with its least coverage or\n\
+         greatest half-width. τ_r is 5 ms, and 50 ms without modulation.\n\n{worst}\n\n\
          ## By statistic\n\n\
          From {MANY} jobs on, cells below {MIN_COVERAGE} %, coverage and the greatest half-width; and coverage with fewer.\n\
          `{NOT_LISTED}` has the coverage of `mean_friction`.\n\n{}\n\n\
-         ## Other sets, from {MANY} jobs on\n\n{others}\n\n\
          ## The backbone\n\n\
          Twelve sets with η from 2 to 2.2 and Δ = 0.6 µm fall into one bin. They have two seeds of 15 slips in common.\n\
          In 100 repetitions the interval of the mean phase of all slips holds the true value in {slips:.1} %,\n\
@@ -705,6 +698,7 @@ fn coverage_is_measured() {
         few.width[1],
         few.width[2],
         include_str!("coverage_findings.md"),
+        sets.len(),
         by_statistic(&all, &statistics),
         of_pulses(&triggers),
         include_str!("coverage_measured.md"),
