@@ -110,6 +110,7 @@ impl Plan<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cost::predicted_cost;
     use super::super::{Extension, Job};
     use super::*;
     use std::path::Path;
@@ -124,6 +125,21 @@ mod tests {
             .jobs()
             .filter(|job| job.point >= sweep.point_count())
             .collect()
+    }
+
+    #[test]
+    fn each_job_has_the_cost_of_its_own_parameters() {
+        for axes in [
+            "V0 = [1e-5, 1e-4]\nDelta = [0, 1e-6]\nfrequency = [29, 58]\nseed = { count = 3 }",
+            "seed = { count = 3 }\nV0 = [1e-5, 1e-4]\nDelta = [1e-6, 2e-6]\nT = [0.02]",
+        ] {
+            let sweep = sweep(&format!("[axes]\n{axes}\n"));
+            assert!(sweep.jobs().count() > 8);
+            for job in sweep.jobs() {
+                let own = predicted_cost(&job.parameters, &sweep.recording, sweep.solver);
+                assert_eq!(job.cost, own, "{}", job.point);
+            }
+        }
     }
 
     #[test]
