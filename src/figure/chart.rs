@@ -321,11 +321,11 @@ impl<'a> Chart<'a> {
         if dots.shape.is_some() {
             return dots.places[set].and_then(|place| SHAPES[place]);
         }
-        self.shape_of_colour(dots, self.colour.as_ref()?.number(set)?)
+        self.shape_of_colour(dots, self.colour.as_ref()?.number(set))
     }
 
     /// That of a colour, unless shapes show something else.
-    fn shape_of_colour(&self, dots: &Marks, value: f64) -> Option<Polygon> {
+    fn shape_of_colour(&self, dots: &Marks, value: Option<f64>) -> Option<Polygon> {
         let is_free = dots.shape.is_none() && self.rows.others.is_empty();
         dots.hues.as_ref()?.shape(value).filter(|_| is_free)
     }
@@ -498,13 +498,15 @@ impl Chart<'_> {
             let shown = [inside, &dots.free].concat();
             let numbers: Vec<Option<f64>> = shown.iter().map(|&set| colour.number(set)).collect();
             let dot = |value| {
-                let shape = self.shape_of_colour(dots, value);
+                let shape = self.shape_of_colour(dots, Some(value));
                 Dot::solid(hues.ink(value), RADIUS).with_shape(shape)
             };
             entries.extend(hues.entries(dot, |value| numbers.contains(&Some(value))));
             if inside.iter().any(|&set| colour.number(set).is_none()) {
                 let text = without_value(&colour.column);
-                entries.push(entry(Mark::Dot(Dot::solid(GREY, RADIUS)), text));
+                let shape = self.shape_of_colour(dots, None);
+                let dot = Dot::solid(GREY, RADIUS).with_shape(shape);
+                entries.push(entry(Mark::Dot(dot), text));
             }
         }
         if let Some(shaped) = &dots.shape {

@@ -6,7 +6,9 @@ use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Anchor, Picture};
 use super::quantity::axis_of;
-use super::style::{Dot, GRID, INKS, Ink, LEGEND_TEXT, Look, Stroke};
+use super::style::{
+    Dot, Fill, GRID, INKS, LEGEND_TEXT, Look, RADIUS, SQUARE, Stroke, WHITE, text_width,
+};
 use crate::reduce::{Point, RampStage, quantile};
 use crate::sets::label;
 
@@ -20,11 +22,17 @@ const LAYOUT: Layout = Layout {
     right: NUMBERS,
     ..Layout::column(520.0)
 };
-/// The stages of the ramp, their names and inks.
-const STAGES: [(RampStage, &str, Ink); 2] = [
-    (RampStage::Up, "there", INKS[0]),
-    (RampStage::Down, "back", INKS[1]),
+/// The stages of the ramp, their names and large dots.
+const STAGES: [(RampStage, &str, Dot); 2] = [
+    (RampStage::Up, "there", Dot::solid(INKS[0], RADIUS)),
+    (
+        RampStage::Down,
+        "back",
+        Dot::solid(INKS[1], RADIUS).with_shape(Some(SQUARE)),
+    ),
 ];
+/// Of a slip.
+const SMALL_RADIUS: f64 = 2.0;
 /// Share of the intervals at either end that the axis of the medians leaves out.
 const RARE: f64 = 0.02;
 /// Bins of the modulation, and least intervals in one that has a median.
@@ -80,7 +88,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
 
     let (low, high) = widened(ends);
     let x = Axis::linear(&x_label, low, high);
-    let medians = STAGES.map(|(_, name, ink)| entry(Mark::Bar(Dot::solid(ink, 4.5)), name));
+    let medians = STAGES.map(|(_, name, dot)| entry(Mark::Bar(dot), name));
     let lines = entry(Mark::Line(GRID), "τ = nT");
     let entries: Vec<LegendEntry> = medians.into_iter().chain([lines]).collect();
     // τ = nT is a curve in T, and level in Δ.
@@ -89,8 +97,11 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let line = |n: f64| [low, high].map(|at| (at, n * factor * period_at(at)));
     // Slip by slip, so that neither stage covers the other.
     let dots = slips.iter().map(|slip| {
-        let dot = Dot::solid(STAGES[slip.stage].2, 2.0);
-        Layer::Dots(vec![(slip.x, slip.tau)], dot.with_opacity(0.45))
+        let dot = Dot {
+            radius: SMALL_RADIUS,
+            ..STAGES[slip.stage].2.with_opacity(0.45)
+        };
+        Layer::Dots(vec![(slip.x, slip.tau)], dot)
     });
     // Where lines leave the frame: at its right, or through its top.
     let end = |n: f64| {
@@ -103,8 +114,24 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let numbers = Layer::Drawn(Box::new(move |sheet, frame| {
         for (n, end) in ends_of_lines {
             let (x, y) = frame.place(end);
-            let place = (x + 6.0, y.max(frame.top + BELOW_TOP));
-            sheet.centred_text(place, &format!("n = {n}"), LEGEND_TEXT, Anchor::Start);
+            let (left, middle) = (x + 6.0, y.max(frame.top + BELOW_TOP));
+            let text = format!("n = {n}");
+            // No line strikes it through.
+            let height = f64::from(LEGEND_TEXT);
+            let ground = [
+                left,
+                middle - 0.5 * height,
+                text_width(&text, LEGEND_TEXT),
+                height,
+            ];
+            sheet.rectangle(
+                ground,
+                Fill {
+                    ink: WHITE,
+                    opacity: 1.0,
+                },
+            );
+            sheet.centred_text((left, middle), &text, LEGEND_TEXT, Anchor::Start);
         }
     }));
     let lines = multiples().map(|n| Layer::Curve(line(n).into(), GRID));
@@ -122,7 +149,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
 fn medians_of<'a>(slips: &[RampedSlip], (low, high): Ends) -> Vec<Layer<'a>> {
     let width = (high - low) / f64::from(BINS);
     let mut layers = Vec::new();
-    for (stage, (_, _, ink)) in STAGES.into_iter().enumerate() {
+    for (stage, (_, _, dot)) in STAGES.into_iter().enumerate() {
         for bin in 0..BINS {
             let start = low + f64::from(bin) * width;
             let is_last = bin + 1 == BINS;
@@ -139,9 +166,9 @@ fn medians_of<'a>(slips: &[RampedSlip], (low, high): Ends) -> Vec<Layer<'a>> {
                 && of_bin.len() >= MIN_INTERVALS
             {
                 let x = start + (0.5 + OFFSETS[stage]) * width;
-                let stroke = Stroke::solid(ink, 2.0);
+                let stroke = Stroke::solid(dot.ink, 2.0);
                 layers.push(Layer::Bars(vec![(x, (first, third))], stroke));
-                layers.push(Layer::Dots(vec![(x, median)], Dot::solid(ink, 4.5)));
+                layers.push(Layer::Dots(vec![(x, median)], dot));
             }
         }
     }

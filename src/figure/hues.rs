@@ -6,7 +6,8 @@ use super::frame::{Frame, OVERLAP, fitting, outline};
 use super::legend::{LegendEntry, Mark, entry};
 use super::picture::{Anchor, Picture};
 use super::style::{
-    AXIS, BLACK, Dot, INKS, Ink, LEGEND_TEXT, NOTE_TEXT, Polygon, SCALE, SHAPES, TICK_TEXT, shade,
+    AXIS, BLACK, Dot, INKS, Ink, LEGEND_TEXT, NOTE_TEXT, PENTAGON, Polygon, SCALE, SHAPES,
+    TICK_TEXT, shade,
 };
 use crate::reduce::{ascending, is_same};
 use crate::table::value::floored;
@@ -60,10 +61,14 @@ impl Hues {
         }
     }
 
-    /// Each ink has its own, which distinguishes them in grey.
-    pub(super) fn shape(&self, value: f64) -> Option<Polygon> {
-        let place = INKS.iter().position(|ink| *ink == self.ink(value))?;
-        SHAPES[place].filter(|_| matches!(self, Self::Inks(_)))
+    /// Each ink has its own, which distinguishes them in grey, and so has what is off or has no value.
+    pub(super) fn shape(&self, value: Option<f64>) -> Option<Polygon> {
+        let own = value.map(|value| self.ink(value));
+        let shape = match INKS.iter().position(|ink| Some(*ink) == own) {
+            Some(place) => SHAPES[place],
+            None => Some(PENTAGON),
+        };
+        shape.filter(|_| matches!(self, Self::Inks(_)))
     }
 
     /// Entries of the legend of values that are shown.

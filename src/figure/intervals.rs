@@ -9,14 +9,16 @@ use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, MeanPlace, Panel};
 use super::picture::Picture;
 use super::quantity::axis_of;
-use super::style::{DARK_GREY, Dot, GREY, GRID, LIGHT_GREY, Look, Place};
+use super::style::{DARK_GREY, Dot, GREY, GRID, LIGHT_GREY, Look, Place, WHITE};
 use crate::reduce::{Point, SetRow, ascending, is_same};
 use crate::sets::{Digits, label};
 
 pub(super) const NAME: &str = "tau-T";
 
 const RADIUS: f64 = 1.8;
-const OTHER: Dot = Dot::solid(LIGHT_GREY, RADIUS).with_opacity(0.6);
+/// Slips of sets without a preferred phase are rings, which no colour of a scale resembles.
+const OTHER: Dot = Dot::solid(LIGHT_GREY, 2.2);
+const HOLE: Dot = Dot::solid(WHITE, 1.2);
 /// Whole numbers whose lines can be distinguished.
 const LINES: u32 = 12;
 
@@ -88,11 +90,8 @@ pub(super) fn intervals(points: &[Point], beside: &Beside, look: &Look) -> Optio
         ));
     }
     if !unphased.is_empty() {
-        let dot = Dot { ink: GREY, ..OTHER };
-        entries.push(entry(
-            Mark::Dot(dot),
-            "slips of sets without a preferred phase",
-        ));
+        let ring = Mark::Ring(GREY, WHITE, 1.5 * OTHER.radius, 1.5 * HOLE.radius);
+        entries.push(entry(ring, "slips of sets without a preferred phase"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     let own = Mark::Dot(Dot::solid(DARK_GREY, RADIUS));
@@ -101,8 +100,10 @@ pub(super) fn intervals(points: &[Point], beside: &Beside, look: &Look) -> Optio
         let mut layers: Vec<Layer<'_>> = (1..=lines)
             .map(|n| Layer::Level(f64::from(n), GRID))
             .collect();
-        let places = unphased.iter().map(|slip| slip.1);
-        layers.push(Layer::Dots(places.collect(), OTHER));
+        for dot in [OTHER, HOLE] {
+            let places = unphased.iter().map(|slip| slip.1);
+            layers.push(Layer::Dots(places.collect(), dot));
+        }
         layers.extend(phased.iter().map(|&&(point, place)| {
             let dot = Dot::solid(hues.ink(value(point)), RADIUS);
             Layer::Dots(vec![place], dot.with_opacity(0.8))

@@ -283,11 +283,11 @@ pub(super) const RADIUS: f64 = 4.2;
 /// corner.
 pub(super) type Polygon = (u32, f64);
 
-const SQUARE: Polygon = (4, 0.5);
+pub(super) const SQUARE: Polygon = (4, 0.5);
 const DIAMOND: Polygon = (4, 0.0);
 const TRIANGLE: Polygon = (3, 0.0);
 const TURNED_TRIANGLE: Polygon = (3, 0.5);
-const PENTAGON: Polygon = (5, 0.0);
+pub(super) const PENTAGON: Polygon = (5, 0.0);
 
 /// Of dots: they distinguish series in grey, too.
 pub(super) const SHAPES: [Option<Polygon>; INKS.len()] = [

@@ -401,12 +401,11 @@ fn sets_without_modulation_stand_in_every_panel_of_a_period() {
         own.contains(">(b)<") && !own.contains(">(c)<"),
         "no panel of its own"
     );
-    // In the colour of what is off: four sets in either panel, and the legend's dot.
-    assert_eq!(
-        own.matches(r##"r="4.2" fill="#000000""##).count(),
-        2 * 4 + 1,
-        "{own}"
-    );
+    // Pentagons in the colour of what is off: four sets in either panel, and the legend's dot.
+    let marks = own.split("<path").skip(1);
+    let paths = marks.filter_map(|mark| mark.split("/>").next());
+    let pentagons = paths.filter(|path| path.contains("#000000") && path.matches('L').count() == 5);
+    assert_eq!(pentagons.count(), 2 * 4 + 1, "{own}");
 }
 
 #[test]
