@@ -28,13 +28,6 @@ pub struct Beside {
 }
 
 impl Beside {
-    pub(super) const fn none() -> Self {
-        Self {
-            names: Vec::new(),
-            others: Vec::new(),
-        }
-    }
-
     /// Reads the others, whose reduced data are up to date. `names` are those of all; by default, they are the shortest
     /// ends of the paths that differ.
     pub fn read(first: &Results<'_>, others: &[Results<'_>], names: &[String]) -> Result<Self> {

@@ -20,6 +20,7 @@ use crate::sets::parameter;
 use crate::table::columns::{Class, Column};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::LazyLock;
 
 /// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
 const REDUCTION: Ends = (0.2, 0.3);
@@ -52,15 +53,15 @@ pub(super) struct ChartRows<'a> {
     pub(super) sets: &'a [SetRow],
     /// The only set that was run as a control alone.
     pub(super) control: Option<&'a SetRow>,
-    /// The swept parameters of the first directory, by which its sets are joined and told apart. Of other rows, what
-    /// makes series of them; none of rows that are dots alone.
+    /// The swept parameters of the first directory, which decide which of its sets are joined and share a mark. For
+    /// other rows, the columns that split them into series; empty if they are not joined.
     pub(super) swept: &'a [Values],
     pub(super) beside: &'a Beside,
     /// Which of the sets are those of each other directory.
     pub(super) others: Vec<Range<usize>>,
 }
 
-static NOTHING_BESIDE: Beside = Beside::none();
+static NOTHING_BESIDE: LazyLock<Beside> = LazyLock::new(Beside::default);
 
 /// Sets against a column: a panel for each quantity and each value of another column.
 pub(super) struct Chart<'a> {
@@ -99,7 +100,7 @@ pub(super) struct ChartParts {
 }
 
 impl<'a> Chart<'a> {
-    /// Of rows that are no sets: the first of what makes series of them gives colours, the second shapes.
+    /// Of rows that are no sets, in series: the first column that splits them gives colours, the second shapes.
     pub(super) fn of_series(
         of: &'static str,
         series: &'a [Values],

@@ -31,8 +31,8 @@ const STAGES: [(RampStage, &str, Dot); 2] = [
         Dot::solid(INKS[1], RADIUS).with_shape(Some(SQUARE)),
     ),
 ];
-/// Of a slip.
-const SMALL_RADIUS: f64 = 2.0;
+/// Of the dot of a slip.
+const SLIP_RADIUS: f64 = 2.0;
 /// Share of the intervals at either end that the axis of the medians leaves out.
 const RARE: f64 = 0.02;
 /// Bins of the modulation, and least intervals in one that has a median.
@@ -98,7 +98,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     // Slip by slip, so that neither stage covers the other.
     let dots = slips.iter().map(|slip| {
         let dot = Dot {
-            radius: SMALL_RADIUS,
+            radius: SLIP_RADIUS,
             ..STAGES[slip.stage].2.with_opacity(0.45)
         };
         Layer::Dots(vec![(slip.x, slip.tau)], dot)
@@ -114,7 +114,8 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let numbers = Layer::Drawn(Box::new(move |sheet, frame| {
         for (n, end) in ends_of_lines {
             let (x, y) = frame.place(end);
-            let (left, middle) = (x + 6.0, y.max(frame.top + BELOW_TOP));
+            let left = x + 6.0;
+            let middle = y.max(frame.top + BELOW_TOP);
             let text = format!("n = {n}");
             // No line strikes it through.
             let height = f64::from(LEGEND_TEXT);

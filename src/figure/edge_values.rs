@@ -37,7 +37,8 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
         _ => "rises at the edge".to_owned(),
     });
     let rises = Values::of_words("rises", &directions.collect::<Vec<_>>());
-    let is_both = rises.distinct.len() > 1;
+    let has = |direction| edges.iter().any(|edge| edge.rises == Some(direction));
+    let is_both = has(true) && has(false);
     let mut series = vec![crossed];
     series.extend(Some(rises).filter(|_| is_both));
     let chart = Chart::of_series("edges", &series, Quantity::of_values("x", x), y);
@@ -111,6 +112,8 @@ mod tests {
             axis: "Delta".to_owned(),
             statistic: statistic.to_owned(),
             threshold: 0.5,
+            bracket_low: 1e-6,
+            bracket_high: 2e-6,
             edge,
             edge_interval: edge.map(|edge| Interval {
                 low: 0.9 * edge,
@@ -134,11 +137,39 @@ mod tests {
             },
         ];
         let svg = edges(&rows, &Look::default()).unwrap().svg();
+        let mut both = rows.clone();
+        both[0].rises = Some(true);
+        both[1].rises = Some(true);
+        both[2].rises = Some(false);
+        let of_both = edges(&both, &Look::default()).unwrap().svg();
+        for direction in [">rises at the edge<", ">falls at the edge<"] {
+            assert!(of_both.contains(direction), "{direction}");
+        }
+        let falling = both.map(|edge| EdgeRow {
+            rises: edge.edge.map(|_| false),
+            ..edge
+        });
+        let of_falling = edges(&falling, &Look::default()).unwrap().svg();
+        assert!(
+            !of_falling.contains("at the edge"),
+            "all fall, or have no edge"
+        );
         assert!(svg.contains("Drive velocity") && svg.contains("Amplitude Δ"));
         for without in [">R, drive = 0.5: no crossing<", ">R = 0.5: unclear end<"] {
             assert!(svg.contains(without), "{without}");
         }
         assert!(svg.contains(">R = 0.5<") && svg.contains(">R, drive = 0.5<"));
+        let dashes = |svg: &str| svg.matches(r#"stroke-width="1.4"#).count();
+        let nothing_searched = rows.clone().map(|edge| EdgeRow {
+            bracket_high: edge.bracket_low,
+            ..edge
+        });
+        let legend_alone = edges(&nothing_searched, &Look::default()).unwrap().svg();
+        assert!(
+            dashes(&svg) > dashes(&legend_alone),
+            "what was searched is drawn"
+        );
+        assert!(!svg.contains("at the edge"), "all have one direction");
         assert!(
             [BLACK, INKS[0]]
                 .iter()

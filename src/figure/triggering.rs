@@ -69,7 +69,7 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
     Some(panel::draw(NAME, &noted, layout, &legend, panels))
 }
 
-/// Series by frequency, of which the first axis begins at 0, as the share does.
+/// A series for each frequency: advances over the cycle, with a panel for each value of a column; else shares from 0 on.
 fn parts_of(rows: &[PulseRow], [x, y]: [&str; 2], panels: Option<&str>) -> Option<ChartParts> {
     let series = [Values::of(rows, FREQUENCY).ok()?];
     let mut x = Quantity::of(rows, "x", x).ok()?;

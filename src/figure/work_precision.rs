@@ -37,7 +37,6 @@ pub struct ErrorPanel {
     pub label: String,
     /// The largest error that chance alone gives, > 0, if it gives any.
     pub by_chance: Option<f64>,
-    /// Those of a method under a drive in the order of settings.
     pub points: Vec<WorkPrecision>,
 }
 

@@ -46,7 +46,7 @@ const JOB_OVERHEAD: f64 = 6e-6;
 
 /// Share of the strength that the drive loads between slips, of a slider that moves as one. In a chain the first blocks
 /// bear the load, and it is less by the square root of the share of the contacts that they hold. Closer than the typical
-/// interval, which stays as it is because jobs give up by it.
+/// interval, which must not change: it decides when jobs give up.
 const LOADED_BY_ONE: f64 = 0.72;
 /// How long motion is resolved after a slip, in s, and how many times that more for a modulation whose amplitude is the
 /// way that the drive makes between slips.
@@ -64,8 +64,7 @@ const LEAPS: f64 = 6.0;
 const FEW_LEAPS: f64 = 2.0;
 /// Steps of the grid that resolve a break of a slider that slides.
 const STEPS_OF_A_SLIDING_BREAK: f64 = 80.0;
-/// With fewer contacts than this, a sliding slider may come to rest by chance: at the latest after so many times the
-/// interval for each slip.
+/// With fewer contacts than this, a slider that slides comes to rest by chance, once in so many intervals.
 const FEW_CONTACTS: f64 = 70.0;
 const REST: f64 = 1.3;
 
