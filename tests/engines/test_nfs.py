@@ -30,6 +30,22 @@ def test_three_hosts_mount_both_versions(guest):
     assert " /mnt/3 nfs " in mounts and "vers=3" in mounts and "local_lock=all" in mounts
 
 
+def test_a_lock_on_nfs_3_is_seen_on_its_own_mount_alone(guest):
+    guest.run("server", "touch /mnt/disk/lock; chmod 666 /mnt/disk/lock")
+
+    def is_seen(holder, mount, other, its):
+        held = guest.start(holder, f"flock --nonblock {mount}/lock bash -c 'echo held; sleep 5'")
+        wait_until(lambda: "held" in held.output(), 60, "the lock is held")
+        taken = guest.start(other, f"flock --nonblock {its}/lock true")
+        wait_until(lambda: taken.status() is not None, 60, "the other has tried")
+        held.wait()
+        return taken.status() != 0
+
+    assert is_seen("h1", "/mnt/3", "h1", "/mnt/3") and is_seen("h1", "/mnt/4.2", "h2", "/mnt/4.2")
+    others = [("h1", "/mnt/3", "h2", "/mnt/3"), ("h1", "/mnt/3", "h1", "/mnt/4.2")]
+    assert not any(is_seen(*pair) for pair in [*others, ("server", "/mnt/disk", "h1", "/mnt/3")])
+
+
 def start(guest, host, version, name):
     """Starts a run of the sweep on a host; its process id goes to a file."""
     program = "/run/sandbox/stickslip run /run/sandbox/shared.toml"
