@@ -52,7 +52,7 @@ pub struct Arguments {
     /// Leave the small print to the caption; that of a custom figure is printed
     #[arg(long)]
     no_caption: bool,
-    /// Another results directory, computed or measured, as hollow marks in phi-eta, tau-T, overview and custom figures
+    /// Another results directory, computed or measured, as hollow marks in phi-eta, overview and custom figures
     /// of sets. Repeatable
     #[arg(long = "with", value_name = "DIR")]
     others: Vec<PathBuf>,

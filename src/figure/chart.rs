@@ -43,6 +43,9 @@ pub(super) const LINE_WIDTH: f64 = 1.0;
 /// Sets up to which dots and bars have their full size.
 const FEW_SETS: usize = 200;
 const SMALL_RADIUS: f64 = 2.5;
+/// Rows from which on even small dots hide each other.
+const MANY_ROWS: usize = 5_000;
+const MIN_RADIUS: f64 = 1.8;
 /// What the drive alone explains of a set that is on no line.
 const ALONE: Dot = Dot::solid(GREY, SMALL_RADIUS);
 /// By how much the hole in the dot of a set that slides is smaller.
@@ -59,6 +62,19 @@ pub(super) struct ChartRows<'a> {
     pub(super) beside: &'a Beside,
     /// Which of the sets are those of each other directory.
     pub(super) others: Vec<Range<usize>>,
+}
+
+impl<'a> ChartRows<'a> {
+    /// Rows that are no sets: the columns that split them into series, or none.
+    pub(super) fn in_series(series: &'a [Values]) -> Self {
+        Self {
+            sets: &[],
+            control: None,
+            swept: series,
+            beside: &NOTHING_BESIDE,
+            others: Vec::new(),
+        }
+    }
 }
 
 static NOTHING_BESIDE: LazyLock<Beside> = LazyLock::new(Beside::default);
@@ -94,7 +110,7 @@ struct Marks {
 /// The panels of a chart, quantity by quantity, without a height, and what explains them.
 pub(super) struct ChartParts {
     pub(super) panels: Vec<Panel<'static>>,
-    bar: Option<ColourBar>,
+    pub(super) bar: Option<ColourBar>,
     pub(super) legend: Vec<LegendEntry>,
     note: String,
 }
@@ -109,13 +125,7 @@ impl<'a> Chart<'a> {
     ) -> Self {
         Self {
             of,
-            rows: ChartRows {
-                sets: &[],
-                control: None,
-                swept: series,
-                beside: &NOTHING_BESIDE,
-                others: Vec::new(),
-            },
+            rows: ChartRows::in_series(series),
             x,
             ys: vec![y],
             colour: series
@@ -188,7 +198,6 @@ impl<'a> Chart<'a> {
         };
         let axes = ys.iter().zip(&y_axes).chain([(x, &x_axis)]);
         let bars_cut = axes.map(cut).sum();
-        let has_many = inside.len() > FEW_SETS;
         let shape = self.shaped();
         let control = self.control();
         let level = |(y, axis): (&Quantity<'_>, &Axis)| {
@@ -202,7 +211,11 @@ impl<'a> Chart<'a> {
         }
         let dots = Marks {
             hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
-            radius: if has_many { SMALL_RADIUS } else { RADIUS },
+            radius: match inside.len() {
+                ..=FEW_SETS => RADIUS,
+                ..MANY_ROWS => SMALL_RADIUS,
+                _ => MIN_RADIUS,
+            },
             lines,
             is_on_line,
             x_axis,
@@ -504,10 +517,9 @@ impl Chart<'_> {
             };
             entries.extend(hues.entries(dot, |value| numbers.contains(&Some(value))));
             if inside.iter().any(|&set| colour.number(set).is_none()) {
-                let text = without_value(&colour.column);
                 let shape = self.shape_of_colour(dots, None);
                 let dot = Dot::solid(GREY, RADIUS).with_shape(shape);
-                entries.push(entry(Mark::Dot(dot), text));
+                entries.push(entry(Mark::Dot(dot), colour.without.as_str()));
             }
         }
         if let Some(shaped) = &dots.shape {

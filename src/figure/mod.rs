@@ -230,9 +230,8 @@ const STANDING: &[Standing] = &[
     })
     .beside(),
     Standing::new(intervals::NAME, |data| {
-        intervals::intervals(&data.points, data.beside, &data.of_all())
-    })
-    .beside(),
+        intervals::intervals(&data.points, &data.own())
+    }),
     Standing::new(histograms::NAME, |data| {
         histograms::histograms(&data.sets, &data.histograms, &data.own())
     }),
@@ -432,13 +431,8 @@ fn draw_slips(
             None => Ok(quantity),
         }
     };
-    let rows = ChartRows {
-        sets: &[],
-        control: None,
-        swept: &swept(sets),
-        beside: &Beside::default(),
-        others: Vec::new(),
-    };
+    let swept = swept(sets);
+    let rows = ChartRows::in_series(&swept);
     custom::custom(&quantity, rows, figure, &noted)
 }
 

@@ -23,7 +23,7 @@ pub type AxisLimits = (Option<f64>, Option<f64>);
 
 pub(super) struct Quantity<'a> {
     /// The option that named it.
-    option: &'static str,
+    pub(super) option: &'static str,
     pub(super) column: Values,
     /// The parameter that it shows, if it shows one.
     pub(super) symbol: Option<Symbol>,
@@ -37,6 +37,8 @@ pub(super) struct Quantity<'a> {
     /// Whether the axis holds all error bars, however much longer they are than others.
     pub(super) holds_bars: bool,
     pub(super) label: Option<&'a str>,
+    /// What rows without a value are called.
+    pub(super) without: String,
 }
 
 /// Whether values show phases. Of mean ones, only those of sets with a phase have a place.
@@ -81,6 +83,7 @@ impl Quantity<'_> {
         };
         Self {
             option,
+            without: without_value(&column),
             column,
             symbol,
             drive: None,
