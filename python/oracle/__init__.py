@@ -1,6 +1,6 @@
 """Replays a contact log with the exact solution of the model and reports how far off the solver that wrote it was.
 
-    stickslip simulate --set Delta=1e-6 --set frequency=58 --time 0.2 --tolerance 1e-10 --contacts log.parquet
+    stickslip simulate --set Delta=1e-6 --set frequency=58 --time 0.2 --set tolerance=1e-10 --contacts log.parquet
     .venv/bin/python -m oracle log.parquet --breaks 1200
     .venv/bin/python -m oracle log.parquet --follow
 

@@ -4,7 +4,7 @@ use super::output::{self, TextTable};
 use super::{Exit, UsageError, choice, layout};
 use crate::figure::{
     AxisLimits, Beside, CustomFigure, Dots, Drawn, Look, Picture, PictureFormat, Size, Style,
-    draw_all, draw_custom, draw_where, measured_trace, remarks, write_custom,
+    draw_all, draw_custom, draw_where, measured_trace, remarks, write,
 };
 use crate::measured::stretch;
 use crate::reduce::{SetRow, SlipOfSet, read_sets, renew, sample_of_slips};
@@ -56,8 +56,8 @@ pub struct Arguments {
     /// of sets. Repeatable
     #[arg(long = "with", value_name = "DIR")]
     others: Vec<PathBuf>,
-    /// Name of a directory in legends, in their order, the first one's first; repeat it for each [default: the shortest
-    /// ends of their paths that differ]
+    /// Name of a directory in legends, in their order, the first one's first; repeat it for each [default: their last
+    /// folders, or their paths if two of these are the same]
     #[arg(long, value_name = "NAME", requires = "others")]
     legend: Vec<String>,
     /// Draw the measured force itself from this time on, in s, with its slips
@@ -124,8 +124,8 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let renewed = layouts.iter().map(|other| renew(&Results::read(other)?));
     let others = renewed.collect::<Result<Vec<Results<'_>>>>()?;
     if arguments.from.or(arguments.until).is_some() {
-        let picture = trace(&results, arguments)?;
-        let files = write_custom(layout, picture, &look, &arguments.format)?;
+        let picture = trace(&results, arguments, &look)?;
+        let files = write(layout, &[picture], &arguments.format)?;
         output::lines(files.iter().map(|path| shown(path).to_string()))?;
         return Ok(Exit::Done);
     }
@@ -141,8 +141,9 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         }
         let remarks = remarks(std::slice::from_ref(&picture));
         let files = match &out {
-            None => write_custom(layout, picture, &look, &arguments.format)?,
+            None => write(layout, &[picture], &arguments.format)?,
             Some((out, format)) => {
+                picture.check_size()?;
                 output::write(out, &picture.encoded(*format)?)?;
                 arguments.out.iter().cloned().collect()
             }
@@ -168,7 +169,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
 }
 
 /// A stretch of the trace that slips came from.
-fn trace(results: &Results<'_>, arguments: &Arguments) -> Result<Picture> {
+fn trace(results: &Results<'_>, arguments: &Arguments, look: &Look) -> Result<Picture> {
     let sweep = results.sweep();
     let measured = sweep.measured().ok_or_else(|| {
         UsageError(
@@ -193,7 +194,7 @@ fn trace(results: &Results<'_>, arguments: &Arguments) -> Result<Picture> {
         // The modulation is drawn with a maximum at 0.
         parameters.modulation_period = None;
     }
-    Ok(measured_trace(&parameters, &trace.samples, &onsets).map_err(refused)?)
+    Ok(measured_trace(look, &parameters, &trace.samples, &onsets).map_err(refused)?)
 }
 
 /// Where a picture goes, and the format that the name ends in.

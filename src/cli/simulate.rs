@@ -11,10 +11,9 @@ use crate::figure::simulation;
 use crate::model::{Parameters, Selected, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
 use crate::results::destination::Destination;
-use crate::results::tables::{self, All, DriveAndSeed, JobOutcome, SlipRow};
+use crate::results::tables::{self, All, DriveAndSeed, JobOutcome, JobRecord, SlipRow};
 use crate::sets::Digits;
 use crate::single_job::{self, JobRecords, RecordRequest};
-use crate::solver::{Method, SolverKey};
 use crate::sweep::{KeyChange, Sweep};
 use crate::table::Table;
 use crate::table::arrow::{self, Gaps};
@@ -59,15 +58,6 @@ struct JobFlags {
     /// Longest model time, in s: `max_time` of [record], where `time` waits for a slip
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     time: Option<String>,
-    /// Method [default: event-driven]
-    #[arg(long, value_parser = Method::ALL.map(Method::word))]
-    solver: Option<String>,
-    /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
-    #[arg(long, allow_negative_numbers = true, value_name = "X")]
-    tolerance: Option<String>,
-    /// Step of a fixed-step solver, in s [default: 1e-6]
-    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
-    dt: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -234,12 +224,17 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     tables.write(files.slip_table.as_deref(), slips)?;
     arguments.write_plots(parameters, &records, &measured)?;
 
-    let report = JobReport::new(&label.0.job_id, &measured, wall);
+    let report = JobReport {
+        job_id: &label.0.job_id,
+        tau_mean: mean_interval(&measured.slips),
+        wall,
+        job: arrow::json(&JobRecord::new(Ok(&measured))),
+    };
     if arguments.json {
         output::json(JSON_FORMAT, &report)?;
     } else {
         output::print(&table_of_slips(&measured.slips))?;
-        report.print()?;
+        report.print(&measured)?;
     }
     Ok(Exit::Done)
 }
@@ -333,19 +328,7 @@ impl Arguments {
 impl JobFlags {
     /// What the flags set, each as a key of a sweep file.
     fn changes(&self) -> Result<Vec<KeyChange>, UsageError> {
-        let method = self.solver.as_deref().and_then(Method::from_word);
-        let takes_steps =
-            method.is_some_and(|method| method.settings().contains(&SolverKey::TimeStep));
-        let default = takes_steps.then(|| "1e-6".to_owned());
-        let dt = self.dt.clone().or(default);
-        let flags = [
-            ("slips", &self.slips),
-            ("max_time", &self.time),
-            ("method", &self.solver),
-            ("tolerance", &self.tolerance),
-            ("dt", &dt),
-        ];
-        let pairs = flags.into_iter();
+        let pairs = [("slips", &self.slips), ("max_time", &self.time)].into_iter();
         let of_flags = pairs.filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
         changes(&Variation {
             settings: self.settings.iter().cloned().chain(of_flags).collect(),
@@ -358,83 +341,61 @@ impl JobFlags {
 #[derive(Serialize)]
 struct JobReport<'a> {
     job_id: &'a str,
-    simulated_seconds: f64,
-    slips: usize,
-    mean_interval_seconds: Option<f64>,
-    outcome: &'static str,
-    regime: Option<&'static str>,
-    mean_friction_newtons: Option<f64>,
-    attached_fraction: Option<f64>,
-    slip_share: Option<f64>,
-    breaks: u64,
-    reattachments: u64,
-    ruptures: u64,
-    steps: u64,
-    leaps: u64,
-    wall_seconds: f64,
+    /// Mean interval, in s.
+    tau_mean: Option<f64>,
+    /// Wall time, in s.
+    wall: f64,
+    /// Its columns of the table of jobs.
+    #[serde(flatten)]
+    job: serde_json::Value,
 }
 
-impl<'a> JobReport<'a> {
-    fn new(job_id: &'a str, measured: &Measurements, wall_seconds: f64) -> Self {
-        let summary = &measured.summary;
-        let averages = measured.averages;
-        let slips = measured.slips.iter();
-        let intervals: Vec<f64> = slips.filter_map(|slip| slip.interval).collect();
-        let mean = intervals.iter().sum::<f64>() / intervals.len() as f64;
-        Self {
-            job_id,
-            simulated_seconds: summary.end_time,
-            slips: measured.slips.len(),
-            mean_interval_seconds: Some(mean).filter(|mean| mean.is_finite()),
-            outcome: JobOutcome::of(measured).word(),
-            regime: measured.regime().map(Regime::word),
-            mean_friction_newtons: averages.map(|averages| averages.friction),
-            attached_fraction: averages.map(|averages| averages.attached_fraction),
-            slip_share: averages.map(|averages| averages.slip_share),
-            breaks: summary.breaks,
-            reattachments: summary.reattachments,
-            ruptures: measured.ruptures,
-            steps: summary.steps,
-            leaps: summary.leaps,
-            wall_seconds,
-        }
-    }
+fn mean_interval(slips: &[Slip]) -> Option<f64> {
+    let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
+    let mean = intervals.iter().sum::<f64>() / intervals.len() as f64;
+    Some(mean).filter(|mean| mean.is_finite())
+}
 
-    fn print(&self) -> Result<()> {
+impl JobReport<'_> {
+    fn print(&self, measured: &Measurements) -> Result<()> {
+        let Measurements {
+            summary, averages, ..
+        } = measured;
         // A mean of few slips is not better known.
         let mean = |value: Option<f64>, unit: &str| {
             let number = value.map(|value| Digits::FOUR.number(value));
             number.map_or_else(|| "none".to_owned(), |number| format!("{number} {unit}"))
         };
-        let regime = match self.regime.zip(self.slip_share) {
+        let regime = match measured.regime().map(Regime::word).zip(*averages) {
             None => "none".to_owned(),
-            Some((regime, _)) if self.slips == 0 => regime.to_owned(),
-            Some((regime, share)) => {
-                format!("{regime}, {:.3} % of the time within slips", 100.0 * share)
+            Some((regime, _)) if measured.slips.is_empty() => regime.to_owned(),
+            Some((regime, averages)) => {
+                let percent = 100.0 * averages.slip_share;
+                format!("{regime}, {percent:.3} % of the time within slips")
             }
         };
         let contacts = format!(
             "{} breaks, {} reattachments",
-            self.breaks, self.reattachments
+            summary.breaks, summary.reattachments
         );
-        let outcome = match self.outcome {
-            word if word == JobOutcome::NoSlips.word() => {
-                format!("{word}: ended early, as no further slip came within give_up_after")
-            }
-            other => other.to_owned(),
+        let outcome = JobOutcome::of(measured);
+        let early = match outcome {
+            JobOutcome::NoSlips => ": ended early, as no further slip came within give_up_after",
+            JobOutcome::Done | JobOutcome::TimeLimit | JobOutcome::Failed => "",
         };
-        let steps = format!("{}, of which {} leaps", self.steps, self.leaps);
+        let steps = format!("{}, of which {} leaps", summary.steps, summary.leaps);
+        let friction = averages.map(|averages| averages.friction);
         output::pairs(&[
             ("job", self.job_id.to_owned()),
-            ("simulated time", format!("{:.6} s", self.simulated_seconds)),
-            ("slips", self.slips.to_string()),
-            ("outcome", outcome),
+            ("simulated time", format!("{:.6} s", summary.end_time)),
+            ("slips", measured.slips.len().to_string()),
+            ("outcome", format!("{}{early}", outcome.word())),
             ("regime", regime),
-            ("mean interval", mean(self.mean_interval_seconds, "s")),
-            ("mean friction", mean(self.mean_friction_newtons, "N")),
+            ("mean interval", mean(self.tau_mean, "s")),
+            ("mean friction", mean(friction, "N")),
             ("contacts", contacts),
             ("steps", steps),
-            ("wall time", output::duration(self.wall_seconds)),
+            ("wall time", output::duration(self.wall)),
         ])
     }
 }

@@ -76,17 +76,6 @@ fn pairs(status: &Status) -> Vec<(&'static str, String)> {
         ("parts", parts),
         ("time left", time_left(status)),
     ];
-    if status.cut.jobs > 0 {
-        let jobs = status.cut.jobs;
-        let each = status.cut.slips as f64 / jobs as f64;
-        let effect = if each < 1.0 {
-            "too few for tau_mean; make max_time longer".to_owned()
-        } else {
-            format!("tau_mean is too short by about cv^2/{each:.1}, as stickslip show says")
-        };
-        let cut = format!("{jobs}, with {each:.1} slips each: {effect}");
-        pairs.push(("cut by max_time", cut));
-    }
     if status.parts_with_deaths > 0 {
         let parts = output::count(status.parts_with_deaths as u64, "missing part");
         let deaths = format!("of workers at {parts}: kills, unless the same part comes again");

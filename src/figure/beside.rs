@@ -2,6 +2,7 @@
 //! them.
 
 use super::legend::{LegendEntry, Mark, entry};
+use super::quantity::distinct;
 use super::style::{HOLLOW, Look};
 use super::{ADVICE, BadOption, check_text, common, read, sets_with_results};
 use crate::model::{Parameters, Symbol};
@@ -9,7 +10,7 @@ use crate::reduce::{BackboneBin, Condition, Difference, Point, SetRow, advise};
 use crate::results::Results;
 use anyhow::Result;
 use std::ops::Range;
-use std::path::{Component, Path, absolute};
+use std::path::Path;
 
 /// A directory beside the first.
 #[derive(Clone, Debug)]
@@ -28,8 +29,8 @@ pub struct Beside {
 }
 
 impl Beside {
-    /// Reads the others, whose reduced data are up to date. `names` are those of all; by default, they are the shortest
-    /// ends of the paths that differ.
+    /// Reads the others, whose reduced data are up to date. `names` are those of all; by default, their last folders,
+    /// or their paths if two of these are the same.
     pub fn read(first: &Results<'_>, others: &[Results<'_>], names: &[String]) -> Result<Self> {
         let all = std::iter::once(first).chain(others);
         let roots: Vec<&Path> = all.map(|results| results.layout().root()).collect();
@@ -134,31 +135,20 @@ fn parameters_of(sets: &[SetRow]) -> Vec<&Parameters> {
     sets.iter().map(|set| &*set.parameters).collect()
 }
 
-/// The shortest ends of paths that no other of them has.
+/// The last folder of each path, or all paths as they were given if two of these are the same.
 fn short_names(paths: &[&Path]) -> Vec<String> {
-    let parts: Vec<Vec<String>> = paths.iter().map(|path| parts(path)).collect();
-    let end = |of: &[String], count: usize| of[of.len().saturating_sub(count)..].join("/");
-    let name = |own: &Vec<String>| {
-        let others = || parts.iter().filter(|other| *other != own);
-        let is_alone = |count: &usize| others().all(|other| end(other, *count) != end(own, *count));
-        let count = (1..own.len()).find(is_alone);
-        end(own, count.unwrap_or(own.len()))
+    let whole = |path: &&Path| path.to_string_lossy().into_owned();
+    let last = |path: &&Path| {
+        let folder = path.file_name();
+        folder.map_or_else(|| whole(path), |name| name.to_string_lossy().into_owned())
     };
-    parts.iter().map(name).collect()
-}
-
-/// The folders of a path from the root on.
-fn parts(path: &Path) -> Vec<String> {
-    let mut parts = Vec::new();
-    let path = absolute(path).unwrap_or_else(|_| path.to_owned());
-    for component in path.components() {
-        match component {
-            Component::Normal(part) => parts.push(part.to_string_lossy().into_owned()),
-            Component::ParentDir => drop(parts.pop()),
-            Component::CurDir | Component::RootDir | Component::Prefix(_) => {}
-        }
+    let names: Vec<String> = paths.iter().map(last).collect();
+    let is_same = names.len() > distinct(names.iter().map(String::as_str)).len();
+    if is_same {
+        paths.iter().map(whole).collect()
+    } else {
+        names
     }
-    parts
 }
 
 #[cfg(test)]
@@ -166,19 +156,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_the_shortest_ends_of_paths_that_differ() {
+    fn names_are_last_folders_or_whole_paths_if_two_are_the_same() {
         let names = |paths: &[&str]| {
             let paths: Vec<&Path> = paths.iter().map(Path::new).collect();
             short_names(&paths)
         };
         assert_eq!(
-            names(&["/r/model", "/r/may/out", "/r/june/out/"]),
-            ["model", "may/out", "june/out"]
+            names(&["/r/model", "may/out/", ".."]),
+            ["model", "out", ".."]
         );
+        assert_eq!(names(&["model", "/may/out"]), ["model", "out"]);
         assert_eq!(
-            names(&["/out", "/a/x/out", "/b/x/../x/out"]),
-            ["out", "a/x/out", "b/x/out"]
+            names(&["model", "may/out", "out"]),
+            ["model", "may/out", "out"]
         );
-        assert_eq!(names(&["/a/out", "/a/./out"]), ["out", "out"]);
     }
 }

@@ -211,11 +211,7 @@ impl<'a> Chart<'a> {
         }
         let dots = Marks {
             hues: self.colour.as_ref().map(Quantity::hues).transpose()?,
-            radius: match inside.len() {
-                ..=FEW_SETS => RADIUS,
-                ..MANY_ROWS => SMALL_RADIUS,
-                _ => MIN_RADIUS,
-            },
+            radius: radius(inside.len()),
             lines,
             is_on_line,
             x_axis,
@@ -653,6 +649,17 @@ impl Chart<'_> {
         }
         notes.extend(self.pooled(inside, dots));
         notes.join("; ")
+    }
+}
+
+/// The radius of the dots of this many rows.
+const fn radius(rows: usize) -> f64 {
+    if rows <= FEW_SETS {
+        RADIUS
+    } else if rows < MANY_ROWS {
+        SMALL_RADIUS
+    } else {
+        MIN_RADIUS
     }
 }
 

@@ -6,7 +6,7 @@ use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Picture, PictureFormat};
 use super::style::{BLUE, Look, Place, RED, REFERENCE, Stroke};
-use super::write_custom;
+use super::write;
 use crate::measured::DropSizes;
 use crate::results::layout::Layout;
 use anyhow::Result;
@@ -14,12 +14,9 @@ use std::path::PathBuf;
 
 /// Draws them into the figures of a directory; returns the files.
 pub fn draw_drop_size(layout: &Layout<'_>, sizes: &DropSizes) -> Result<Vec<PathBuf>> {
-    let look = Look::default();
     layout.storage.ensure_folder(layout.root())?;
-    let picture = drop_size(sizes, &look);
-    let files =
-        picture.map(|picture| write_custom(layout, picture, &look, &PictureFormat::DEFAULT));
-    Ok(files.transpose()?.unwrap_or_default())
+    let pictures: Vec<Picture> = drop_size(sizes, &Look::default()).into_iter().collect();
+    write(layout, &pictures, &PictureFormat::DEFAULT)
 }
 
 /// Draws both against the drop size, with the size that was chosen; `None` without slips.

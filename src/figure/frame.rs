@@ -257,7 +257,7 @@ impl Frame {
     pub(super) fn axes(&self, sheet: &mut Picture) {
         let right = self.right();
         let bottom = self.bottom();
-        let style = sheet.style;
+        let style = sheet.look.style;
         for (value, length) in ticks(&self.x, self.width, style) {
             let x = self.x_of(value);
             sheet.line(vec![(x, bottom), (x, bottom - length)], AXIS);

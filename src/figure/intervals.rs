@@ -114,13 +114,7 @@ mod tests {
         };
         assert!(texts(
             &points,
-            &[
-                "Δ = 1 µm",
-                "no preferred phase",
-                "τ = nT",
-                "4",
-                "10"
-            ]
+            &["Δ = 1 µm", "no preferred phase", "τ = nT", "4", "10"]
         ));
         let mut amplitudes = points.clone();
         amplitudes[1].amplitude = 3e-7;
@@ -130,13 +124,7 @@ mod tests {
             drive_velocity: 1e-6 * f64::from(1 << step),
             ..first
         }));
-        assert!(texts(
-            &points,
-            &[
-                "V₀ (m/s)",
-                "no preferred phase"
-            ]
-        ));
+        assert!(texts(&points, &["V₀ (m/s)", "no preferred phase"]));
     }
 
     #[test]

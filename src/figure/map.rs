@@ -16,7 +16,6 @@ use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{FREQUENCY, SetRow, Values, ascending, differing, has_even_steps, is_same};
 use crate::table::columns::Class;
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 pub(super) const LOCKING: &str = "locking-map";
@@ -28,7 +27,6 @@ const MIN_EXCESS: f64 = 0.2;
 const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 /// Under the line, so that it is seen on dark cells.
 const CASING: Stroke = Stroke::solid(WHITE, 4.4);
-const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
 /// Marks of regimes: the ink of their middle, and their name; radii of a mark and of its middle.
 const MARKS: [(Regime, Ink, &str); 2] = [
     (Regime::Mixed, BLACK, "mixed"),
@@ -96,7 +94,7 @@ pub(super) fn locking(sets: &[SetRow], look: &Look) -> Option<Picture> {
     })
 }
 
-/// The same of two other parameters, of 4 values or more, with the borders between regimes. The drive velocity is the x
+/// The same of two other parameters, of 4 values or more, with a mark of what does not stick. The drive velocity is the x
 /// axis wherever it is one.
 pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let axes = match differing(&sets.iter())[..] {
@@ -111,8 +109,6 @@ pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
             legend.push(entry(mark, format!("{name}, share of {share} or more")));
         }
     }
-    let borders = "between regimes; unmarked: stick-slip";
-    legend.push(entry(Mark::Line(BORDER), borders));
     if sets.iter().any(|set| set.tau_mean.is_none()) {
         legend.push(entry(Mark::Patch(UNCLEAR), "(c) no intervals"));
     }
@@ -127,16 +123,16 @@ pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
         legend,
     };
     figure.draw(look, |map| {
-        let mut lines = map.borders(|set| sets[set].regime);
+        let mut marks = Vec::new();
         for (regime, ink, _) in MARKS {
             let drawn = map.sets.iter().map(|set| set.0);
             let of_it = drawn.filter(|&set| sets[set].regime == Some(regime));
             let place = |set| map.x.number(set).zip(map.y.number(set));
             let places: Vec<Place> = of_it.filter_map(place).collect();
-            lines.push(Layer::Dots(places.clone(), Dot::solid(BLACK, MARK)));
-            lines.push(Layer::Dots(places, Dot::solid(ink, HOLE)));
+            marks.push(Layer::Dots(places.clone(), Dot::solid(BLACK, MARK)));
+            marks.push(Layer::Dots(places, Dot::solid(ink, HOLE)));
         }
-        lines
+        marks
     })
 }
 
@@ -341,31 +337,6 @@ impl<'a> Map<'a> {
             }
         }))
     }
-
-    /// Lines between neighbours of different regimes.
-    fn borders(&self, regime: impl Fn(usize) -> Option<Regime>) -> Vec<Layer<'static>> {
-        let sets = self.sets.iter();
-        let regimes: BTreeMap<Position, _> = sets
-            .map(|&(set, position)| (position, regime(set)))
-            .collect();
-        let differs = |position, next| {
-            let other = regimes.get(&next);
-            other.is_some_and(|other| *other != regimes[&position])
-        };
-        let border = |&(_, (column, row)): &(usize, Position)| {
-            let ((left, right), (bottom, top)) = self.cell((column, row));
-            let upright = differs((column, row), (column + 1, row))
-                .then(|| vec![(right, bottom), (right, top)]);
-            let level =
-                differs((column, row), (column, row + 1)).then(|| vec![(left, top), (right, top)]);
-            upright.into_iter().chain(level)
-        };
-        self.sets
-            .iter()
-            .flat_map(border)
-            .map(|line| Layer::Curve(line, BORDER))
-            .collect()
-    }
 }
 
 #[cfg(test)]
@@ -500,7 +471,7 @@ mod tests {
     }
 
     #[test]
-    fn two_parameters_make_a_map_with_lines_between_regimes() {
+    fn two_parameters_make_a_map_with_a_mark_of_each_set_that_slides() {
         let grid = |shares: fn(u32, u32) -> f64| -> Vec<SetRow> {
             (0..4)
                 .flat_map(|row| {
@@ -518,7 +489,7 @@ mod tests {
             regimes(sets, &Look::default())
                 .unwrap()
                 .svg()
-                .matches("stroke-width=\"1.6\"")
+                .matches("<circle")
                 .count()
         };
         let svg = regimes(
@@ -534,11 +505,10 @@ mod tests {
             assert!(svg.contains(&format!(">{text}<")), "{text}");
         }
         assert!(!svg.contains("mixed, "), "no set is mixed");
-        let without = drawn(&grid(|_, _| 0.05));
-        assert_eq!(
-            drawn(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })),
-            without + 3 * 4
-        );
+        assert_eq!(drawn(&grid(|_, _| 0.05)), 0);
+        // Two discs each, of eight sets in three panels and of the legend.
+        let sliding = grid(|_, column| if column < 3 { 0.05 } else { 1.0 });
+        assert_eq!(drawn(&sliding), 2 * (3 * 8 + 1));
         assert!(
             regimes(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(),
             "two rows"

@@ -132,7 +132,7 @@ impl<'a> Data<'a> {
     /// Of each standing figure that these data make, or the overview.
     fn pictures(&self) -> Vec<Picture> {
         let figures = STANDING.iter();
-        let mut pictures: Vec<Picture> = figures.filter_map(|figure| (figure.draw)(self)).collect();
+        let mut pictures: Vec<Picture> = figures.filter_map(|(_, draw)| draw(self)).collect();
         if pictures.is_empty() {
             pictures.extend(overview::overview(
                 &self.sets,
@@ -191,58 +191,38 @@ fn retain<R: Row>(rows: &mut Vec<R>, of: &str, text: &str) -> Result<(), BadOpti
     Ok(())
 }
 
-/// A figure that [`draw_all`] draws if its data are there.
-struct Standing {
-    name: &'static str,
-    draw: fn(&Data<'_>) -> Option<Picture>,
-    /// Whether it shows other directories, too.
-    is_beside: bool,
-}
+/// A figure, or `None` if its data are not there.
+type Draw = fn(&Data<'_>) -> Option<Picture>;
 
-impl Standing {
-    const fn new(name: &'static str, draw: fn(&Data<'_>) -> Option<Picture>) -> Self {
-        Self {
-            name,
-            draw,
-            is_beside: false,
-        }
-    }
-
-    const fn beside(self) -> Self {
-        Self {
-            is_beside: true,
-            ..self
-        }
-    }
-}
-
-/// All of them, in the order of the report.
-const STANDING: &[Standing] = &[
-    Standing::new(overview::NAME, overview_of_sets).beside(),
-    Standing::new(map::LOCKING, |data| map::locking(data.still(), &data.own())),
-    Standing::new(map::REGIMES, |data| map::regimes(data.still(), &data.own())),
-    Standing::new(edge_values::NAME, |data| {
+/// The figures that [`draw_all`] draws if their data are there, in the order of the report.
+const STANDING: &[(&str, Draw)] = &[
+    (overview::NAME, overview_of_sets),
+    (map::LOCKING, |data| map::locking(data.still(), &data.own())),
+    (map::REGIMES, |data| map::regimes(data.still(), &data.own())),
+    (edge_values::NAME, |data| {
         edge_values::edges(&data.edges, &data.own())
     }),
-    Standing::new(drag::NAME, |data| drag::drag(&data.points, &data.own())),
-    Standing::new(phase_eta::NAME, |data| {
+    (drag::NAME, |data| drag::drag(&data.points, &data.own())),
+    (phase_eta::NAME, |data| {
         phase_eta::phase_eta(&data.points, &data.backbone, data.beside, &data.of_all())
-    })
-    .beside(),
-    Standing::new(intervals::NAME, |data| {
+    }),
+    (intervals::NAME, |data| {
         intervals::intervals(&data.points, &data.own())
     }),
-    Standing::new(histograms::NAME, |data| {
+    (histograms::NAME, |data| {
         histograms::histograms(&data.sets, &data.histograms, &data.own())
     }),
-    Standing::new(triggering::NAME, |data| {
+    (triggering::NAME, |data| {
         triggering::triggering(&data.pulses, data.look)
     }),
 ];
 
+/// Those that show other directories, too.
+const BESIDE: [&str; 2] = [overview::NAME, phase_eta::NAME];
+
 /// The names of the standing figures, in the order of the report.
 pub fn standing() -> impl Iterator<Item = &'static str> {
-    STANDING.iter().map(|figure| figure.name)
+    STANDING.iter().map(|(name, _)| *name)
 }
 
 /// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
@@ -271,7 +251,9 @@ pub struct Drawn {
 
 /// What is to be said of pictures: in what directories differ, which have no mark, and letters that are boxes.
 pub fn remarks(pictures: &[Picture]) -> Vec<String> {
-    let directories = pictures.iter().flat_map(|picture| &picture.directories);
+    let directories = pictures
+        .iter()
+        .flat_map(|picture| &picture.look.directories);
     let lines = distinct(directories.map(String::as_str)).into_iter();
     let mut remarks: Vec<String> = lines
         .map(|line| format!("differs  {}", line.replace('\u{a0}', " ")))
@@ -304,16 +286,14 @@ pub fn draw_all(
 ) -> Result<Drawn> {
     let pictures = Data::read(layout, beside, look)?.pictures();
     let mut remarks = remarks(&pictures);
-    let all_beside = STANDING.iter().filter(|figure| figure.is_beside);
-    let all_beside: Vec<&str> = all_beside.map(|figure| figure.name).collect();
-    let is_beside = |picture: &Picture| all_beside.contains(&picture.name());
+    let is_beside = |picture: &Picture| BESIDE.contains(&picture.name());
     if !beside.others.is_empty() && !pictures.iter().any(is_beside) {
-        let figures = all_beside.join(", ");
+        let figures = BESIDE.join(", ");
         remarks.push(format!(
             "no figure shows other directories: there is none of {figures}"
         ));
     }
-    let files = write(layout, &pictures, look, formats)?;
+    let files = write(layout, &pictures, formats)?;
     // What earlier data gave, and these do not.
     for name in layout.storage.list(&layout.figures())? {
         let path = layout.figures().join(name);
@@ -341,7 +321,7 @@ pub fn draw_where(
     for picture in &mut pictures {
         picture.name += "-where";
     }
-    let files = write(results.layout(), &pictures, &look, formats)?;
+    let files = write(results.layout(), &pictures, formats)?;
     Ok(Drawn {
         files,
         remarks: remarks(&pictures),
@@ -358,12 +338,10 @@ pub fn draw_custom(
     let sets = read_sets(results.layout())
         .collect::<Result<Vec<_>, _>>()
         .map_err(advise(ADVICE))?;
-    let picture = match figure.of {
+    match figure.of {
         Dots::Sets => draw_sets(results, sets, beside, figure, look),
         Dots::Slips => draw_slips(results, &sets, figure, look),
-    }?;
-    check_size(&picture, look)?;
-    Ok(picture)
+    }
 }
 
 fn draw_sets(
@@ -436,16 +414,6 @@ fn draw_slips(
     custom::custom(&quantity, rows, figure, &noted)
 }
 
-/// Puts a figure into `figures/`, in these formats.
-pub fn write_custom(
-    layout: &Layout<'_>,
-    picture: Picture,
-    look: &Look,
-    formats: &[PictureFormat],
-) -> Result<Vec<PathBuf>> {
-    write(layout, &[picture], look, formats)
-}
-
 /// The sets with at least one interval or a regime; none if these are too many.
 fn sets_with_results(layout: &Layout<'_>) -> Result<Vec<SetRow>, ResultsError> {
     let mut sets = Vec::new();
@@ -465,33 +433,13 @@ fn read<R: Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
     read_reduced(layout).map_err(advise(ADVICE))
 }
 
-/// A picture is larger than it is asked to be if its frames would be too small to read.
-fn check_size(picture: &Picture, look: &Look) -> Result<(), BadOption> {
-    const SLACK: f64 = 1.001;
-    let size = picture.size();
-    match look.size {
-        Some(asked) if size.width > SLACK * asked.width || size.height > SLACK * asked.height => {
-            let problem = format!(
-                "--size: figure {} needs at least {:.0}mmx{:.0}mm with its legend and small print, and less in the style print",
-                picture.name(),
-                size.width.ceil(),
-                size.height.ceil()
-            );
-            Err(BadOption(problem))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn write(
+/// Puts pictures into `figures/`, each in these formats.
+pub fn write(
     layout: &Layout<'_>,
     pictures: &[Picture],
-    look: &Look,
     formats: &[PictureFormat],
 ) -> Result<Vec<PathBuf>> {
-    pictures
-        .iter()
-        .try_for_each(|picture| check_size(picture, look))?;
+    pictures.iter().try_for_each(Picture::check_size)?;
     let folder = layout.figures();
     layout.ensure_folder(&folder)?;
     let mut commit = Commit::begin(layout)?;

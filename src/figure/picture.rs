@@ -3,8 +3,8 @@
 use super::BadOption;
 use super::pdf::{pdf, single};
 use super::style::{
-    BLACK, Dot, FACE, Fill, HALF_DIGIT, Ink, Look, POINTS_PER_INCH, Size, Stroke, Style, Unit,
-    outline_of, text_width,
+    BLACK, Dot, FACE, Fill, HALF_DIGIT, Ink, Look, POINTS_PER_INCH, Size, Stroke, outline_of,
+    text_width,
 };
 use crate::table::shown::shown_text;
 use crate::table::value::words;
@@ -29,13 +29,7 @@ const MAX_PIXELS: f64 = 1e8;
 
 pub struct Picture {
     pub(super) name: String,
-    pub(super) style: Style,
-    unit: Unit,
-    /// Whether the small print is part of it.
-    has_caption: bool,
-    note: String,
-    /// In what each of several directories differs from others.
-    pub(super) directories: Vec<String>,
+    pub(super) look: Look,
     /// Names of directories of which it shows nothing.
     pub(super) absent: Vec<String>,
     pub(super) scene: Scene,
@@ -71,11 +65,11 @@ impl Picture {
 
     /// Its small print, if that is left to the caption.
     pub fn caption(&self) -> Option<String> {
-        (!self.has_caption).then(|| self.note())
+        (!self.look.has_caption()).then(|| self.note())
     }
 
     fn note(&self) -> String {
-        let lines = std::iter::once(&self.note).chain(&self.directories);
+        let lines = std::iter::once(&self.look.note).chain(&self.look.directories);
         // Lines may be broken anywhere there.
         lines
             .map(|line| line.replace('\u{a0}', " "))
@@ -100,22 +94,43 @@ impl Picture {
     }
 
     pub fn size(&self) -> Size {
+        let unit = self.look.unit();
         let [width, height] =
-            [self.scene.width, self.scene.height].map(|side| self.unit.millimetres(side));
+            [self.scene.width, self.scene.height].map(|side| unit.millimetres(side));
         Size { width, height }
+    }
+
+    /// It is larger than asked if its frames would be too small to read.
+    pub fn check_size(&self) -> Result<(), BadOption> {
+        const SLACK: f64 = 1.001;
+        let size = self.size();
+        match self.look.size {
+            Some(asked)
+                if size.width > SLACK * asked.width || size.height > SLACK * asked.height =>
+            {
+                let problem = format!(
+                    "--size: figure {} needs at least {:.0}mmx{:.0}mm with its legend and small print, and less in the style print",
+                    self.name,
+                    size.width.ceil(),
+                    size.height.ceil()
+                );
+                Err(BadOption(problem))
+            }
+            _ => Ok(()),
+        }
     }
 
     pub fn encoded(&self, format: PictureFormat) -> Result<Vec<u8>> {
         match format {
             PictureFormat::Svg => Ok(self.svg().into_bytes()),
             PictureFormat::Png => self.png(),
-            PictureFormat::Pdf => Ok(pdf(&self.scene, self.unit.0)),
+            PictureFormat::Pdf => Ok(pdf(&self.scene, self.look.unit().0)),
         }
     }
 
     pub fn svg(&self) -> String {
         let svg = SvgBackend::new().render_scene(&self.scene);
-        if self.unit == Look::default().unit() {
+        if self.look.unit() == Look::default().unit() {
             return svg;
         }
         // The library gives sizes in pixels only, so a picture of this size holds it.
@@ -126,7 +141,7 @@ impl Picture {
     }
 
     pub fn png(&self) -> Result<Vec<u8>> {
-        let scale = self.style.resolution() * self.unit.0 / POINTS_PER_INCH;
+        let scale = self.look.style.resolution() * self.look.unit().0 / POINTS_PER_INCH;
         let pixels = self.scene.width * self.scene.height * scale * scale;
         if pixels > MAX_PIXELS {
             return Err(BadOption(format!(
@@ -158,11 +173,7 @@ impl Picture {
         scene.text_color = Some(BLACK.to_string());
         Self {
             name: name.to_owned(),
-            style: look.style,
-            unit: look.unit(),
-            has_caption: look.has_caption(),
-            note: look.note.clone(),
-            directories: look.directories.clone(),
+            look: look.clone(),
             absent: Vec::new(),
             scene,
         }

@@ -68,19 +68,12 @@ pub fn simulation(
 
 /// Draws the measured force in N against time in s, under the modulation that is known, with the onsets of slips.
 pub fn measured_trace(
+    look: &Look,
     parameters: &Parameters,
     trace: &[(f64, f64)],
     onsets: &[f64],
 ) -> Result<Picture> {
-    let look = Look::default();
-    draw(
-        MEASURED,
-        &look,
-        parameters,
-        Some(trace),
-        None,
-        [&[], onsets],
-    )
+    draw(MEASURED, look, parameters, Some(trace), None, [&[], onsets])
 }
 
 fn draw(

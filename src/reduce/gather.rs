@@ -251,8 +251,8 @@ columns! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Point {
         drive_velocity as "V0": f64 = "m/s", "drive velocity", "", Class::Parameter;
-        amplitude as "Delta": f64 = "m", "amplitude of the modulation at the onset", "", Class::Parameter;
-        period as "T": Option<f64> = "s", "period of the modulation at the onset", "", Class::Parameter;
+        amplitude as "Delta": f64 = "m", "amplitude of the modulation at the onset";
+        period as "T": Option<f64> = "s", "period of the modulation at the onset", "", Class::Period;
         eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
         ramp_stage: Option<RampStage> = "",
             "where on the ramp of the modulation the onset lies: up, down, after; null without a ramp";

@@ -4,11 +4,9 @@ use crate::results::claims::Marked;
 use crate::results::log::RunEvent;
 use crate::results::next_round::RoundsSoFar;
 use crate::results::pending::{Again, Overview, Pending, Retry};
-use crate::results::tables::{JobOutcome, RecordedTable};
 use crate::results::workers::Living;
 use crate::results::{Results, ResultsError};
-use crate::sweep::{Extension, Outline};
-use crate::table::columns::columns;
+use crate::sweep::Outline;
 use serde::Serialize;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -29,7 +27,6 @@ pub struct Status {
     pub time_left: Option<f64>,
     pub failures: Vec<Failure>,
     pub failure_reasons: Reasons,
-    pub cut: Cut,
     /// Missing parts at which workers died.
     pub parts_with_deaths: usize,
     pub marked: Vec<Marked>,
@@ -52,38 +49,6 @@ pub struct Failure {
     pub job_id: String,
     pub reason: String,
     pub command: String,
-}
-
-columns! {
-    struct EndedJob {
-        outcome: JobOutcome;
-        slips: Option<u64>;
-    }
-}
-
-/// Jobs that `max_time` ended within an interval.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Cut {
-    pub jobs: u64,
-    pub slips: u64,
-}
-
-impl Cut {
-    fn read(results: &Results<'_>) -> Result<Self, ResultsError> {
-        let mut cut = Self::default();
-        let has_time = |extension: &Extension| extension.sweep.recording().max_time.is_some();
-        if !results.extensions().iter().any(has_time) {
-            return Ok(cut);
-        }
-        for job in results.dataset(RecordedTable::Jobs)?.rows::<EndedJob>() {
-            let job = job?;
-            if job.outcome == JobOutcome::TimeLimit {
-                cut.jobs += 1;
-                cut.slips += job.slips.unwrap_or(0);
-            }
-        }
-        Ok(cut)
-    }
 }
 
 /// Jobs of finished parts that the current sweep does not have.
@@ -154,7 +119,6 @@ pub fn status(results: &Results<'_>, max_failures: u64) -> Result<Status, Result
             .map(|(pace, threads)| overview.predicted_cost_missing * pace / threads.max(1) as f64),
         failures,
         failure_reasons,
-        cut: Cut::read(results)?,
         parts_with_deaths: pending.with_deaths(1).count(),
         marked: pending.marked(),
         rounds: results.rounds_so_far(),

@@ -89,8 +89,7 @@ impl Footer {
         let footer = self
             .clone()
             .with("units", &by_name(UNIT))
-            .with("meaning", &by_name(DESCRIPTION))
-            .with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
+            .with("meaning", &by_name(DESCRIPTION));
         let texts = footer.0.into_iter();
         let entries = texts.map(|(key, text)| KeyValue::new(key, text));
         let mut properties = WriterProperties::builder()
@@ -125,7 +124,9 @@ impl<R: Row, S: Sink> TableWriter<R, S> {
     pub fn new(gaps: &Gaps, path: &Path, file: S, footer: &Footer) -> Result<Self, ResultsError> {
         let buffer = RowBuffer::new::<R>().with(gaps);
         let schema = buffer.schema();
-        let writer = footer.properties(schema).and_then(|properties| {
+        let footer = footer.clone();
+        let sealed = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
+        let writer = sealed.properties(schema).and_then(|properties| {
             ArrowWriter::try_new(Vec::new(), Arc::clone(schema), Some(properties))
         });
         let writer = writer.map_err(ResultsError::unwritten(path))?;

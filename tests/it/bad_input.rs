@@ -540,27 +540,27 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
             &["max_time = \"soon\"", "must be a finite number > 0, in s"],
         ),
         (
-            "simulate --solver leapfrog",
-            &["--solver", "event-driven, "],
+            "simulate --set method=leapfrog",
+            &["method = \"leapfrog\": must be \"event-driven\" or \"fixed-step\""],
         ),
         (
-            "simulate --dt 1e-6",
+            "simulate --set dt=1e-6",
             &["dt = 1e-6: unknown key in [solver]"],
         ),
         (
-            "simulate --solver fixed-step --tolerance 1e-6",
+            "simulate --set method=fixed-step --set dt=1e-6 --set tolerance=1e-6",
             &["tolerance = 1e-6: unknown key in [solver]; allowed are method, dt"],
         ),
         (
-            "simulate --solver fixed-step --dt 5e-6",
+            "simulate --set method=fixed-step --set dt=5e-6",
             &["dt = 5e-6 s", "must be below", "= 4.8719e-6 s"],
         ),
         (
-            "simulate --solver fixed-step --dt 0",
+            "simulate --set method=fixed-step --set dt=0",
             &["dt = 0", "must be a finite number > 0, in s"],
         ),
         (
-            "simulate --tolerance 1",
+            "simulate --set tolerance=1",
             &["tolerance = 1", "must be a number from 1e-12 to 1e-2"],
         ),
         // Its files.
@@ -644,7 +644,7 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
             &["'[SWEEP.toml]'", "--preset"],
         ),
         (
-            "simulate good.toml --dt 1e-6",
+            "simulate good.toml --set dt=1e-6",
             &["dt = 1e-6: unknown key in [solver]"],
         ),
         (

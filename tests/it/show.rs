@@ -234,7 +234,7 @@ fn sets_of_a_zip_with_seeds_are_in_the_sweep_and_those_that_left_it_are_named() 
 }
 
 #[test]
-fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_and_report() {
+fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_and_report() {
     let folder = Folder::new();
     folder.write(
         "cut.toml",
@@ -244,12 +244,9 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
         "cut_by_max_time",
         [
             "run cut.toml --out out --threads 1",
-            "status out",
             "run cut.toml --set max_time=0.01 --out early --threads 1",
-            "status early",
             // Those that end at a time are whole.
             "run cut.toml --set max_time=9 --set slips=4 --set time=0.4 --out whole --threads 1",
-            "status whole",
         ],
     );
     let columns = "--json --columns tau_mean,tau_sd,intervals,slips,jobs_cut,tau_mean_off";
@@ -259,11 +256,6 @@ fn jobs_that_max_time_cut_are_counted_with_about_what_is_missing_by_show_status_
     let off = -variation * variation * 6.0 / number("intervals");
     assert_eq!(number("jobs_cut"), 6.0);
     assert!((number("tau_mean_off") / off - 1.0).abs() < 1e-12);
-    let status = json(&folder.ends(0, "status out --json").stdout);
-    assert_eq!(
-        (&status["cut"]["jobs"], status["cut"]["slips"].as_f64()),
-        (&6.into(), Some(number("slips")))
-    );
     folder.ends(0, "report out");
     let census = &unpacked(&page(&folder, "out/report.html"))["census"];
     let shown = census["tau_off"].as_f64().unwrap();

@@ -24,10 +24,12 @@ fn first_break(contacts: &Rows) -> (f64, f64, usize) {
 #[test]
 fn identical_contacts_first_break_together_at_the_reference_time_and_force() {
     let folder = Folder::new();
-    for solver in ["--solver event-driven", "--solver fixed-step --dt 1e-6"] {
+    for solver in ["method=event-driven", "method=fixed-step --set dt=1e-6"] {
         folder.ends(
             0,
-            &format!("simulate --set dfs=0 --time 0.0633 {solver} --contacts contacts.parquet"),
+            &format!(
+                "simulate --set dfs=0 --time 0.0633 --set {solver} --contacts contacts.parquet"
+            ),
         );
         let contacts = folder.file("contacts.parquet");
         let (time, force, together) = first_break(&contacts);
@@ -248,7 +250,7 @@ fn a_time_limit_ends_a_simulation() {
         .ends(0, "simulate --set N=9 --time 0.25 --json")
         .stdout;
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
-    assert_eq!(report["simulated_seconds"].as_f64(), Some(0.25));
+    assert_eq!(report["simulated_time"].as_f64(), Some(0.25));
     let slips = report["slips"].as_u64().unwrap();
     // Slips of nine blocks are some 0.03 s apart, and five are start-up.
     assert!((1..=6).contains(&slips), "{slips}");

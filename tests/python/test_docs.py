@@ -53,8 +53,10 @@ def test_every_field_of_json_output_is_documented(stickslip, results, tmp_path):
         row = next(line for line in text.splitlines() if line.startswith(f"| `{command}` |"))
         fields = json.loads(stickslip(*arguments, "--json").stdout)
         assert "Its `format` increases" in text and fields.pop("format") > 0, command
+        of_jobs = pq.read_schema(next(results.glob("tables/jobs/*.parquet"))).names
+        described = of_jobs if "columns of [`jobs`](tables.md#jobs)" in row else []
         for field in fields:
-            assert f"`{field}`" in row, f"{command} --json: {field}"
+            assert field in described or f"`{field}`" in row, f"{command} --json: {field}"
 
 
 @pytest.mark.parametrize("text", list(examples()))

@@ -76,6 +76,12 @@ def expected(results, name):
     return table.assign(control=False)
 
 
+def test_what_verifies_a_file_of_a_directory_is_in_no_export(extended):
+    assert b"seal" in pq.read_metadata(extended / "results/reduced/sets.parquet").metadata
+    assert b"seal" not in pq.read_metadata(extended / "parquet/sets.parquet").metadata
+
+
+
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("format", FORMATS)
 def test_every_reader_finds_the_rows_of_the_tables_with_what_was_swept(extended, format, reader):

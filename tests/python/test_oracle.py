@@ -14,7 +14,7 @@ def log(stickslip, tmp_path_factory):
     """The contact log of a small slider under modulation, ended early."""
     file = tmp_path_factory.mktemp("oracle") / "log.parquet"
     flags = ("--set", "N=9", "--set", "Delta=1e-6", "--set", "frequency=58")
-    stickslip("simulate", *flags, "--time", 0.05, "--tolerance", 1e-10, "--contacts", file)
+    stickslip("simulate", *flags, "--time", 0.05, "--set", "tolerance=1e-10", "--contacts", file)
     return file
 
 
@@ -47,7 +47,7 @@ def test_the_oracle_and_scipy_confirm_a_log(log):
 def test_the_oracle_confirms_a_pulse(stickslip, tmp_path):
     file = tmp_path / "pulse.parquet"
     flags = ("--set", "N=9", "--set", "Delta=1e-6", "--set", "frequency=58", "--set", "pulse_start=0.02")
-    stickslip("simulate", *flags, "--set", "pulse_cycles=2", "--time", 0.07, "--tolerance", 1e-10, "--contacts", file)
+    stickslip("simulate", *flags, "--set", "pulse_cycles=2", "--time", 0.07, "--set", "tolerance=1e-10", "--contacts", file)
     found = json.loads(run("oracle", file).stdout)
     assert found["within_limits"] and found["breaks"] > 100
     assert found["worst_residual"] < 1e-9 and found["worst_time_error"] < 1e-11

@@ -86,20 +86,12 @@ impl Zigzag {
     }
 }
 
-/// A drop, from `start` to `end` in s, of a size in N.
-#[derive(Clone, Copy, Debug)]
-struct Drop {
-    start: f64,
-    end: f64,
-    size: f64,
-}
-
 /// Finds drops as time passes.
 #[derive(Clone, Debug)]
 pub(super) struct DropDetector {
     drive: Drive,
     zigzag: Zigzag,
-    drops: Vec<Drop>,
+    drops: Vec<Fall>,
 }
 
 impl DropDetector {
@@ -140,26 +132,23 @@ impl DropDetector {
 
     /// Adds a fall, if it is a drop.
     fn add(&mut self, fall: Option<Fall>) {
-        let drop = fall.map(|fall| Drop {
-            start: fall.top.time,
-            end: fall.bottom.time,
-            size: fall.size(self.drive.stiffness),
-        });
         let least = self.zigzag.least;
-        self.drops.extend(drop.filter(|drop| drop.size >= least));
+        let is_drop = |fall: &Fall| fall.size(self.drive.stiffness) >= least;
+        self.drops.extend(fall.filter(is_drop));
     }
 
     /// The drops of slips, given the first and last break of each in order of time. A fall that is under way at the end
     /// counts as far as it went.
     pub(super) fn of_slips(mut self, slips: &[(f64, f64)]) -> Vec<Drops> {
         self.add(self.zigzag.under_way());
-        let largest = |drops: &[Drop]| drops.iter().map(|drop| drop.size).max_by(f64::total_cmp);
+        let size = |drop: &Fall| drop.size(self.drive.stiffness);
+        let largest = |drops: &[Fall]| drops.iter().map(size).max_by(f64::total_cmp);
         let mut drops = &self.drops[..];
         let of_slip = |&(first_break, last_break): &(f64, f64)| {
             let (before, others) =
-                drops.split_at(drops.partition_point(|drop| drop.end < first_break));
+                drops.split_at(drops.partition_point(|drop| drop.bottom.time < first_break));
             let (during, later) =
-                others.split_at(others.partition_point(|drop| drop.start <= last_break));
+                others.split_at(others.partition_point(|drop| drop.top.time <= last_break));
             drops = later;
             Drops {
                 before: Some(before.len() as u64),

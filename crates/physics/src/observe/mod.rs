@@ -6,7 +6,7 @@
 //! ```text
 //! measure.rs                     one job: parameters -> measurements; recording.rs: what a sweep asks for
 //! slip_observer.rs, rupture.rs   contact events -> slips and precursors (slip.rs), fronts
-//! drops.rs, sampled.rs           shear force alone -> slips: of the model, of a trace
+//! drops.rs, sampled/             shear force alone -> slips: of the model, of a trace
 //! records.rs                     traces, maps, profiles and contact events of a single job
 //! ```
 

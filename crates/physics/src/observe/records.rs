@@ -24,10 +24,6 @@ impl Observer for Observers<'_> {
         self.0.iter().any(|each| each.follows_attachments())
     }
 
-    fn follows_force(&self) -> bool {
-        self.0.iter().any(|each| each.follows_force())
-    }
-
     fn is_satisfied(&self) -> bool {
         self.0[0].is_satisfied()
     }

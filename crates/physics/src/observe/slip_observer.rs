@@ -386,10 +386,6 @@ impl Observer for SlipObserver {
         false
     }
 
-    fn follows_force(&self) -> bool {
-        self.drops.is_some()
-    }
-
     fn is_satisfied(&self) -> bool {
         self.is_complete() || self.measured.has_given_up
     }

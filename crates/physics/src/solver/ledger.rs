@@ -6,8 +6,7 @@
 //! the solver. A break found late, a contact attached stressed or a series cut short all show as a residual.
 //!
 //! A leap drops the free motion about the driven solution. Its energy is what damping would have taken, and is entered
-//! as such; [`Ledger::left_out`] reports how much that was. Where a leap carries the free motion on, it is resolved
-//! again for its damping and for the work on it, which the segment of the leap does not show.
+//! as such; [`Ledger::left_out`] reports how much that was.
 
 use super::harmonic::Harmonic;
 use super::segment::{CubicStep, ForcePath, PolynomialPath, Segment};

@@ -119,12 +119,6 @@ pub trait Observer {
         true
     }
 
-    /// Whether it asks segments for the force between their ends or for its turns, and not only for extremes and
-    /// impulse.
-    fn follows_force(&self) -> bool {
-        true
-    }
-
     /// Whether the simulation may end. Asked after each segment and its events.
     fn is_satisfied(&self) -> bool {
         false
@@ -193,8 +187,7 @@ pub fn simulate(
     run(parameters, solver, limits, observer, None)
 }
 
-/// The same with an energy ledger, which costs several times as much; the simulation itself is the same to the last
-/// bit, but that the event-driven solver takes Taylor steps at any tolerance.
+/// The same with an energy ledger, which costs several times as much; the simulation itself is the same to the last bit.
 pub fn simulate_audited(
     parameters: &Parameters,
     solver: Solver,

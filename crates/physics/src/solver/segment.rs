@@ -30,10 +30,8 @@ pub struct PolynomialPath<'a> {
 /// Cubics on a grid of time, from `first` in the first of them on.
 #[derive(Clone, Copy, Debug)]
 pub struct GridPath<'a> {
-    /// The cubics, one a step, or only the first and the last; see [`super::Observer::follows_force`].
+    /// The cubics, one a step.
     pub steps: &'a [CubicStep],
-    /// Number of steps.
-    pub count: usize,
     /// Where in the first step the segment starts, from 0 to 1.
     pub first: f64,
     /// Length of a step, in s.
@@ -421,10 +419,11 @@ impl GridPath<'_> {
             }
         };
         // The last first, since the force mostly rises.
-        let begin = (self.count - 1) as f64;
+        let last = self.steps.len() - 1;
+        let begin = last as f64;
         let from = if begin > 0.0 { 0.0 } else { self.first };
         let to = (self.first + duration / self.spacing - begin).min(1.0);
-        offer(begin, &self.steps[self.steps.len() - 1], from, to);
+        offer(begin, &self.steps[last], from, to);
         if begin > 0.0 {
             offer(0.0, &self.steps[0], self.first, 1.0);
         }
@@ -491,7 +490,7 @@ mod tests {
             let bounds = steps.iter().map(CubicStep::bounds).fold([f64::MAX, f64::MIN], |[low, high], step| {
                 [low.min(step[0]), high.max(step[1])]
             });
-            let path = GridPath { steps: &steps, count: steps.len(), first, spacing, inner, bounds, end, integral };
+            let path = GridPath { steps: &steps, first, spacing, inner, bounds, end, integral };
             let segment = Segment { start: 3.0, duration: (last - first) * spacing, path: ForcePath::Grid(path) };
             assert_turns(&segment);
             let samples = || (0..=2000).map(|i| segment.force_after(segment.duration * f64::from(i) / 2000.0));

@@ -23,10 +23,6 @@ impl Observer for Nobody {
     fn follows_attachments(&self) -> bool {
         false
     }
-
-    fn follows_force(&self) -> bool {
-        false
-    }
 }
 
 /// How many times as long the second takes as the first: by the least of runs that take turns.

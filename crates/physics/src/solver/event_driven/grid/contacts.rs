@@ -4,6 +4,10 @@
 //! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes it by terms in ξ = s - s'
 //! ([`event`](super::super::event)). Added at s = 1 they correct the displacement, and at s = 0, backwards, the
 //! increment.
+//!
+//! In short: after a step, [`change_contacts`] first breaks what blocks have reached, then attaches what is due, in the
+//! order of time at each block. For a block, [`Path`] is its motion within the step: breaks are found along it
+//! ([`break_along`]) and bend it, and what has become of its end is added to the grid's motion ([`settle`]).
 
 use super::Grid;
 use super::step::{Correction, GridStep, add};

@@ -5,10 +5,7 @@ use crate::solver::segment::{CubicStep, Extremes, ForcePath, GridPath, Segment};
 /// Steps of shear force, from somewhere in the first of them on.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ForceHistory {
-    /// Whether all steps are kept, or only the first and the last.
-    pub keeps_all: bool,
-    steps: Vec<CubicStep>,
-    pub count: usize,
+    pub steps: Vec<CubicStep>,
     /// Whether the last step turns or lies beside one that does.
     turns: bool,
     /// Where in the first step it begins.
@@ -26,7 +23,6 @@ impl ForceHistory {
     pub fn restart(&mut self, start: f64) {
         self.steps.clear();
         *self = Self {
-            keeps_all: self.keeps_all,
             steps: std::mem::take(&mut self.steps),
             start,
             ..Self::default()
@@ -37,21 +33,15 @@ impl ForceHistory {
     #[inline(always)]
     pub fn push(&mut self, step: CubicStep) {
         self.integral += step.integral();
-        let Some(last) = self.steps.last_mut() else {
-            (self.count, self.turns) = (1, false);
-            return self.steps.push(step);
-        };
-        let turns = last.rises() != step.rises();
-        if self.count > 1 && (self.turns || turns) {
-            self.inner.include_step((self.count - 1) as f64, last);
+        if let Some(last) = self.steps.last() {
+            let turns = last.rises() != step.rises();
+            let before = self.steps.len() - 1;
+            if before > 0 && (self.turns || turns) {
+                self.inner.include_step(before as f64, last);
+            }
+            self.turns = turns;
         }
-        if self.count == 1 || self.keeps_all {
-            self.steps.push(step);
-        } else {
-            *last = step;
-        }
-        self.count += 1;
-        self.turns = turns;
+        self.steps.push(step);
     }
 
     /// F_S at s in the last step, in N.
@@ -66,7 +56,7 @@ impl ForceHistory {
     pub fn segment_to(&self, s: f64, spacing: f64, origin: f64) -> Option<Segment<'_>> {
         let first = self.steps.first()?;
         let last = self.steps.last()?;
-        let steps = (self.count - 1) as f64 + s - self.first;
+        let steps = (self.steps.len() - 1) as f64 + s - self.first;
         let before = if self.first > 0.0 {
             first.integral_to(self.first)
         } else {
@@ -81,7 +71,6 @@ impl ForceHistory {
         let [lowest, highest] = last.bounds();
         let path = GridPath {
             steps: &self.steps,
-            count: self.count,
             first: self.first,
             spacing,
             inner: self.inner,

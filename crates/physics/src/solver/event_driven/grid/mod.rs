@@ -97,7 +97,6 @@ impl Grid {
     pub fn set_observed(&mut self, observer: &dyn Observer, is_audited: bool) {
         self.step.end_force = is_audited.then(|| self.step.force.clone());
         self.events.wants_attachments = observer.follows_attachments();
-        self.history.keeps_all = observer.follows_force();
     }
 
     /// Takes over a frame that has moved.
@@ -332,7 +331,7 @@ impl Integration<'_> {
             return self.step_back(observer);
         }
         self.largest_force = self.largest_force.max(self.grid.force);
-        if self.grid.history.count > MAX_HISTORY {
+        if self.grid.history.steps.len() > MAX_HISTORY {
             self.report_force(1.0, observer);
         }
         Ok(())

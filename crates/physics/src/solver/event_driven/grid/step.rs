@@ -1,5 +1,10 @@
 //! One step of the grid: a recurrence of two stencils, of fourth order in ω_max h.
 //!
+//! In short: displacements at the next point follow from those at this one and their increments, as the forces at both
+//! points are known ([`march`]). The coefficients lie in a [`GridStep`], and change where a contact does
+//! ([`GridStep::update`]). Steps end where a block reaches a break position, for [`contacts`](super::contacts) to go on;
+//! where the motion leaves the grid, [`velocity`] says how fast it is.
+//!
 //! With h constant, σ = γh/2, e = exp(-σ), Z = h² S/m and φ_n = h² f_n, where f is all force per mass but the damping,
 //!
 //! ```text

@@ -8,6 +8,9 @@
 //! small part of the error of a step, it is merged into the step: the change is added to the series, which stays
 //! accurate after the event. The step ends where the series would no longer be accurate. Contract: events in the right
 //! order, also of blocks whose series has changed.
+//!
+//! In short: [`Integration::take_step`] expands the state into a series, looks for the first break in it, goes there or
+//! to the next reattachment, changes the contact and with it the series, and goes on in the same step as long as it may.
 
 mod series;
 
