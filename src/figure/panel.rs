@@ -6,7 +6,7 @@ use super::hues::{COLOUR_BAR, ColourBar};
 use super::legend::{LegendEntry, Mark};
 use super::picture::Picture;
 use super::style::{
-    BAR_WIDTH, BLACK, Dot, Fill, HOLLOW, Ink, Look, Place, RADIUS, Stroke, WHITE, outline_of,
+    BAR_WIDTH, Dot, Fill, HOLLOW, Ink, Look, Place, RADIUS, Stroke, WHITE, outline_of,
 };
 
 pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
@@ -102,21 +102,6 @@ impl Layer<'_> {
             Self::Drawn(draw) => draw(sheet, frame),
         }
     }
-}
-
-/// A mean with the ends of its interval, at a place along x.
-pub(super) type MeanPlace = (f64, f64, Ends);
-
-/// Means of other directories, by their numbers, with their intervals.
-pub(super) fn hollow_marks(
-    others: &[Vec<MeanPlace>],
-) -> impl Iterator<Item = Layer<'static>> + use<'_> {
-    others.iter().enumerate().flat_map(|(number, means)| {
-        let bars = means.iter().map(|&(x, _, ends)| (x, ends)).collect();
-        let places = means.iter().map(|&(x, mean, _)| (x, mean)).collect();
-        let bars = Layer::Bars(bars, Stroke::solid(BLACK, BAR_WIDTH));
-        [bars, Layer::Hollow(places, number, BLACK)]
-    })
 }
 
 pub(super) struct Panel<'a> {

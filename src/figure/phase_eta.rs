@@ -6,10 +6,11 @@ use super::beside::Other;
 use super::frame::{Cell, Ends, Layout, OVERLAP};
 use super::hues::ColourBar;
 use super::legend::{LegendEntry, Mark, entry};
-use super::panel::{self, Layer, MeanPlace, Panel};
+use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::style::{
-    BAR_WIDTH, BLUE, Dot, Fill, Look, Place, RADIUS, RED, REFERENCE, Stroke, WHITE, cell_shade,
+    BAR_WIDTH, BLACK, BLUE, Dot, Fill, Look, Place, RADIUS, RED, REFERENCE, Stroke, WHITE,
+    cell_shade,
 };
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point};
@@ -49,6 +50,23 @@ struct DensityColumn {
     slips: Vec<Place>,
 }
 
+/// The mean phase of slips about an η, in rad.
+struct AveragePhase {
+    eta: f64,
+    mean: f64,
+    interval: Ends,
+}
+
+impl AveragePhase {
+    fn place(&self) -> Place {
+        (self.eta, self.mean)
+    }
+
+    fn bar(&self) -> (f64, Ends) {
+        (self.eta, self.interval)
+    }
+}
+
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
 pub(super) fn phase_eta(
@@ -65,7 +83,7 @@ pub(super) fn phase_eta(
     let cells: Vec<(Cell, f64)> = columns.iter().flat_map(cells).collect();
     let (least, most) = bounds(cells.iter().map(|cell| cell.1))?;
     let shades = Axis::logarithmic("density (1/rad)", least, most.max(10.0 * least));
-    let etas = of_others.iter().flatten().map(|mean| mean.0);
+    let etas = of_others.iter().flatten().map(|average| average.eta);
     let ends = [columns.first()?.edges.0, columns.last()?.edges.1];
     let (low, high) = bounds(etas.chain(ends))?;
     let x = axis_of_eta(low, high);
@@ -82,7 +100,7 @@ pub(super) fn phase_eta(
     ];
     let shown = entries.into_iter().filter(|(is_shown, ..)| *is_shown);
     let mut entries: Vec<LegendEntry> = shown.map(|(_, mark, text)| entry(mark, text)).collect();
-    let angles = of_others.iter().flatten().map(|mean| mean.1);
+    let angles = of_others.iter().flatten().map(|average| average.mean);
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1).chain(angles));
     let curve = |phase: fn(f64) -> Option<f64>| {
         let etas = x.evenly_placed(CURVE_POINTS).into_iter();
@@ -95,8 +113,8 @@ pub(super) fn phase_eta(
         .iter()
         .map(|&(cell, density)| (cell, cell_shade(shades.place(density))));
     let mut layers = vec![Layer::Cells(coloured.collect(), OVERLAP)];
-    let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
-    let bars = averages.iter().map(|&(eta, _, ends)| (eta, ends));
+    let means = || averages.iter().map(AveragePhase::place).collect();
+    let bars = averages.iter().map(AveragePhase::bar);
     layers.extend([
         Layer::Upright(1.0, REFERENCE),
         Layer::Curve(curve(|eta| Some(minimum_phase_asymptote(eta))), ASYMPTOTE),
@@ -110,7 +128,12 @@ pub(super) fn phase_eta(
         opacity: 1.0,
     });
     entries.extend(beside.entries(Some(own), |other| !of_others[other].is_empty()));
-    layers.extend(panel::hollow_marks(&of_others));
+    for (number, averages) in of_others.iter().enumerate() {
+        let bars = averages.iter().map(AveragePhase::bar).collect();
+        let places = averages.iter().map(AveragePhase::place).collect();
+        layers.push(Layer::Bars(bars, Stroke::solid(BLACK, BAR_WIDTH)));
+        layers.push(Layer::Hollow(places, number, BLACK));
+    }
     let bar = Some(ColourBar::of_axis(&shades, cell_shade));
     let panel = Panel {
         bar,
@@ -134,14 +157,18 @@ fn phases(points: &[Point]) -> Vec<Place> {
 }
 
 /// The middle of the η of each column's slips, their mean phase in rad, and its interval, unless that is the whole turn.
-fn averages(bins: &[BackboneBin], columns: &[DensityColumn]) -> Vec<MeanPlace> {
+fn averages(bins: &[BackboneBin], columns: &[DensityColumn]) -> Vec<AveragePhase> {
     let average = |bin: &BackboneBin| {
         let is_of_bin =
             |column: &&DensityColumn| (bin.eta_low..bin.eta_high).contains(&column.values.0);
         let (low, high) = columns.iter().find(is_of_bin)?.values;
         let ends = bin.phase_mean_low.zip(bin.phase_mean_high);
         let known = ends.filter(|(low, high)| high - low < 0.999 * TAU);
-        Some(((low * high).sqrt(), bin.phase_mean?, known?))
+        Some(AveragePhase {
+            eta: (low * high).sqrt(),
+            mean: bin.phase_mean?,
+            interval: known?,
+        })
     };
     bins.iter().filter_map(average).collect()
 }
