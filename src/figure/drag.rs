@@ -192,13 +192,10 @@ mod tests {
             drive_velocity: 1e-4,
             amplitude: 1e-6,
             period: Some(period),
-            eta: 2.0,
             ramp_stage,
-            onset: 1.0,
             interval: Some(n * period),
             periods: Some(4),
-            phase: Some(-0.5),
-            has_phase: true,
+            ..Point::default()
         }
     }
 

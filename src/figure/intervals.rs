@@ -94,13 +94,11 @@ mod tests {
             drive_velocity: 1e-4,
             amplitude: 1e-6,
             period: Some(0.01),
-            eta: 20.0,
-            ramp_stage: None,
-            onset: 1.0,
             interval: Some(n as f64 * 0.01),
             periods: Some(n),
             phase: Some(-0.5),
             has_phase,
+            ..Point::default()
         }
     }
 

@@ -533,12 +533,11 @@ mod tests {
             amplitude: 1e-6,
             period: Some(period),
             eta: 0.5 + f64::from(step),
-            ramp_stage: None,
-            onset: 1.0,
             interval: Some(4.0 * period),
             periods: Some(4),
             phase: Some(-0.01 * f64::from(step)),
             has_phase: step.is_multiple_of(2),
+            ..Point::default()
         }
     }
 

@@ -51,6 +51,7 @@ struct DensityColumn {
 }
 
 /// The mean phase of slips about an η, in rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct AveragePhase {
     eta: f64,
     mean: f64,
@@ -291,6 +292,11 @@ mod tests {
             ..BackboneBin::default()
         };
         let found = averages(&[bin(1.8, 0.1), bin(18.0, PI)], &columns);
-        assert_eq!(found, [(6.0_f64.sqrt(), -1.0, (-1.1, -0.9))]);
+        let expected = AveragePhase {
+            eta: 6.0_f64.sqrt(),
+            mean: -1.0,
+            interval: (-1.1, -0.9),
+        };
+        assert_eq!(found, [expected]);
     }
 }

@@ -8,8 +8,11 @@
 //! - the jackknife over units, with Student's t (B. Efron and C. Stein, Ann. Stat. 9, 586 (1981));
 //! - *not seen*: of a kind of slip that no unit holds, there may be [`MAX_UNSEEN`];
 //! - *ends*: the change if the first and the last value of each job count by half. Where slips alternate, jobs may all
-//!   begin and end with the same kind, so that their sums do not vary, and are wrong.
+//!   begin and end with the same kind, so that their sums do not vary, and are wrong: an error of one sign, not a random
+//!   one, so it is added.
 //!
+//! A value enters as its weight and two numbers ([`Sums`]), and a statistic is a function of such sums: [`mean`],
+//! [`length`] and the like. [`Units`] has the sums of each unit, [`Units::estimate`] the interval.
 //! Angles are unit vectors. docs/coverage.md has how often intervals hold the true value.
 
 use crate::model::standard_normal_quantile;

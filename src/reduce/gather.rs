@@ -248,7 +248,7 @@ impl RampStage {
 
 columns! {
     /// A slip as a point of a scatter figure.
-    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Point {
         drive_velocity as "V0": f64 = "m/s", "drive velocity", "", Class::Parameter;
         amplitude as "Delta": f64 = "m", "amplitude of the modulation at the onset";

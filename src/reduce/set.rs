@@ -250,7 +250,8 @@ fn ratio_of_numbers(jobs: &[(u64, Vec<Sums>)]) -> f64 {
     between / by_seeds
 }
 
-/// Between quantiles at the ends of the interval of the share that does not exceed the median (R. S. Woodruff, J. Am.
+/// Of values in order of time: between quantiles at the ends of the interval of the share that does not exceed the
+/// median (R. S. Woodruff, J. Am.
 /// Stat. Assoc. 47, 635 (1952)).
 fn median_interval(jobs: &[(u64, Vec<f64>)], ranked: &Ranked) -> Option<Interval> {
     let median = ranked.quantile(0.5)?;

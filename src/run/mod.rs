@@ -1,6 +1,7 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
+//! shard.rs    the parts of a plan, or a share of them
 //! take.rs     outlines of missing parts, claimed -> their jobs while there is time (limits.rs)
 //! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> rayon -> their files -> Results::put, and events for
 //!             the log and a display
@@ -14,6 +15,7 @@
 
 mod collect;
 pub mod limits;
+mod shard;
 mod state;
 mod take;
 #[cfg(test)]
@@ -21,8 +23,8 @@ mod tests;
 
 pub use crate::results::log::{RunEvent, RunReport};
 pub use crate::results::pending::Overview;
+pub use shard::Shard;
 pub use state::{Failure, MAX_FAILURES, Present, Reasons, Status, Tally, status};
-pub use take::Shard;
 
 use crate::observe::Measurements;
 use crate::results::claims::{ClaimState, Claims};

@@ -1,4 +1,5 @@
-//! A sweep: the points of its axes in grid order, those that are jobs, and the look-up of a job without walking.
+//! [`Sweep`]: what a sweep file says. And its grid: the points of the axes in grid order, those that are jobs, and the
+//! look-up of a job without walking.
 //!
 //! Grid order: axes as in the file, the last moves fastest. A point is a job if the conditions hold and no earlier
 //! point has the same parameters; that happens without modulation only, where T, η and the frequency mean nothing:

@@ -540,8 +540,8 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
             &["max_time = \"soon\"", "must be a finite number > 0, in s"],
         ),
         (
-            "simulate --set method=leapfrog",
-            &["method = \"leapfrog\": must be \"event-driven\" or \"fixed-step\""],
+            "simulate --set method=no-such",
+            &["method = \"no-such\": must be \"event-driven\" or \"fixed-step\""],
         ),
         (
             "simulate --set dt=1e-6",

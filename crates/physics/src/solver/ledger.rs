@@ -55,7 +55,8 @@ pub struct Spent {
     pub broken: f64,
 }
 
-/// The entries that a solver makes; cells, since the meter reads them while it makes them.
+/// The entries that a solver makes: losses in damping as it goes, and the energies once, at the end. Cells, since the
+/// meter reads them while it makes them.
 #[derive(Clone, Debug)]
 pub(super) struct Audit {
     /// Mass of a block in kg, and stiffness of the springs between blocks and of the driving spring in N/m.

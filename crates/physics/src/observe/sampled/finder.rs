@@ -1,7 +1,10 @@
 //! The third pass: the slips for one drop size.
 //!
-//! Where the noise is seen, maxima of the force are maxima of the noise: an onset is then the last sample that reaches the
-//! median level before the fall (half the error of a sample within two noises of it), and a drop lies between means.
+//! Without noise, an onset is the largest sample before a fall, and the drop reaches from there to the least one.
+//! Where the noise is seen, the largest sample is a maximum of the noise. So the level before the fall is the median of
+//! the last samples near its top; the onset is the last sample at that level, within the noise; and the drop lies
+//! between the means of a few samples before the fall and of as many after it. A few are those in which the drive does
+//! not load by more than the noise.
 
 use super::super::drops::{Fall, Zigzag};
 use super::{Pass, Samples, TraceDrive};

@@ -1,4 +1,5 @@
-//! Slips in a force that was sampled: those of a trace, by the definition of [`drops`](super::drops).
+//! Slips in a force that was sampled: those of a measured trace, by the definition of [`drops`](super::drops).
+//! Parameters of the model enter only as the drive that loaded it.
 //!
 //! Three passes over the samples, piece by piece, each in constant memory but for the slips:
 //!

@@ -6,7 +6,7 @@
 //! increment.
 //!
 //! In short: after a step, [`change_contacts`] first breaks what blocks have reached, then attaches what is due, in the
-//! order of time at each block. For a block, [`Path`] is its motion within the step: breaks are found along it
+//! order of time at each block. Blocks beside see the change at the end of the step, not in it. For a block, [`Path`] is its motion within the step: breaks are found along it
 //! ([`break_along`]) and bend it, and what has become of its end is added to the grid's motion ([`settle`]).
 
 use super::Grid;

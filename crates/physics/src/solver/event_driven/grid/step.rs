@@ -15,7 +15,7 @@
 //! the expansion in Z of the exact recurrence of a damped oscillator, 2 e cos(√(Z - σ²)); the last term is what the
 //! drive u adds to the second derivative of the force. It is exact for damping, for equilibrium and for uniform motion.
 //! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present
-//! law.
+//! law: an event changes these two, and no step is taken again.
 //!
 //! Steps are written twice: with the motion in registers and in memory. One loop for both costs 3 to 4 % of a run.
 
