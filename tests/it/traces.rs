@@ -288,6 +288,10 @@ fn a_stretch_of_a_trace_is_drawn_from_its_file_as_long_as_that_is_the_same() {
     assert!(figure.contains(">Time t (ms)<") && figure.contains(">onset of a slip<"));
     // Four slips, and their entry.
     assert_eq!(figure.matches("#d62020").count(), 5, "{figure}");
+    folder.ends(0, &format!("{stretch} --size 120mmx80mm"));
+    let sized = std::fs::read_to_string(folder.path("out/figures/trace.svg")).unwrap();
+    // 96 pixels an inch.
+    assert!(sized.contains(r#"width="453.54" height="302.36""#));
     let problem = |command: &str| folder.ends(2, command).stderr;
     assert!(problem("plot out --from 9").contains("fewer than two instants"));
     folder.write("trace.csv", &trace.replacen("\n0,5;", "\n0,50;", 1));
