@@ -404,7 +404,7 @@ impl TraceReader<'_> {
                 Ok(())
             });
             let rows = read.with_context(|| name.clone())?;
-            runs.pass.end();
+            runs.end();
             all.push((runs.begun, rows));
         }
         Ok(all)
@@ -474,9 +474,7 @@ impl Runs<'_> {
     }
 
     fn begin(&mut self, rows: &Rows, row: usize) -> Result<()> {
-        if !self.begun.is_empty() {
-            self.pass.end();
-        }
+        self.end();
         let [velocity, stiffness, amplitude, period] = parameters(rows, row)?;
         let stiffness = match self.reader.force.unit {
             "N" => stiffness,
@@ -502,7 +500,7 @@ impl Runs<'_> {
         };
         self.loading = Some(loading);
         self.mean = Smoothing::default();
-        self.pass.begin(loading);
+        self.pass.begin();
         let first = rows.of(Key::Time).map_or(f64::NAN, |times| times[row]);
         self.begun.push(Run {
             name: rows.run_name(row),
@@ -517,11 +515,18 @@ impl Runs<'_> {
         Ok(())
     }
 
+    /// Ends the run that was begun last.
+    fn end(&mut self) {
+        if let Some(loading) = self.loading.take() {
+            self.pass.end(&loading);
+        }
+    }
+
     fn push(&mut self, times: &[f64], forces: &[f64]) {
         let Some(loading) = self.loading else { return };
         let smooth = self.reader.smooth;
         if self.reader.force.key == Key::Force && smooth == 1 {
-            return self.pass_on(times, forces);
+            return self.pass_on(&loading, times, forces);
         }
         let (mut mean_times, mut mean_forces) = (Vec::new(), Vec::new());
         for (&time, &force) in times.iter().zip(forces) {
@@ -539,12 +544,12 @@ impl Runs<'_> {
                 self.mean = Smoothing::default();
             }
         }
-        self.pass_on(&mean_times, &mean_forces);
+        self.pass_on(&loading, &mean_times, &mean_forces);
     }
 
-    fn pass_on(&mut self, times: &[f64], forces: &[f64]) {
+    fn pass_on(&mut self, loading: &TraceDrive, times: &[f64], forces: &[f64]) {
         if !times.is_empty() {
-            self.pass.push(Samples { times, forces });
+            self.pass.push(loading, Samples { times, forces });
         }
     }
 }

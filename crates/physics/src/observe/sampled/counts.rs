@@ -36,7 +36,6 @@ impl Count {
 /// How many slips there are for each of many drop sizes.
 #[derive(Clone, Debug)]
 pub struct Counts {
-    loading: Option<TraceDrive>,
     /// Rising.
     pub of_sizes: Vec<Count>,
 }
@@ -52,7 +51,6 @@ impl Counts {
             before: None,
         };
         Self {
-            loading: None,
             of_sizes: sizes.into_iter().map(count).collect(),
         }
     }
@@ -91,12 +89,7 @@ impl Count {
 }
 
 impl Pass for Counts {
-    fn begin(&mut self, loading: TraceDrive) {
-        self.loading = Some(loading);
-    }
-
-    fn push(&mut self, samples: Samples<'_>) {
-        let Some(loading) = self.loading else { return };
+    fn push(&mut self, loading: &TraceDrive, samples: Samples<'_>) {
         let least = self.of_sizes.first().map_or(0.0, |count| count.least);
         let mut turns = Vec::new();
         loading.turns(samples, least, |now| turns.push(now));
@@ -105,8 +98,8 @@ impl Pass for Counts {
         }
     }
 
-    fn end(&mut self) {
-        let stiffness = self.loading.map_or(0.0, |loading| loading.drive.stiffness);
+    fn end(&mut self, loading: &TraceDrive) {
+        let stiffness = loading.drive.stiffness;
         let mut turns = Vec::new();
         for count in &mut self.of_sizes {
             turns = count.follow(&turns, stiffness);

@@ -37,7 +37,6 @@ pub struct SampledSlip {
 pub struct Finder {
     least: f64,
     noise: f64,
-    loading: Option<TraceDrive>,
     zigzag: Option<Zigzag>,
     /// When the fall before was at its least.
     before: f64,
@@ -52,7 +51,6 @@ impl Finder {
         Self {
             least,
             noise,
-            loading: None,
             zigzag: None,
             before: f64::NEG_INFINITY,
             times: Vec::new(),
@@ -132,16 +130,14 @@ impl Finder {
 }
 
 impl Pass for Finder {
-    fn begin(&mut self, loading: TraceDrive) {
-        self.loading = Some(loading);
+    fn begin(&mut self) {
         self.times.clear();
         self.forces.clear();
         self.runs.push(Vec::new());
         self.before = f64::NEG_INFINITY;
     }
 
-    fn push(&mut self, samples: Samples<'_>) {
-        let Some(loading) = self.loading else { return };
+    fn push(&mut self, loading: &TraceDrive, samples: Samples<'_>) {
         if let Some(zigzag) = &self.zigzag
             && self.times.len() > KEPT
         {
@@ -161,14 +157,14 @@ impl Pass for Finder {
         });
         self.zigzag = zigzag;
         for (fall, end) in ended {
-            self.add(fall, end, &loading);
+            self.add(fall, end, loading);
         }
     }
 
-    fn end(&mut self) {
+    fn end(&mut self, loading: &TraceDrive) {
         let fall = self.zigzag.take().and_then(|zigzag| zigzag.under_way());
-        if let Some((fall, loading)) = fall.zip(self.loading) {
-            self.add(fall, f64::INFINITY, &loading);
+        if let Some(fall) = fall {
+            self.add(fall, f64::INFINITY, loading);
         }
     }
 }

@@ -76,14 +76,14 @@ pub struct Samples<'a> {
     pub forces: &'a [f64],
 }
 
-/// What goes over the runs of a trace, piece by piece.
+/// What goes over the runs of a trace, piece by piece, each under a drive that loads it.
 pub trait Pass {
     /// The next run begins.
-    fn begin(&mut self, loading: TraceDrive);
+    fn begin(&mut self) {}
     /// The next samples, at least one.
-    fn push(&mut self, samples: Samples<'_>);
+    fn push(&mut self, loading: &TraceDrive, samples: Samples<'_>);
     /// The run has ended: a fall under way counts as far as it went.
-    fn end(&mut self) {}
+    fn end(&mut self, _loading: &TraceDrive) {}
 }
 
 #[cfg(test)]
@@ -160,10 +160,11 @@ mod tests {
     }
 
     fn pass(pass: &mut dyn Pass, trace: &Trace, swing: f64, piece: usize) {
-        pass.begin(loading(swing));
+        let loading = loading(swing);
+        pass.begin();
         let pieces = trace.times.chunks(piece).zip(trace.forces.chunks(piece));
-        pieces.for_each(|(times, forces)| pass.push(Samples { times, forces }));
-        pass.end();
+        pieces.for_each(|(times, forces)| pass.push(&loading, Samples { times, forces }));
+        pass.end(&loading);
     }
 
     fn found(trace: &Trace, swing: f64, least: f64, noise: f64, piece: usize) -> Vec<SampledSlip> {

@@ -45,7 +45,8 @@ impl Default for Histogram {
 /// The noise of a trace and the stiffness of its loading.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
-    loading: Option<TraceDrive>,
+    /// Of the drive, in m/s.
+    velocity: f64,
     noise: Histogram,
     stiffness: [Histogram; 3],
     pub low: f64,
@@ -73,8 +74,7 @@ impl Survey {
 
     /// The slope of the loading parts over the velocity of the drive, in N/m.
     pub fn stiffness(&self) -> f64 {
-        let velocity = self.loading.map_or(0.0, |loading| loading.drive.velocity);
-        let step = velocity * self.seconds / self.samples as f64;
+        let step = self.velocity * self.seconds / self.samples as f64;
         let mut scales = SLOPES
             .into_iter()
             .zip(self.stiffness.iter().map(Histogram::median));
@@ -124,18 +124,17 @@ impl Survey {
 }
 
 impl Pass for Survey {
-    fn begin(&mut self, loading: TraceDrive) {
+    fn begin(&mut self) {
         if self.samples == 0 {
             [self.low, self.high] = [f64::INFINITY, f64::NEG_INFINITY];
         }
-        self.loading = Some(loading);
         self.times.clear();
         self.driven.clear();
         self.forces.clear();
     }
 
-    fn push(&mut self, samples: Samples<'_>) {
-        let Some(loading) = self.loading else { return };
+    fn push(&mut self, loading: &TraceDrive, samples: Samples<'_>) {
+        self.velocity = loading.drive.velocity;
         let known = self.times.len();
         self.times.extend(samples.times);
         let driven = samples.times.iter().map(|time| loading.driven(*time));
