@@ -92,7 +92,7 @@ class Plot(Guessed):
 
         Of other directories, computed or measured, the means are hollow marks:
         `results.plot.phase_eta(others=[stickslip.open("results/mine")])`. `legend` names all directories, this one first; by
-        default, they have those of their folders, or their paths if two of these are the same. What differs between them
+        default, they have those of their folders, or their paths where folders have the same name. What differs between them
         stands above the axes.
         """
         described = side_by_side([results.directory for results in (self._results, *others)], list(legend))

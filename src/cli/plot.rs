@@ -57,7 +57,7 @@ pub struct Arguments {
     #[arg(long = "with", value_name = "DIR")]
     others: Vec<PathBuf>,
     /// Name of a directory in legends, in their order, the first one's first; repeat it for each [default: their last
-    /// folders, or their paths if two of these are the same]
+    /// folders, or the paths of those whose last folders are the same]
     #[arg(long, value_name = "NAME", requires = "others")]
     legend: Vec<String>,
     /// Draw the measured force itself from this time on, in s, with its slips

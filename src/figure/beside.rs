@@ -2,7 +2,6 @@
 //! them.
 
 use super::legend::{LegendEntry, Mark, entry};
-use super::quantity::distinct;
 use super::style::{HOLLOW, Look};
 use super::{ADVICE, BadOption, check_text, common, read, sets_with_results};
 use crate::model::{Parameters, Symbol};
@@ -30,7 +29,7 @@ pub struct Beside {
 
 impl Beside {
     /// Reads the others, whose reduced data are up to date. `names` are those of all; by default, their last folders,
-    /// or their paths if two of these are the same.
+    /// or the paths of those whose last folders are the same.
     pub fn read(first: &Results<'_>, others: &[Results<'_>], names: &[String]) -> Result<Self> {
         let all = std::iter::once(first).chain(others);
         let roots: Vec<&Path> = all.map(|results| results.layout().root()).collect();
@@ -135,20 +134,18 @@ fn parameters_of(sets: &[SetRow]) -> Vec<&Parameters> {
     sets.iter().map(|set| &*set.parameters).collect()
 }
 
-/// The last folder of each path, or all paths as they were given if two of these are the same.
+/// The last folder of each path, or the path as it was given if another one ends so, too.
 fn short_names(paths: &[&Path]) -> Vec<String> {
-    let whole = |path: &&Path| path.to_string_lossy().into_owned();
-    let last = |path: &&Path| {
-        let folder = path.file_name();
-        folder.map_or_else(|| whole(path), |name| name.to_string_lossy().into_owned())
+    let name = |path: &&Path| {
+        let last = path.file_name();
+        let alike = paths.iter().filter(|other| other.file_name() == last);
+        let folder = last.filter(|_| alike.count() == 1);
+        folder
+            .unwrap_or(path.as_os_str())
+            .to_string_lossy()
+            .into_owned()
     };
-    let names: Vec<String> = paths.iter().map(last).collect();
-    let is_same = names.len() > distinct(names.iter().map(String::as_str)).len();
-    if is_same {
-        paths.iter().map(whole).collect()
-    } else {
-        names
-    }
+    paths.iter().map(name).collect()
 }
 
 #[cfg(test)]
@@ -156,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_last_folders_or_whole_paths_if_two_are_the_same() {
+    fn names_are_last_folders_or_whole_paths_of_those_that_end_alike() {
         let names = |paths: &[&str]| {
             let paths: Vec<&Path> = paths.iter().map(Path::new).collect();
             short_names(&paths)
