@@ -115,6 +115,13 @@ pub(super) struct ChartParts {
     note: String,
 }
 
+impl ChartParts {
+    /// Draws the panels as they are now, with their legend.
+    pub(super) fn draw(self, name: &str, look: &Look, layout: Layout) -> Picture {
+        panel::draw(name, look, layout, &self.legend, self.panels)
+    }
+}
+
 impl<'a> Chart<'a> {
     /// Of rows that are no sets, in series: the first column that splits them gives colours, the second shapes.
     pub(super) fn of_series(

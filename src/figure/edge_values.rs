@@ -3,7 +3,7 @@
 use super::chart::Chart;
 use super::frame::Layout;
 use super::legend::{LegendEntry, Mark, entry};
-use super::panel::{self, Layer};
+use super::panel::Layer;
 use super::picture::Picture;
 use super::quantity::{Quantity, distinct};
 use super::style::{Look, Stroke};
@@ -56,13 +56,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     }
     let noted = look.with_note("bars: 95 %");
     let layout = Layout::column(490.0);
-    Some(panel::draw(
-        NAME,
-        &noted,
-        layout,
-        &parts.legend,
-        parts.panels,
-    ))
+    Some(parts.draw(NAME, &noted, layout))
 }
 
 /// What has no edge is seen over all that was searched, or where it is unclear.

@@ -2,7 +2,6 @@
 
 use super::chart::{Chart, ChartRows};
 use super::frame::Layout;
-use super::panel;
 use super::picture::Picture;
 use super::quantity::Quantity;
 use super::style::Look;
@@ -73,16 +72,10 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     }
     let numbers = 0..=FEW_PERIODS;
     parts.panels[1].y.ticks = numbers.map(|n| (f64::from(n), n.to_string())).collect();
-    parts.panels[0].bar = parts.bar;
+    parts.panels[0].bar = parts.bar.take();
     let noted = look.with_note(pooled);
     let layout = Layout::column(560.0);
-    Some(panel::draw(
-        NAME,
-        &noted,
-        layout,
-        &parts.legend,
-        parts.panels,
-    ))
+    Some(parts.draw(NAME, &noted, layout))
 }
 
 #[cfg(test)]

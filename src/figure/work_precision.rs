@@ -5,7 +5,7 @@ use super::axis::{Axis, logarithmic_bounds};
 use super::chart::Chart;
 use super::frame::{Ends, Layout};
 use super::legend::{Mark, entry};
-use super::panel::{self, Layer};
+use super::panel::Layer;
 use super::picture::Picture;
 use super::quantity::Quantity;
 use super::style::{Look, STRIPE};
@@ -118,7 +118,7 @@ fn draw(work_label: &str, kinds: &[ErrorPanel], look: &Look) -> Option<Picture> 
         column_gap: COLUMN_GAP,
         ..Layout::column(WIDTH)
     };
-    Some(panel::draw(NAME, look, layout, &parts.legend, parts.panels))
+    Some(parts.draw(NAME, look, layout))
 }
 
 #[cfg(test)]

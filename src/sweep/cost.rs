@@ -64,7 +64,7 @@ const LEAPS: f64 = 6.0;
 const FEW_LEAPS: f64 = 2.0;
 /// Steps of the grid that resolve a break of a slider that slides.
 const STEPS_OF_A_SLIDING_BREAK: f64 = 80.0;
-/// With fewer contacts than this, a slider that slides comes to rest by chance, once in so many intervals.
+/// Contacts below which a sliding slider comes to rest by chance, and its mean interval then, in intervals of stick-slip.
 const FEW_CONTACTS: f64 = 70.0;
 const REST: f64 = 1.3;
 
