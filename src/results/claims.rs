@@ -11,8 +11,8 @@
 //! queues count, too. A part that is done and has jobs to run again has claims of another name, which stay until a run
 //! ends in order.
 
-use crate::results::layout::{Layout, claim};
-use crate::results::workers::{Living, Member};
+use crate::results::layout::{Layout, claim, stays};
+use crate::results::workers::{GIVEN_BACK, Living, Member};
 use crate::sweep::PartName;
 use crate::table::error::ResultsError;
 use crate::table::shown::shown_bytes;
@@ -22,11 +22,6 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
 use std::io;
 use std::time::SystemTime;
-
-/// What the name of a claim begins with if jobs of a finished part run again.
-const AGAIN: &str = "again-";
-/// What stands behind the name of a worker in a claim that it has given back.
-const GIVEN_BACK: &str = " gave it back";
 
 #[derive(Debug)]
 pub struct Claims<'a> {
@@ -143,44 +138,6 @@ impl fmt::Display for Marked {
     }
 }
 
-/// What is claimed to run a part, or jobs of one that is done again.
-pub(super) fn claim_of(part: PartName, is_done: bool) -> String {
-    let again = if is_done { AGAIN } else { "" };
-    format!("{again}{part}")
-}
-
-/// Whether claims of this name stay when nobody else works, as they count deaths.
-pub(super) fn stays(what: &str, is_end: bool, done: &BTreeSet<PartName>) -> bool {
-    let is_again = what.starts_with(AGAIN) && !is_end;
-    is_again || PartName::parse(what).is_some_and(|part| !done.contains(&part))
-}
-
-impl Member<'_> {
-    /// Says in a claim of this worker that it runs the part no more.
-    pub(super) fn give_back(&self, what: &str, generation: u64) -> Result<(), StorageError> {
-        let layout = self.layout();
-        let name = format!("{what}.{generation}");
-        let text = self.staging().join(&name);
-        let given_back = format!("{}{GIVEN_BACK}", self.name());
-        layout.storage.create(&text)?.write(given_back.as_bytes())?;
-        layout.storage.rename(&text, &layout.claims().join(name))
-    }
-
-    /// Notes that it runs a part by this claim.
-    pub fn begin_part(&self, what: &str, generation: u64) {
-        self.unfinished().insert(what.to_owned(), generation);
-    }
-
-    /// Notes that the part is finished.
-    pub fn end_part(&self, what: &str) -> Result<(), StorageError> {
-        let generation = self.unfinished().remove(what);
-        match generation {
-            Some(generation) if what.starts_with(AGAIN) => self.give_back(what, generation),
-            _ => Ok(()),
-        }
-    }
-}
-
 impl Layout<'_> {
     /// What a claim says; empty if it is gone.
     fn claim_text(&self, what: &str, generation: u64) -> Result<String, StorageError> {
@@ -210,5 +167,57 @@ impl Layout<'_> {
             }
         }
         Ok(deaths)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::workers::tests::{join, results};
+    use std::fs;
+
+    #[test]
+    fn generations_of_a_claim_rise_as_its_owners_die_and_claims_stay_while_others_are_there() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        join(&results, |first| {
+            let mut claims = Claims::list(first).unwrap();
+            assert!(claims.take("part", 0).unwrap());
+            let standing = |claims: &Claims<'_>, member: &Member<'_>| match claims
+                .standing("part", &member.others().unwrap())
+            {
+                Ok(ClaimState::Taken(owner)) => Err(owner.to_owned()),
+                Ok(ClaimState::Free(generation)) => Ok(Some(generation)),
+                Ok(ClaimState::Own) => Ok(None),
+                Err(error) => panic!("{error}"),
+            };
+            assert_eq!(standing(&claims, first), Ok(None));
+            join(&results, |second| {
+                let mut others = Claims::list(second).unwrap();
+                assert_eq!(standing(&others, second), Err(first.name().to_owned()));
+                assert!(!others.take("part", 0).unwrap());
+                assert!(others.take("other", 0).unwrap());
+                second.tidy(false).unwrap();
+            });
+            claims.refresh().unwrap();
+            assert!(
+                claims.last("other").is_some(),
+                "its owner has ended, but others are there"
+            );
+            fs::write(results.layout().claims().join("part.1"), "worker-dead").unwrap();
+            join(&results, |third| {
+                let mut others = Claims::list(third).unwrap();
+                assert_eq!(standing(&others, third), Ok(Some(2)));
+                assert!(others.take("part", 2).unwrap());
+            });
+            first.tidy(false).unwrap();
+            assert!(
+                fs::read_dir(results.layout().claims())
+                    .unwrap()
+                    .next()
+                    .is_none(),
+                "nobody else is there"
+            );
+        });
     }
 }

@@ -74,7 +74,7 @@ impl<'a> Results<'a> {
             // A directory that was moved, or taken over by others, explains any other error.
             let place_error = opened.ok().and_then(|results| results.check_place().err());
             let moved = place_error.filter(|error| error.kind == ErrorKind::Refused);
-            match moved.or_else(|| member.burial()) {
+            match moved.or_else(|| member.taken_over()) {
                 Some(reason) => Err(reason.into()),
                 None => ended,
             }

@@ -26,6 +26,8 @@ pub const FIGURES: &str = "figures";
 const RESULTS: &str = "results";
 pub const RUN_FOLDERS: [&str; 6] = ["staging", "log", "workers", "claims", "spill", "batch"];
 const EXTENSION: &str = "extension-";
+/// What the name of a claim begins with if jobs of a finished part run again.
+pub(super) const AGAIN: &str = "again-";
 
 #[derive(Clone)]
 pub struct Layout<'a> {
@@ -204,6 +206,18 @@ pub(super) fn claim(name: &OsStr) -> Option<(&str, u64)> {
     let (what, digits) = name.to_str()?.rsplit_once('.')?;
     let generation = digits.parse().ok()?;
     (!is_hidden(name)).then_some((what, generation))
+}
+
+/// What is claimed to run a part, or jobs of one that is done again.
+pub(super) fn claim_of(part: PartName, is_done: bool) -> String {
+    let again = if is_done { AGAIN } else { "" };
+    format!("{again}{part}")
+}
+
+/// Whether claims of this name stay when nobody else works, as they count deaths.
+pub(super) fn stays(what: &str, is_end: bool, done: &BTreeSet<PartName>) -> bool {
+    let is_again = what.starts_with(AGAIN) && !is_end;
+    is_again || PartName::parse(what).is_some_and(|part| !done.contains(&part))
 }
 
 fn extension_name(number: usize) -> String {

@@ -10,9 +10,9 @@
 //!
 //! Which worker runs it is decided in `claims.rs` and `run/take.rs`.
 
-use crate::results::claims::{Marked, claim_of};
+use crate::results::claims::Marked;
 use crate::results::directory::Results;
-use crate::results::layout::settled;
+use crate::results::layout::{claim_of, settled};
 use crate::results::tables::{JobOutcome, RecordedTable, RowOfJob};
 use crate::sweep::{Extension, Job, LARGE, Outline, Part, PartName, certain_memory};
 use crate::table::columns::columns;

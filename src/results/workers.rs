@@ -9,9 +9,8 @@
 //! why. All living workers run the same sweep: of two that join for different sweeps at once, one at least sees the
 //! other, and leaves.
 
-use crate::results::claims::stays;
 use crate::results::commit::{Commit, own_number};
-use crate::results::layout::{Layout, claim, shorter_in_tests};
+use crate::results::layout::{AGAIN, Layout, claim, shorter_in_tests, stays};
 use crate::results::tables::RecordedTable;
 use crate::sweep::Sweep;
 use crate::table::checksum;
@@ -39,6 +38,8 @@ pub(super) const PREFIX: &str = "worker-";
 const NEW: &str = ".new";
 /// Staged file whose links are the claims of a worker.
 const CLAIM: &str = "claim";
+/// What stands behind the name of a worker in a claim that it has given back.
+pub(super) const GIVEN_BACK: &str = " gave it back";
 
 /// A process, as its file says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -181,7 +182,7 @@ pub(super) fn join<'a, T, E: From<ResultsError>>(
     body: impl FnOnce(&Member<'a>) -> Result<T, E>,
 ) -> Result<T, E> {
     let member = &Member::join(layout, Worker::here(sweep, threads))?;
-    member.check_peace()?;
+    member.refuse_another_sweep()?;
     std::thread::scope(|scope| {
         let (end, ended) = channel::<()>();
         let beats = move || {
@@ -265,7 +266,7 @@ impl<'a> Member<'a> {
         member.beat()?;
         match member.stage_claim() {
             Ok(()) => Ok(member),
-            Err(error) => Err(member.burial().unwrap_or_else(|| error.into())),
+            Err(error) => Err(member.taken_over().unwrap_or_else(|| error.into())),
         }
     }
 
@@ -285,7 +286,7 @@ impl<'a> Member<'a> {
         self.staging().join(CLAIM)
     }
 
-    pub(super) fn unfinished(&self) -> MutexGuard<'_, BTreeMap<String, u64>> {
+    fn unfinished(&self) -> MutexGuard<'_, BTreeMap<String, u64>> {
         // Nothing panics while it is held.
         self.unfinished
             .lock()
@@ -340,8 +341,32 @@ impl<'a> Member<'a> {
         claim.write(self.name.as_bytes())
     }
 
+    /// Says in a claim of this worker that it runs the part no more.
+    fn give_back(&self, what: &str, generation: u64) -> Result<(), StorageError> {
+        let layout = self.layout();
+        let name = format!("{what}.{generation}");
+        let text = self.staging().join(&name);
+        let given_back = format!("{}{GIVEN_BACK}", self.name());
+        layout.storage.create(&text)?.write(given_back.as_bytes())?;
+        layout.storage.rename(&text, &layout.claims().join(name))
+    }
+
+    /// Notes that it runs a part by this claim.
+    pub fn begin_part(&self, what: &str, generation: u64) {
+        self.unfinished().insert(what.to_owned(), generation);
+    }
+
+    /// Notes that the part is finished.
+    pub fn end_part(&self, what: &str) -> Result<(), StorageError> {
+        let generation = self.unfinished().remove(what);
+        match generation {
+            Some(generation) if what.starts_with(AGAIN) => self.give_back(what, generation),
+            _ => Ok(()),
+        }
+    }
+
     /// Refuses to run beside a worker that runs another sweep.
-    fn check_peace(&self) -> Result<(), ResultsError> {
+    fn refuse_another_sweep(&self) -> Result<(), ResultsError> {
         let mut others = self.others()?.into_values().map(|other| other.worker);
         let Some(other) = others.find(|other| other.sweep != self.worker.sweep) else {
             return Ok(());
@@ -357,19 +382,19 @@ impl<'a> Member<'a> {
     }
 
     /// Why it can commit nothing any more, if others took it for dead. A listing is true also on a network disk.
-    pub(super) fn burial(&self) -> Option<ResultsError> {
+    pub(super) fn taken_over(&self) -> Option<ResultsError> {
         let is_listed = |folder: &Path, name: &str| match self.layout.storage.list(folder) {
             Ok(names) => names.iter().any(|there| there == name),
             Err(_) => true,
         };
-        let is_buried = is_listed(&self.layout.run(), "staging")
+        let is_taken_over = is_listed(&self.layout.run(), "staging")
             && !is_listed(&self.layout.staging(""), &self.name);
         let silence = SILENCE.as_secs();
         let problem = format!(
             "this worker gave no sign of life for over {silence} s, as on a machine that was suspended, so others have \
              taken over its work; nothing that was committed is lost, and the same command resumes"
         );
-        is_buried.then(|| ResultsError::new(ErrorKind::Stopped, self.layout.root(), problem))
+        is_taken_over.then(|| ResultsError::new(ErrorKind::Stopped, self.layout.root(), problem))
     }
 
     pub(super) fn commit(&self) -> Commit<'a> {
@@ -430,7 +455,6 @@ impl Drop for Member<'_> {
 pub(crate) mod tests {
     use super::*;
     use crate::results::ErrorKind;
-    use crate::results::claims::{ClaimState, Claims};
     use crate::results::directory::Results;
     use crate::sweep::Sweep;
     use crate::table::storage::over_disk::{Access, OverDisk};
@@ -451,7 +475,7 @@ pub(crate) mod tests {
         Sweep::parse("name = \"test\"", Path::new("test.toml")).unwrap()
     }
 
-    fn results(root: &Path) -> Results<'static> {
+    pub fn results(root: &Path) -> Results<'static> {
         open(&Layout::new(&Disk, root), &sweep()).unwrap()
     }
 
@@ -481,7 +505,7 @@ pub(crate) mod tests {
         fs::rename(new, path).unwrap();
     }
 
-    fn join<T>(results: &Results<'static>, body: impl FnOnce(&Member<'static>) -> T) -> T {
+    pub fn join<T>(results: &Results<'static>, body: impl FnOnce(&Member<'static>) -> T) -> T {
         Results::join::<_, ResultsError>(results.layout(), &sweep(), 1, |member, _| {
             Ok(body(member))
         })
@@ -648,50 +672,5 @@ pub(crate) mod tests {
             open(results.layout(), &other).unwrap().extensions().len(),
             2
         );
-    }
-
-    #[test]
-    fn generations_of_a_claim_rise_as_its_owners_die_and_claims_stay_while_others_are_there() {
-        let root = tempfile::tempdir().unwrap();
-        let results = results(root.path());
-        join(&results, |first| {
-            let mut claims = Claims::list(first).unwrap();
-            assert!(claims.take("part", 0).unwrap());
-            let standing = |claims: &Claims<'_>, member: &Member<'_>| match claims
-                .standing("part", &member.others().unwrap())
-            {
-                Ok(ClaimState::Taken(owner)) => Err(owner.to_owned()),
-                Ok(ClaimState::Free(generation)) => Ok(Some(generation)),
-                Ok(ClaimState::Own) => Ok(None),
-                Err(error) => panic!("{error}"),
-            };
-            assert_eq!(standing(&claims, first), Ok(None));
-            join(&results, |second| {
-                let mut others = Claims::list(second).unwrap();
-                assert_eq!(standing(&others, second), Err(first.name().to_owned()));
-                assert!(!others.take("part", 0).unwrap());
-                assert!(others.take("other", 0).unwrap());
-                second.tidy(false).unwrap();
-            });
-            claims.refresh().unwrap();
-            assert!(
-                claims.last("other").is_some(),
-                "its owner has ended, but others are there"
-            );
-            fs::write(results.layout().claims().join("part.1"), "worker-dead").unwrap();
-            join(&results, |third| {
-                let mut others = Claims::list(third).unwrap();
-                assert_eq!(standing(&others, third), Ok(Some(2)));
-                assert!(others.take("part", 2).unwrap());
-            });
-            first.tidy(false).unwrap();
-            assert!(
-                fs::read_dir(results.layout().claims())
-                    .unwrap()
-                    .next()
-                    .is_none(),
-                "nobody else is there"
-            );
-        });
     }
 }
