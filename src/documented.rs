@@ -3,10 +3,9 @@
 
 use crate::model::{Description, Parameters, Symbol, Value};
 use crate::observe::{ContactRow, MapRow, ProfileRow, Recording, RecordingKey, TraceRow};
-use crate::reduce::{
-    BackboneBin, EdgeRow, HistogramBin, Point, PulseRow, RoundOfSet, SetRow, TriggerRow,
-};
+use crate::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, PulseRow, RoundOfSet, TriggerRow};
 use crate::results::tables::{JobRow, OptionalTable, PrecursorRow, RecordedTable, SlipRow};
+use crate::sets::SetRow;
 use crate::solver::{Solver, SolverKey};
 use crate::table::Table;
 use crate::table::columns::{Class, Column, Kind, Row};

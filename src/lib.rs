@@ -74,7 +74,7 @@ mod report;
 pub mod results;
 pub mod rounds;
 pub mod run;
-mod sets;
+pub mod sets;
 pub mod single_job;
 pub mod sweep;
 pub mod table;

@@ -11,13 +11,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::figure::Beside;
 use stickslip::reduce::{
-    BackboneBin, EdgeRow, HistogramBin, Point, PulseRow, SetInRounds, SetRow, TriggerRow,
-    read_sets, renew,
+    BackboneBin, EdgeRow, HistogramBin, Point, PulseRow, SetInRounds, TriggerRow, read_sets, renew,
 };
 use stickslip::results::exported::{JoinedTable, with_columns};
 use stickslip::results::layout::Layout;
 use stickslip::results::tables::{OptionalTable, RecordedTable, gaps};
 use stickslip::results::{Results, ResultsError};
+use stickslip::sets::SetRow;
 use stickslip::table::Table as TableRow;
 use stickslip::table::arrow::{Gaps, RowBuffer, schema};
 use stickslip::table::file::{Batch, Dataset};

@@ -7,10 +7,11 @@ use crate::figure::{
     draw_all, draw_custom, draw_where, measured_trace, remarks, write,
 };
 use crate::measured::stretch;
-use crate::reduce::{SetRow, SlipOfSet, read_sets, renew, sample_of_slips};
+use crate::reduce::{SlipOfSet, read_sets, renew, sample_of_slips};
 use crate::results::Results;
 use crate::results::destination::Destination;
 use crate::results::layout::Layout;
+use crate::sets::SetRow;
 use crate::table::columns::{Column, Row as _};
 use crate::table::shown::shown;
 use anyhow::Result;

@@ -4,16 +4,18 @@ use super::output::{self, TextTable};
 use super::{Exit, UsageError, layout};
 use crate::model::{Parameters, Selected, Selection, Symbol, Value as Parameter};
 use crate::reduce::{
-    Comparison, Condition, Difference, EdgePair, EdgeRow, FREQUENCY, Interval, PulseRow,
-    SetInRounds, SetRow, TriggerRow, Values, add_intervals, ascending, compare, differing,
-    means_of_slips, pairs_of_edges, read_optional, read_sets, read_sets_in_rounds, renew,
+    Comparison, Condition, Difference, EdgePair, EdgeRow, PulseRow, SetInRounds, TriggerRow,
+    Values, add_intervals, ascending, compare, differing, means_of_slips, pairs_of_edges,
+    read_optional, read_sets, read_sets_in_rounds, renew,
 };
 use crate::results::Results;
 use crate::sets::{
     AllButSeed, Digits, FOUND, by_frequency, column_of, label, symbol_of, with_decimals,
 };
+use crate::sets::{FREQUENCY, SetRow};
 use crate::sweep::Sweep;
 use crate::table::arrow::json;
+use crate::table::columns::Interval;
 use crate::table::columns::{Kind, Row as _};
 use crate::table::shown::shown;
 use crate::table::value::floored;

@@ -1,12 +1,15 @@
 //! Directories in one figure: the dots of the first, and others as hollow marks; their names, and what differs between
 //! them.
 
+use super::files::{ADVICE, read, sets_with_results};
 use super::legend::{LegendEntry, Mark, entry};
+use super::note::common;
+use super::options::{BadOption, check_text};
 use super::style::{HOLLOW, Look};
-use super::{ADVICE, BadOption, check_text, common, read, sets_with_results};
 use crate::model::{Parameters, Symbol};
-use crate::reduce::{BackboneBin, Condition, Difference, Point, SetRow, advise};
+use crate::reduce::{BackboneBin, Condition, Difference, Point, advise};
 use crate::results::Results;
+use crate::sets::SetRow;
 use anyhow::Result;
 use std::ops::Range;
 use std::path::Path;

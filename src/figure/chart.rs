@@ -2,9 +2,11 @@
 //! custom figures are charts.
 
 use super::axis::Axis;
+use super::beside::Beside;
 use super::frame::{Ends, LEFT, Layout};
 use super::hues::{ColourBar, Hues};
 use super::legend::{LegendEntry, Mark, entry};
+use super::options::BadOption;
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::{Quantity, belongs_to_all, distinct, shows_angle, without_value};
@@ -12,11 +14,12 @@ use super::style::{
     BAR_WIDTH, BLACK, DARK_GREY, Dot, GREY, GRID, INKS, Ink, Look, Place, Polygon, RADIUS,
     REFERENCE, SHAPES, STRIPE, Stroke, WHITE, drive_alone,
 };
-use super::{BadOption, Beside};
 use crate::model::Symbol;
+use crate::model::theory::resultant_at_random;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, Values, is_same, resultant_at_random, swept};
+use crate::reduce::{Values, swept};
 use crate::sets::parameter;
+use crate::sets::{SetRow, is_same};
 use crate::table::columns::{Class, Column};
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,11 +1,21 @@
 //! Custom figures: any column of the table of sets, or of slips, or a formula of columns, against any other.
 
+use super::beside::Beside;
 use super::chart::{Chart, ChartRows};
+use super::files::ADVICE;
+use super::note::common;
+use super::options::{BadOption, check_text};
+use super::picture::Picture;
 use super::quantity::{AxisLimits, Quantity};
-use super::{BadOption, Look, Picture, check_text};
+use super::style::Look;
 use crate::model::Symbol;
-use crate::reduce::{Condition, Values};
-use crate::sets::parameter;
+use crate::reduce::{
+    Condition, SlipOfSet, Values, advise, means_of_slips, read_control, read_sets, sample_of_slips,
+    swept,
+};
+use crate::results::Results;
+use crate::results::tables::gaps;
+use crate::sets::{SetRow, parameter};
 use crate::table::columns::Row;
 use crate::table::value::words;
 use anyhow::Result;
@@ -71,7 +81,7 @@ impl CustomFigure {
 
 /// Draws a dot for each row of which there are these quantities, with the next of the swept parameters as colours. If the
 /// rows are `sets`, those that differ in one parameter of the x axis alone are joined; if they are slips, there are none.
-pub(super) fn custom<'a>(
+fn custom<'a>(
     quantity: &dyn Fn(&'static str, &str) -> Result<Quantity<'a>>,
     rows: ChartRows<'a>,
     figure: &'a CustomFigure,
@@ -119,16 +129,101 @@ pub(super) fn custom<'a>(
     Ok(chart.draw(&name, look)?)
 }
 
+/// Draws a custom figure of the sets or slips of a results directory; writes nothing.
+pub fn draw_custom(
+    results: &Results<'_>,
+    beside: &Beside,
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture> {
+    let sets = read_sets(results.layout())
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(advise(ADVICE))?;
+    match figure.of {
+        Dots::Sets => draw_sets(results, sets, beside, figure, look),
+        Dots::Slips => draw_slips(results, &sets, figure, look),
+    }
+}
+
+fn draw_sets(
+    results: &Results<'_>,
+    mut own: Vec<SetRow>,
+    beside: &Beside,
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture> {
+    let mut beside = beside.clone();
+    if let Some(condition) = figure.condition::<SetRow>()? {
+        if !own.iter().any(|set| condition.holds(set)) {
+            return Err(figure.unmatched(&condition, &own).into());
+        }
+        beside.retain(&condition);
+        own.retain(|set| condition.holds(set));
+    }
+    let mut look = beside.look(look, &own);
+    look.note += &figure.shown_condition();
+    let swept = swept(&own);
+    let control = read_control(results.layout()).map_err(advise(ADVICE))?;
+    let (sets, others) = beside.with_others(own);
+    let quantity = |option, name: &str| {
+        Quantity::of(&sets, option, name).or_else(|unknown| {
+            let mean = means_of_slips(results, &sets, name)?.ok_or(unknown)?;
+            Ok(Quantity::of_values(option, mean))
+        })
+    };
+    let rows = ChartRows {
+        sets: &sets,
+        control: control.as_ref(),
+        swept: &swept,
+        beside: &beside,
+        others,
+    };
+    custom(&quantity, rows, figure, &look)
+}
+
+fn draw_slips(
+    results: &Results<'_>,
+    sets: &[SetRow],
+    figure: &CustomFigure,
+    look: &Look,
+) -> Result<Picture> {
+    let condition = figure.condition::<SlipOfSet>()?;
+    let (slips, every, matching) = sample_of_slips(results, sets, condition.as_ref())?;
+    if let Some(condition) = condition.filter(|_| slips.is_empty()) {
+        let (all, ..) = sample_of_slips(results, sets, None)?;
+        return Err(figure.unmatched(&condition, &all).into());
+    }
+    let part = if every > 1 {
+        format!("one in {every} of ")
+    } else {
+        String::new()
+    };
+    let shared = common(slips.iter().map(|slip| &*slip.0.1), &[]);
+    let condition = figure.shown_condition();
+    let noted = look.with_note(&format!("{shared}{condition}; {part}{matching} slips"));
+    let unknown = gaps(results.sweep()).unknown;
+    let quantity = |option, name: &str| {
+        let quantity = Quantity::of(&slips, option, name)?;
+        let mut sources = quantity.column.sources.iter();
+        match sources.find(|source| unknown.contains(&source.name)) {
+            Some(source) => Err(BadOption::new(option, &source.name, "was not measured").into()),
+            None => Ok(quantity),
+        }
+    };
+    let swept = swept(sets);
+    let rows = ChartRows::in_series(&swept);
+    custom(&quantity, rows, figure, &noted)
+}
+
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::Beside;
     use super::super::chart::LINE_WIDTH;
     use super::super::quantity::tests::set;
     use super::super::style::{BAR_WIDTH, Style};
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
-    use crate::reduce::{Interval, SetRow, swept};
+    use crate::table::columns::Interval;
 
     /// Sets at rising V0, and two amplitudes.
     pub(in crate::figure) fn rows(count: u32) -> Vec<SetRow> {

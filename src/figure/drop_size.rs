@@ -1,12 +1,12 @@
 //! What the drop size decides: the number of slips in a trace, and their mean interval, for many drop sizes.
 
 use super::axis::{Axis, bounds, logarithmic_bounds, widened};
+use super::files::write;
 use super::frame;
 use super::legend::{LegendEntry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Picture, PictureFormat};
 use super::style::{BLUE, Look, Place, RED, REFERENCE, Stroke};
-use super::write;
 use crate::measured::DropSizes;
 use crate::results::layout::Layout;
 use anyhow::Result;

@@ -8,7 +8,8 @@ use super::picture::Picture;
 use super::quantity::{Quantity, distinct};
 use super::style::{Look, Stroke};
 use crate::model::Selection as _;
-use crate::reduce::{EdgeRow, Ended, FREQUENCY, Values};
+use crate::reduce::{EdgeRow, Ended, Values};
+use crate::sets::FREQUENCY;
 use crate::sets::{AllButSeed, column_of, label};
 
 pub(super) const NAME: &str = "edges";
@@ -95,7 +96,7 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::model::Selected;
-    use crate::reduce::Interval;
+    use crate::table::columns::Interval;
 
     fn edge(drive_velocity: f64, statistic: &str, edge: Option<f64>) -> EdgeRow {
         EdgeRow {

@@ -9,8 +9,9 @@ use super::style::{
     BLACK, Fill, Ink, LEGEND_TEXT, Look, Place, RED, REFERENCE, Stroke, text_width,
 };
 use crate::model::{Parameters, Symbol};
-use crate::reduce::{FREQUENCY, HistogramBin, SetRow, Values, differing};
+use crate::reduce::{HistogramBin, Values, differing};
 use crate::sets::label;
+use crate::sets::{FREQUENCY, SetRow};
 
 pub(super) const NAME: &str = "tau-histograms";
 

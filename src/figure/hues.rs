@@ -9,7 +9,8 @@ use super::style::{
     AXIS, BLACK, Dot, INKS, Ink, LEGEND_TEXT, NOTE_TEXT, PENTAGON, Polygon, SCALE, SHAPES,
     TICK_TEXT, shade,
 };
-use crate::reduce::{ascending, is_same};
+use crate::reduce::ascending;
+use crate::sets::is_same;
 use crate::table::value::floored;
 
 /// How the values of a quantity become colours.

@@ -14,7 +14,8 @@ use super::style::{
 };
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{FREQUENCY, SetRow, Values, ascending, differing, has_even_steps, is_same};
+use crate::reduce::{Values, ascending, differing, has_even_steps};
+use crate::sets::{FREQUENCY, SetRow, is_same};
 use crate::table::columns::Class;
 use std::f64::consts::TAU;
 

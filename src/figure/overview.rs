@@ -1,10 +1,13 @@
 //! The overview of a sweep: what was found of the sets, over what was swept.
 
+use super::beside::Beside;
 use super::chart::{Chart, ChartRows, MAX_COLUMNS};
+use super::picture::Picture;
 use super::quantity::{Quantity, belongs_to_all};
-use super::{Beside, Look, Picture};
+use super::style::Look;
 use crate::observe::Regime;
-use crate::reduce::{SetRow, swept};
+use crate::reduce::swept;
+use crate::sets::SetRow;
 
 pub(super) const NAME: &str = "overview";
 

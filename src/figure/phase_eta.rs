@@ -1,8 +1,7 @@
 //! φ against η (Fig. 3e): the density of slips, the backbone of Eq. 2, and the mean of each column.
 
-use super::Beside;
 use super::axis::{Axis, angle_bounds, bounds};
-use super::beside::Other;
+use super::beside::{Beside, Other};
 use super::frame::{Cell, Ends, Layout, OVERLAP};
 use super::hues::ColourBar;
 use super::legend::{LegendEntry, Mark, entry};

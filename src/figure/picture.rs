@@ -1,6 +1,6 @@
 //! Pictures: what is drawn, as SVG, PNG and PDF. The same data give the same bytes.
 
-use super::BadOption;
+use super::options::BadOption;
 use super::pdf::{pdf, single};
 use super::style::{
     BLACK, Dot, FACE, Fill, HALF_DIGIT, Ink, Look, POINTS_PER_INCH, Size, Stroke, outline_of,

@@ -1,12 +1,13 @@
 //! Quantities that figures show: a column of the table of sets on an axis or as colours, and the grid of its values.
 
-use super::BadOption;
 use super::axis::{Axis, bounds, is_wide, logarithmic_bounds, widened};
 use super::frame::Ends;
 use super::hues::Hues;
+use super::options::BadOption;
 use super::style::INKS;
 use crate::model::Symbol;
-use crate::reduce::{FREQUENCY, Values, ascending, has_even_steps, is_spread, quantile};
+use crate::reduce::{Values, ascending, has_even_steps, is_spread, quantile};
+use crate::sets::FREQUENCY;
 use crate::sets::{label, parameter};
 use crate::table::columns::{Column, Row};
 use std::borrow::Cow;
@@ -360,8 +361,8 @@ pub(super) mod tests {
     use crate::model::Parameters;
     use crate::model::Selected;
     use crate::observe::Regime;
-    use crate::reduce::Interval;
-    use crate::reduce::SetRow;
+    use crate::sets::SetRow;
+    use crate::table::columns::Interval;
 
     /// A set at Δ in m and T in s that locks to `periods` of T.
     pub(in crate::figure) fn set(amplitude: f64, period: f64, periods: f64) -> SetRow {

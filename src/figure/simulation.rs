@@ -2,10 +2,10 @@
 //! detached contacts (Fig. 4b, d) with the onsets of slips.
 
 use super::axis::{Axis, bounds, widened};
-use super::common;
 use super::frame::{Cell, Layout, OVERLAP};
 use super::hues::ColourBar;
 use super::legend::{Mark, entry};
+use super::note::common;
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::style::{BLACK, BLUE, GRID, INKS, Ink, Look, Place, RED, REFERENCE, Stroke, shade};

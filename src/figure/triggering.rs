@@ -2,15 +2,16 @@
 //! amplitude; and the share of triggered slips against the amplitude. Both beside the drive alone.
 
 use super::chart::{Chart, ChartParts};
-use super::common;
 use super::frame::{LEFT, Layout};
 use super::legend::{Mark, entry};
+use super::note::common;
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::quantity::Quantity;
 use super::style::{INKS, Look, REFERENCE};
 use crate::model::Parameters;
-use crate::reduce::{FREQUENCY, PulseRow, Values};
+use crate::reduce::{PulseRow, Values};
+use crate::sets::FREQUENCY;
 
 pub(super) const NAME: &str = "triggering";
 

@@ -9,8 +9,9 @@ use super::panel::Layer;
 use super::picture::Picture;
 use super::quantity::Quantity;
 use super::style::{Look, STRIPE};
-use crate::reduce::{Interval, Values};
+use crate::reduce::Values;
 use crate::sets::Label;
+use crate::table::columns::Interval;
 use crate::table::columns::Kind;
 use anyhow::{Result, anyhow};
 

@@ -1,8 +1,7 @@
 //! The φ-η backbone: phases pooled in logarithmic bins of η (Fig. 3e).
 
 use super::estimate::{Estimate, Units, length};
-use super::set::FinishedSet;
-use super::top_of_phases;
+use super::set::{FinishedSet, top_of_phases};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::table::columns::{Class, columns};
 use crate::table::tables;

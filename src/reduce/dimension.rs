@@ -64,8 +64,8 @@ fn written(powers: Exponents) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::SetRow;
-    use super::super::Values;
+    use super::super::values::Values;
+    use crate::sets::SetRow;
 
     #[test]
     fn a_formula_has_the_unit_of_its_dimension() {

@@ -26,8 +26,6 @@ mod slips;
 mod triggers;
 mod values;
 
-pub use crate::sets::{FREQUENCY, SetRow, is_same};
-pub use crate::table::columns::Interval;
 pub use backbone::BackboneBin;
 pub use compare::{Comparison, compare};
 #[cfg(test)]
@@ -54,30 +52,3 @@ pub use slips::{SlipOfSet, add_intervals, means_of_slips, points_of, sample_of_s
 pub(crate) use triggers::Pulses;
 pub use triggers::{PulseRow, TriggerRow};
 pub use values::{Condition, Values, ascending, differing, has_even_steps, is_spread, swept};
-
-use crate::model::theory::{load_maximum_phase, minimum_phase};
-use std::f64::consts::{PI, TAU};
-
-/// Resultant of slips at random loads: of the density 1 - η sin φ, for η >= 1 from φ_min to Φ_max.
-pub(crate) fn resultant_at_random(eta: f64) -> f64 {
-    let Some((low, high)) = minimum_phase(eta).zip(load_maximum_phase(eta)) else {
-        return 0.5 * eta;
-    };
-    let integral = |phase: f64| {
-        let (sine, cosine) = libm::sincos(phase);
-        [
-            sine - 0.5 * eta * sine * sine,
-            -cosine - 0.5 * eta * (phase - sine * cosine),
-        ]
-    };
-    let [x, y] = [0, 1].map(|part| integral(high)[part] - integral(low)[part]);
-    libm::hypot(x, y) / TAU
-}
-
-/// Upper end of the turn in which mean phases at some η are given, in rad. For η >= 1 the seam is in the middle of the
-/// gap between Φ_max - 2π and φ_min, where no slip begins.
-fn top_of_phases(eta: f64) -> f64 {
-    minimum_phase(eta)
-        .zip(load_maximum_phase(eta))
-        .map_or(PI, |(low, high)| 0.5 * (low + high + TAU))
-}

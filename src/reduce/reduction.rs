@@ -406,7 +406,6 @@ pub fn read_sets<'a>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::read_reduced;
     use super::super::set::SetSlips;
     use super::super::set::tests::{jobs, slip};
     use super::*;

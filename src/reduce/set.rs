@@ -4,7 +4,7 @@
 use super::estimate::{
     Estimate, MAX_UNSEEN, Numbers, Sums, Units, at_rank, length, mean, plus, unit,
 };
-use super::{resultant_at_random, top_of_phases};
+use crate::model::theory::{load_maximum_phase, minimum_phase, resultant_at_random};
 use crate::model::{Parameters, Selected};
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
@@ -544,6 +544,14 @@ impl SetJobs {
             ..SetRow::default()
         }
     }
+}
+
+/// Upper end of the turn in which mean phases at some η are given, in rad. For η >= 1 the seam is in the middle of the
+/// gap between Φ_max - 2π and φ_min, where no slip begins.
+pub(super) fn top_of_phases(eta: f64) -> f64 {
+    minimum_phase(eta)
+        .zip(load_maximum_phase(eta))
+        .map_or(PI, |(low, high)| 0.5 * (low + high + TAU))
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! Slips one by one, with all parameters of their sets: for figures, and for means that the table of sets lacks.
 
-use super::Condition;
 use super::estimate::{Estimate, Numbers};
 use super::gather::{Gathering, MAX_SLIPS as MAX_SLIPS_AT_ONCE, Point, has_jobs};
-use super::values::{Values, formula};
+use super::values::{Condition, Values, formula};
 use crate::model::Selected;
 use crate::observe::Slip;
 use crate::results::tables::{JobOfSlip, Loading, RecordedTable, gaps};

@@ -1,11 +1,12 @@
 //! Tables of the page, column by column: a reader of the page needs each column as a whole, and columns compress best.
 
 use crate::observe::{Regime, Slip};
-use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, read_sets, swept};
+use crate::reduce::{BackboneBin, HistogramBin, read_reduced, read_sets, swept};
 use crate::results::layout::Layout;
 use crate::results::tables::{JobOfSlip, RecordedTable};
 use crate::results::{Results, ResultsError};
 use crate::sets::Label;
+use crate::sets::SetRow;
 use crate::sweep::Sweep;
 use crate::table::Table;
 use crate::table::columns::{Column, Row, Value};

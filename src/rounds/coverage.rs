@@ -4,12 +4,13 @@
 use super::{need, seeds_for};
 use crate::model::Parameters;
 use crate::reduce::{
-    Interval, Pool, PooledJob, Pulses, SetRow, TriggerRow, Units, error_over_target, mean,
-    quantile, read_optional,
+    Pool, PooledJob, Pulses, TriggerRow, Units, error_over_target, mean, quantile, read_optional,
 };
 use crate::results::layout::Layout;
+use crate::sets::SetRow;
 use crate::sets::{STATISTICS, Statistic};
 use crate::sweep::{MIN_SEEDS, Precision, Target};
+use crate::table::columns::Interval;
 use crate::table::storage::Disk;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

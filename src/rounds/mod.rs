@@ -13,10 +13,9 @@
 //! Looking again and again until an interval is short prefers those that are short by chance: the more so, the fewer
 //! seeds it is when a set may end, and the more skewed its values are. So no set ends with fewer than [`MIN_SEEDS`].
 
-use crate::reduce::{
-    Line, SetOfEdges, SetRow, error_over_target, lines, reduce_chosen, sets_of_edges,
-};
+use crate::reduce::{Line, SetOfEdges, error_over_target, lines, reduce_chosen, sets_of_edges};
 use crate::results::{Results, ResultsError};
+use crate::sets::SetRow;
 use crate::sweep::{Goal, MIN_SEEDS, Precision, Refinement, Round, Standing, Sweep};
 use crate::table::value::floored;
 use std::collections::{BTreeMap, BTreeSet};

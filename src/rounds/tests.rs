@@ -1,9 +1,10 @@
 //! Rounds of sweeps that look for edges, from the first to the end, with responses whose edges are known.
 
 use super::*;
-use crate::reduce::{Edge, Interval, Units, mean};
+use crate::reduce::{Edge, Units, mean};
 use crate::sets::Statistic;
 use crate::sweep::Target;
+use crate::table::columns::Interval;
 use proptest::prelude::*;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

@@ -1,11 +1,12 @@
 //! Directories of programs of other versions: what is there is read, and nothing is run in them.
 
 use super::{fine, options, run, run_all, sweep};
-use crate::reduce::{SetRow, read_reduced, reduce};
+use crate::reduce::{read_reduced, reduce};
 use crate::results::destination::NewFolder;
 use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, Names, PrecursorRow, RecordedTable, SlipRow, gaps};
 use crate::results::{ErrorKind, Results, of_other_versions};
+use crate::sets::SetRow;
 use crate::table::columns::Row;
 use crate::table::file::{Dataset, Footer, TableWriter};
 use crate::table::formats::Format;

@@ -1,4 +1,5 @@
-//! Closed forms of the paper: η, Φ_max, Eq. 2 and its asymptote, and a typical interval. Eq. 1 and the friction of a
+//! Closed forms of the paper: η, Φ_max, Eq. 2 and its asymptote, the resultant of slips at random loads, and a typical
+//! interval. Eq. 1 and the friction of a
 //! rigid block are tests: `crates/physics/tests/physics/deterministic_rows.rs`.
 
 use super::Parameters;
@@ -32,6 +33,22 @@ pub fn minimum_phase(eta: f64) -> Option<f64> {
     let target = maximum - TAU + eta * libm::cos(maximum);
     let reaches = |phase: f64| phase + eta * libm::cos(phase) >= target;
     Some(bisected(-PI - maximum, maximum, reaches))
+}
+
+/// Resultant of slips at random loads: of the density 1 - η sin φ, for η >= 1 from φ_min to Φ_max.
+pub fn resultant_at_random(eta: f64) -> f64 {
+    let Some((low, high)) = minimum_phase(eta).zip(load_maximum_phase(eta)) else {
+        return 0.5 * eta;
+    };
+    let integral = |phase: f64| {
+        let (sine, cosine) = libm::sincos(phase);
+        [
+            sine - 0.5 * eta * sine * sine,
+            -cosine - 0.5 * eta * (phase - sine * cosine),
+        ]
+    };
+    let [x, y] = [0, 1].map(|part| integral(high)[part] - integral(low)[part]);
+    libm::hypot(x, y) / TAU
 }
 
 /// The least number at which a condition holds, up to the last bit: it does not at `low`, and from there on at `high`.
