@@ -17,8 +17,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-/// Amplitude and frequency of the modulated drive, in m and Hz: those of Fig. 2f.
-const MODULATION: (f64, f64) = (1e-6, 58.0);
+/// Of the modulated drive, that of Fig. 2f, in m.
+const AMPLITUDE: f64 = 1e-6;
+/// In Hz.
+const FREQUENCY: f64 = 58.0;
 const DISCARD: u64 = 5;
 /// Tolerance of the reference of break times, the tightest that there is.
 const TIGHTEST_TOLERANCE: f64 = 1e-12;
@@ -126,14 +128,13 @@ impl Study {
 
 /// The defaults at a drive velocity in m/s, without and with modulation.
 fn plain_and_modulated(drive_velocity: f64) -> [Parameters; 2] {
-    let (amplitude, frequency) = MODULATION;
     let plain = Parameters {
         drive_velocity,
         ..Parameters::default()
     };
     let modulated = Parameters {
-        modulation_amplitude: amplitude,
-        modulation_period: Some(1.0 / frequency),
+        modulation_amplitude: AMPLITUDE,
+        modulation_period: Some(1.0 / FREQUENCY),
         ..plain.clone()
     };
     [plain, modulated]

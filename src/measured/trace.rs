@@ -33,10 +33,17 @@ const MIN_SAMPLES: f64 = 15.0;
 /// How slips are to be found in a trace.
 #[derive(Clone, Debug, Default)]
 pub struct TraceRequest {
-    /// The least drop, with its unit; none: the middle of the widest plateau.
-    drop_size: Option<(f64, String)>,
+    /// If none is given, it is the middle of the widest plateau.
+    drop_size: Option<GivenSize>,
     /// Samples of which the mean is one.
     smooth: usize,
+}
+
+/// The least drop that a user gives.
+#[derive(Clone, Debug)]
+struct GivenSize {
+    value: f64,
+    unit: String,
 }
 
 impl TraceRequest {
@@ -55,24 +62,32 @@ impl TraceRequest {
             });
         }
         let (size, unit) = drop_size.split_once(':').unwrap_or((drop_size, ""));
-        let size = size
+        let value = size
             .parse()
             .ok()
             .filter(|size: &f64| *size > 0.0 && size.is_finite());
-        let drop_size = Some((size.with_context(wrong)?, unit.to_owned()));
+        let drop_size = Some(GivenSize {
+            value: value.with_context(wrong)?,
+            unit: unit.to_owned(),
+        });
         Ok(Self { drop_size, smooth })
     }
 
     /// The drop size in this unit.
     fn size(&self, unit: &str) -> Result<Option<f64>> {
-        let Some((size, given)) = &self.drop_size else {
+        let Some(given) = &self.drop_size else {
             return Ok(None);
         };
-        let factor = factor(if given.is_empty() { unit } else { given }, unit);
-        let factor = factor.with_context(|| {
-            format!("--drop-size {size}:{given}: its unit must be {unit}, or with prefixes")
+        let of = if given.unit.is_empty() {
+            unit
+        } else {
+            &given.unit
+        };
+        let factor = factor(of, unit).with_context(|| {
+            let GivenSize { value, unit: of } = given;
+            format!("--drop-size {value}:{of}: its unit must be {unit}, or with prefixes")
         })?;
-        Ok(Some(size * factor))
+        Ok(Some(given.value * factor))
     }
 }
 

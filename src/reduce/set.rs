@@ -211,16 +211,30 @@ fn off(period: Option<f64>, mean: f64, numbers: &Numbers) -> f64 {
     }
 }
 
-/// By how much slips that were not seen may shorten the mean of vectors, if slips at random loads have this length: each
-/// by `times` the difference of that length from 1, and by `most` at most.
-fn lost(length_at_random: f64, [times, most]: [f64; 2], vectors: &Units) -> f64 {
-    let [count, ..] = vectors.total();
-    MAX_UNSEEN * (times * (1.0 - length_at_random)).min(most) / count
+/// By how much a slip that was not seen may shorten the sum of vectors.
+#[derive(Clone, Copy)]
+struct Loss {
+    /// For each unit by which the length at random loads is short of 1.
+    times: f64,
+    most: f64,
 }
+
 /// Of a slip.
-const OF_PHASES: [f64; 2] = [3.0, 0.75];
+const OF_PHASES: Loss = Loss {
+    times: 3.0,
+    most: 0.75,
+};
 /// Of the two intervals beside it, whose vectors have the square of that length.
-const OF_INTERVALS: [f64; 2] = [6.0, 1.5];
+const OF_INTERVALS: Loss = Loss {
+    times: 6.0,
+    most: 1.5,
+};
+
+/// By how much slips that were not seen may shorten the mean of vectors, if slips at random loads have this length.
+fn lost(length_at_random: f64, loss: Loss, vectors: &Units) -> f64 {
+    let [count, ..] = vectors.total();
+    MAX_UNSEEN * (loss.times * (1.0 - length_at_random)).min(loss.most) / count
+}
 
 /// Ratio of variances above which jobs still share their start: errors are then more than twice what seeds show.
 const MAX_RATIO: f64 = 4.0;

@@ -5,7 +5,7 @@ use crate::results::layout::shorter_in_tests;
 use crate::results::parts::{Kept, Outcome, Outcomes, PartFiles};
 use crate::results::pending::Pending;
 use crate::results::{Results, ResultsError};
-use crate::run::take::{LOOK, Left, PartJob, Taken, Work};
+use crate::run::take::{Done, LOOK, Left, PartJob, Taken, Work};
 use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, limits};
 use crate::solver::SimulationError;
 use crate::sweep::{Job, PartName};
@@ -123,8 +123,8 @@ pub(super) struct Collector<'a, 'e> {
     pub events: &'a mut Events<'e>,
     pub report: &'a mut RunReport,
     pub open: BTreeMap<PartName, OpenPart>,
-    /// Number and predicted cost of the jobs of the parts that it has committed, spilled ones included.
-    pub own: (u64, f64),
+    /// Of the parts that it has committed, spilled jobs included.
+    pub own: Done,
 }
 
 impl Collector<'_, '_> {
@@ -353,9 +353,9 @@ impl Collector<'_, '_> {
 
     /// Reports what other workers have done since the run began.
     fn report_others(&mut self) -> Result<(), ResultsError> {
-        let (done, cost) = self.pending.done_since()?;
-        let jobs = done.saturating_sub(self.own.0);
-        let predicted_cost = (cost - self.own.1).max(0.0);
+        let done = self.pending.done_since()?;
+        let jobs = done.jobs.saturating_sub(self.own.jobs);
+        let predicted_cost = (done.cost - self.own.cost).max(0.0);
         Ok(self.events.send(&RunEvent::OthersDone {
             jobs,
             predicted_cost,
@@ -423,7 +423,7 @@ impl Collector<'_, '_> {
         let took = whole.of.begin.elapsed();
         self.joined.walltime.committed(took, begin.elapsed());
         if !whole.of.again {
-            self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);
+            self.own.add(part);
         }
         let jobs = whole.outcomes.len();
         let outcomes = whole.outcomes.values();

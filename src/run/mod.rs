@@ -36,6 +36,7 @@ use crate::results::{Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
 use crate::run::limits::Walltime;
+use crate::run::take::Done;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
 use crate::table::file::PROGRAM;
@@ -251,7 +252,7 @@ impl Joined<'_> {
             events,
             report,
             open: BTreeMap::new(),
-            own: (0, 0.0),
+            own: Done::default(),
         };
         let ended = collector.run_all(kernel);
         report.wall = self.begin.elapsed().as_secs_f64();

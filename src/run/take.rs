@@ -69,18 +69,32 @@ pub(super) struct Left {
     pub has_abandoned: bool,
 }
 
+/// Jobs of finished parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Done {
+    pub jobs: u64,
+    /// Predicted, in CPU seconds.
+    pub cost: f64,
+}
+
+impl Done {
+    pub(super) fn add(&mut self, part: &Outline) {
+        self.jobs += part.job_count as u64;
+        self.cost += part.cost;
+    }
+}
+
 impl Pending<'_> {
-    /// Number and predicted cost of the jobs of parts that were finished since they were looked up.
-    pub(super) fn done_since(&self) -> Result<(u64, f64), ResultsError> {
+    /// Of parts that were finished since they were looked up.
+    pub(super) fn done_since(&self) -> Result<Done, ResultsError> {
         let done = self.results.done_parts()?;
         let is_new = |part: &&Outline| done.contains(&part.name) && !self.done.contains(&part.name);
-        let mut jobs = 0;
-        let mut cost = 0.0;
-        for part in self.parts.iter().filter(is_new) {
-            jobs += part.job_count as u64;
-            cost += part.cost;
-        }
-        Ok((jobs, cost))
+        let mut sum = Done::default();
+        self.parts
+            .iter()
+            .filter(is_new)
+            .for_each(|part| sum.add(part));
+        Ok(sum)
     }
 
     /// What is left once this worker has committed all its parts; nothing for the last worker that looks.

@@ -979,7 +979,7 @@ fn parts_done_since_the_last_look_are_counted_whichever_worker_did_them() {
     let results = open(&layout, &sweep(SEEDS, "")).unwrap();
     let parts: Vec<Outline> = results.plan().outlines().collect();
     let pending = Pending::look_up(&results, &parts, Retry::default()).unwrap();
-    assert_eq!(pending.done_since().unwrap(), (0, 0.0));
+    assert_eq!(pending.done_since().unwrap(), Done::default());
     let report = run(
         &layout,
         &sweep(SEEDS, ""),
@@ -987,9 +987,9 @@ fn parts_done_since_the_last_look_are_counted_whichever_worker_did_them() {
         &|job, _| Ok(measure(&job.parameters)),
         &mut |_| (),
     );
-    let (jobs, cost) = pending.done_since().unwrap();
-    assert_eq!(jobs, 2 * SEEDS);
-    assert!((cost / report.unwrap().predicted_cost - 1.0).abs() < 1e-9);
+    let done = pending.done_since().unwrap();
+    assert_eq!(done.jobs, 2 * SEEDS);
+    assert!((done.cost / report.unwrap().predicted_cost - 1.0).abs() < 1e-9);
 }
 
 #[test]

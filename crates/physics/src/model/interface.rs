@@ -62,13 +62,13 @@ impl ContactEvent {
     #[inline(always)]
     pub(crate) const fn new(
         what: ContactChange,
-        (attached, attached_time): (u64, f64),
+        attached: AttachedContacts,
         mean_displacement: f64,
     ) -> Self {
         Self {
             what,
-            attached,
-            attached_time,
+            attached: attached.number,
+            attached_time: attached.time,
             mean_displacement,
         }
     }
@@ -80,6 +80,14 @@ impl Deref for ContactEvent {
     fn deref(&self) -> &ContactChange {
         &self.what
     }
+}
+
+/// Contacts of the whole slider that are attached after a change.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AttachedContacts {
+    number: u64,
+    /// Integral of that number over time up to the change, in s.
+    time: f64,
 }
 
 /// The number of attached contacts, and its integral over time.
@@ -209,11 +217,15 @@ impl Interface {
     /// The initial attachment of every contact as events at time 0, in order.
     pub fn initial_attachments(&self) -> impl Iterator<Item = ContactEvent> {
         let contacts = 0..self.block_stiffness.len() * self.contacts_per_block;
-        contacts.map(|index| {
+        let attached = AttachedContacts {
+            number: self.attached.count,
+            time: 0.0,
+        };
+        contacts.map(move |index| {
             let block = index / self.contacts_per_block;
             let contact = index % self.contacts_per_block;
             let what = self.change(block, contact, 0.0, 0.0, Change::Attach);
-            ContactEvent::new(what, (self.attached.count, 0.0), 0.0)
+            ContactEvent::new(what, attached, 0.0)
         })
     }
 
@@ -303,12 +315,12 @@ impl Interface {
     /// Breaks and counts every contact of a block whose threshold is reached at this displacement, in the order of
     /// contacts. Passes each to `log`, with what `count` gives.
     #[inline(always)]
-    pub fn break_reached(
+    pub(crate) fn break_reached(
         &mut self,
         block: usize,
         time: f64,
         displacement: f64,
-        mut log: impl FnMut(ContactChange, (u64, f64)),
+        mut log: impl FnMut(ContactChange, AttachedContacts),
     ) {
         for row in 0..self.rows_per_block {
             let mut reached = self.rows_of(block)[row].reached(Scalar512b, displacement);
@@ -399,12 +411,14 @@ impl Interface {
         (change, due)
     }
 
-    /// Counts a change at a time in s, in the order of time. Returns how many contacts are attached after it, and the
-    /// integral of that number up to there, in s.
+    /// Counts a change at a time in s, in the order of time.
     #[inline(always)]
-    pub(crate) fn count(&mut self, change: Change, time: f64) -> (u64, f64) {
+    pub(crate) fn count(&mut self, change: Change, time: f64) -> AttachedContacts {
         self.attached.change(change, time);
-        (self.attached.count, self.attached.integral(time))
+        AttachedContacts {
+            number: self.attached.count,
+            time: self.attached.integral(time),
+        }
     }
 
     /// Moves the origin by `time` s and `displacement` m.

@@ -46,30 +46,44 @@ pub struct GridPath<'a> {
     pub integral: f64,
 }
 
-/// The largest and the least of something over a number of steps: how many steps from the beginning, and in N.
+/// The largest and the least shear force over a number of steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Extremes {
-    pub largest: (f64, f64),
-    pub least: (f64, f64),
+    pub largest: Extreme,
+    pub least: Extreme,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Extreme {
+    /// How many steps from the beginning.
+    pub at: f64,
+    /// F_S, in N.
+    pub force: f64,
 }
 
 impl Default for Extremes {
     fn default() -> Self {
         Self {
-            largest: (0.0, f64::NEG_INFINITY),
-            least: (0.0, f64::INFINITY),
+            largest: Extreme {
+                at: 0.0,
+                force: f64::NEG_INFINITY,
+            },
+            least: Extreme {
+                at: 0.0,
+                force: f64::INFINITY,
+            },
         }
     }
 }
 
 impl Extremes {
     #[inline(always)]
-    fn include(&mut self, at: f64, value: f64) {
-        if value > self.largest.1 {
-            self.largest = (at, value);
+    fn include(&mut self, at: f64, force: f64) {
+        if force > self.largest.force {
+            self.largest = Extreme { at, force };
         }
-        if value < self.least.1 {
-            self.least = (at, value);
+        if force < self.least.force {
+            self.least = Extreme { at, force };
         }
     }
 
@@ -403,12 +417,13 @@ impl GridPath<'_> {
         if above(self.bounds) <= floor {
             return None;
         }
-        let (mut at, value) = if sign > 0.0 {
+        let inner = if sign > 0.0 {
             self.inner.largest
         } else {
             self.inner.least
         };
-        let mut extreme = sign * value;
+        let mut at = inner.at;
+        let mut extreme = sign * inner.force;
         let mut offer = |begin: f64, cubic: &CubicStep, from: f64, to: f64| {
             let least = if extreme > floor { extreme } else { floor };
             if above(cubic.bounds()) > least {

@@ -30,7 +30,7 @@ use super::harmonic::Harmonic;
 use super::ledger::Audit;
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Solver, SolverKey, Summary};
-use crate::model::{Change, ContactChange, ContactEvent, Drive, Parameters};
+use crate::model::{AttachedContacts, Change, ContactChange, ContactEvent, Drive, Parameters};
 use crate::value::{Field, words};
 use std::sync::atomic::Ordering;
 
@@ -290,7 +290,7 @@ impl<'a> Integration<'a> {
                 return false;
             }
         };
-        self.report_leap(&plan, &drive, [start, began], observer);
+        self.report_leap(&plan, &drive, start, began, observer);
         self.grid.is_on = false;
         self.summary.steps += 1;
         self.summary.leaps += 1;
@@ -304,7 +304,7 @@ impl<'a> Integration<'a> {
                 let x = self.slider.displacement(block);
                 let trailing = self.slider.state.displacement[0][0];
                 let mean = self.slider.mean_displacement();
-                self.break_block(block, [x, mean], self.frame.shear_force(trailing), observer);
+                self.break_block(block, x, mean, self.frame.shear_force(trailing), observer);
             }
             None => self.reattach_due(observer),
         }
@@ -317,7 +317,8 @@ impl<'a> Integration<'a> {
         &mut self,
         leap: &PlannedLeap,
         drive: &Harmonic,
-        [start, began]: [f64; 2],
+        start: f64,
+        began: f64,
         observer: &mut dyn Observer,
     ) {
         let mut reported = 0.0;
@@ -353,12 +354,13 @@ impl<'a> Integration<'a> {
         report(leap.duration, observer);
     }
 
-    /// Breaks the contacts of a block that has reached a break position, at these displacements of it and of all blocks
-    /// on average in m and shear force `force` N.
+    /// Breaks the contacts of a block that has reached a break position, at displacement `x` m of it and `mean` m of all
+    /// blocks on average, and a shear force of `force` N.
     fn break_block(
         &mut self,
         block: usize,
-        [x, mean]: [f64; 2],
+        x: f64,
+        mean: f64,
         force: f64,
         observer: &mut dyn Observer,
     ) {
@@ -366,11 +368,11 @@ impl<'a> Integration<'a> {
         let frame = &self.frame;
         let summary = &mut self.summary;
         let mean_displacement = frame.absolute_displacement(mean);
-        let mut log = |change: ContactChange, count: (u64, f64)| {
+        let mut log = |change: ContactChange, attached: AttachedContacts| {
             summary.breaks += 1;
             observer.contact(&ContactEvent::new(
                 frame.absolute(change),
-                count,
+                attached,
                 mean_displacement,
             ));
         };

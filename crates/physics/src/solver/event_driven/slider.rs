@@ -6,7 +6,7 @@
 
 use crate::model::equation::StiffnessMatrix;
 use crate::model::simd::{Simd, Vector};
-use crate::model::{ContactChange, Interface, LANES, Parameters, Row};
+use crate::model::{AttachedContacts, ContactChange, Interface, LANES, Parameters, Row};
 use pulp::Scalar512b;
 
 /// Block 1, at which the drive pulls, in the first row.
@@ -18,6 +18,17 @@ pub(super) struct BlockLayout {
     pub rows: usize,
 }
 
+/// Where a block lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Slot {
+    pub row: usize,
+    pub lane: usize,
+}
+
+impl Slot {
+    pub const FIRST: Self = Self { row: 0, lane: 0 };
+}
+
 impl BlockLayout {
     pub fn new(blocks: usize) -> Self {
         Self {
@@ -26,10 +37,12 @@ impl BlockLayout {
         }
     }
 
-    /// Row and lane of a block.
     #[inline]
-    pub fn slot(self, block: usize) -> (usize, usize) {
-        (block % self.rows, block / self.rows)
+    pub fn slot(self, block: usize) -> Slot {
+        Slot {
+            row: block % self.rows,
+            lane: block / self.rows,
+        }
     }
 
     /// Block in a slot; beyond the last one for padding.
@@ -90,7 +103,7 @@ impl Chain {
         };
         let bare = StiffnessMatrix::new(parameters, &vec![0.0; layout.blocks]);
         for (block, diagonal) in bare.diagonal.iter().enumerate() {
-            let (row, lane) = layout.slot(block);
+            let Slot { row, lane } = layout.slot(block);
             chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
             chain.bare[row][lane] = *diagonal;
             chain.diagonal[row][lane] = diagonal / chain.mass;
@@ -100,7 +113,7 @@ impl Chain {
 
     /// Updates the coefficients of a block whose contacts have changed.
     pub fn update(&mut self, block: usize, interface: &Interface) {
-        let (row, lane) = self.layout.slot(block);
+        let Slot { row, lane } = self.layout.slot(block);
         self.diagonal[row][lane] =
             (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
         self.pull[row][lane] = interface.block_pull[block] / self.mass;
@@ -110,7 +123,7 @@ impl Chain {
 
     #[inline]
     pub fn at(&self, rows: &[Row], block: usize) -> f64 {
-        let (row, lane) = self.layout.slot(block);
+        let Slot { row, lane } = self.layout.slot(block);
         rows[row][lane]
     }
 
@@ -176,9 +189,9 @@ impl Slider {
         block: usize,
         time: f64,
         x: f64,
-        log: impl FnMut(ContactChange, (u64, f64)),
+        log: impl FnMut(ContactChange, AttachedContacts),
     ) {
-        let (row, lane) = self.chain.layout.slot(block);
+        let Slot { row, lane } = self.chain.layout.slot(block);
         let upper = self.chain.upper[row][lane];
         let lower = self.chain.lower[row][lane];
         // Rounding may leave the block just short of the position that it has reached.
@@ -203,7 +216,7 @@ impl Slider {
     pub fn move_origin(&mut self, time: f64, displacement: f64) {
         self.interface.move_origin(time, displacement);
         for block in 0..self.chain.layout.blocks {
-            let (row, lane) = self.chain.layout.slot(block);
+            let Slot { row, lane } = self.chain.layout.slot(block);
             self.state.displacement[row][lane] -= displacement;
             self.chain.update(block, &self.interface);
         }

@@ -15,7 +15,7 @@ use crate::model::simd::Simd;
 use crate::model::{ContactChange, Interface};
 use crate::solver::event_driven::event::{own_terms, term_beside};
 use crate::solver::event_driven::moving_frame::StepDrive;
-use crate::solver::event_driven::slider::Slider;
+use crate::solver::event_driven::slider::{Slider, Slot};
 use crate::solver::polynomial::{CUBIC, halley_step, rising_root, value_and_integral};
 
 const SIXTH: f64 = 1.0 / 6.0;
@@ -28,7 +28,7 @@ const MAX_HALLEY_STEPS: usize = 4;
 struct Path {
     block: usize,
     /// Row and lane of the block, and its entry in the diagonal of S without contacts, in N/m.
-    slot: (usize, usize),
+    slot: Slot,
     bare: f64,
     /// Coefficients by s, in m.
     coefficients: [f64; 5],
@@ -49,7 +49,7 @@ impl Path {
         let x = &slider.state.displacement;
         let q = &step.increment;
         let place = step.places[block];
-        let (row, lane) = place.slot;
+        let Slot { row, lane } = place.slot;
         let end = x[row][lane];
         let rise = q[row][lane];
         let beside = place.beside(x);
@@ -280,7 +280,7 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
         let s = ((due - start) * step.inverse_length).clamp(0.0, 1.0);
         let left = 1.0 - s;
         let place = step.places[block];
-        let (row, lane) = place.slot;
+        let Slot { row, lane } = place.slot;
         let x = &slider.state.displacement;
         let end = x[row][lane];
         let rise = step.increment[row][lane];
@@ -431,7 +431,7 @@ mod tests {
         let none = Correction::default();
         Path {
             block: 0,
-            slot: (0, 0),
+            slot: Slot::FIRST,
             bare: 0.0,
             coefficients,
             from,

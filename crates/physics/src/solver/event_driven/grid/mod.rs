@@ -67,6 +67,13 @@ pub(super) struct Grid {
     entered: f64,
 }
 
+/// The shear force at the start of a step, and its second derivative by steps there, both in N.
+#[derive(Clone, Copy, Debug)]
+struct ForceAtStart {
+    force: f64,
+    bend: f64,
+}
+
 impl Grid {
     pub fn new(parameters: &Parameters, tolerance: f64, chain: &Chain, state: &State) -> Self {
         Self {
@@ -109,9 +116,9 @@ impl Grid {
     }
 
     /// Adds the last run of steps to the history, but for its last step. `before` is the shear force one step before
-    /// its start. Returns the force at the start of the last step and its second derivative there, in N.
+    /// its start. Returns the force at the start of the last step.
     #[inline(always)]
-    fn follow_run(&mut self, steps: usize, before: f64) -> [f64; 2] {
+    fn follow_run(&mut self, steps: usize, before: f64) -> ForceAtStart {
         let mut here = self.force;
         let mut bend = (self.step.trail[0] - here) - (here - before);
         for pair in self.step.trail[..steps].windows(2) {
@@ -123,7 +130,7 @@ impl Grid {
             });
             (here, bend) = (next, next_bend);
         }
-        [here, bend]
+        ForceAtStart { force: here, bend }
     }
 
     /// Adds the last step to the history, once its events are known.
@@ -132,7 +139,7 @@ impl Grid {
         &mut self,
         chain: &Chain,
         state: &State,
-        [force, bend]: [f64; 2],
+        ForceAtStart { force, bend }: ForceAtStart,
         start_bend: f64,
     ) {
         let step = &self.step;

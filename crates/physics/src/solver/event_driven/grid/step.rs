@@ -22,7 +22,7 @@
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
 use crate::solver::event_driven::moving_frame::StepDrive;
-use crate::solver::event_driven::slider::{BlockLayout, Chain, FIRST_BLOCK, State};
+use crate::solver::event_driven::slider::{BlockLayout, Chain, FIRST_BLOCK, Slot, State};
 
 /// Longest run of steps without a look at the clock.
 pub(super) const MAX_RUN: usize = 64;
@@ -30,9 +30,9 @@ pub(super) const MAX_RUN: usize = 64;
 /// Row and lane of a block and of those beside.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BlockPlace {
-    pub slot: (usize, usize),
-    pub before: (usize, usize),
-    pub after: (usize, usize),
+    pub slot: Slot,
+    pub before: Slot,
+    pub after: Slot,
     /// 1 for each block beside that there is, else 0, and its slot is the block's own.
     pub shares: [f64; 2],
 }
@@ -60,7 +60,8 @@ impl BlockPlace {
             shares,
             ..
         } = self;
-        shares[0].mul_add(rows[before.0][before.1], shares[1] * rows[after.0][after.1])
+        let of = |slot: &Slot| rows[slot.row][slot.lane];
+        shares[0].mul_add(of(before), shares[1] * of(after))
     }
 }
 
@@ -193,7 +194,7 @@ impl GridStep {
     pub(super) fn update<S: Simd>(
         &mut self,
         simd: S,
-        (row, lane): (usize, usize),
+        Slot { row, lane }: Slot,
         diagonal: f64,
         pull: f64,
         [upper, lower]: [f64; 2],
@@ -263,8 +264,8 @@ impl GridStep {
         beside: f64,
         drive: &StepDrive,
     ) -> f64 {
-        let (row, lane) = place.slot;
-        let pulled = if place.slot == (0, 0) {
+        let Slot { row, lane } = place.slot;
+        let pulled = if place.slot == Slot::FIRST {
             self.pulling * drive.increment()
         } else {
             0.0
@@ -275,9 +276,9 @@ impl GridStep {
     /// φ of a block at the displacements of it, of both blocks beside together, and of the drive, in m.
     #[inline(always)]
     pub(super) fn force_on(&self, place: &BlockPlace, here: f64, beside: f64, driven: f64) -> f64 {
-        let (row, lane) = place.slot;
+        let Slot { row, lane } = place.slot;
         let own = self.diagonal[row][lane].mul_add(here, self.pull[row][lane]);
-        let pulls = if place.slot == (0, 0) {
+        let pulls = if place.slot == Slot::FIRST {
             self.pulling
         } else {
             0.0
@@ -300,7 +301,7 @@ fn weights(half: f64) -> [f64; 2] {
 }
 
 #[inline(always)]
-pub(super) fn add<S: Simd>(simd: S, rows: &mut [Row], (row, lane): (usize, usize), value: f64) {
+pub(super) fn add<S: Simd>(simd: S, rows: &mut [Row], Slot { row, lane }: Slot, value: f64) {
     let sum = rows[row][lane] + value;
     simd.set(&mut rows[row], lane, sum);
 }
@@ -645,7 +646,7 @@ mod tests {
         let mut step = GridStep::new(parameters, &slider.chain, length);
         step.update_all(&slider.chain);
         for block in 0..layout.blocks {
-            let (row, lane) = layout.slot(block);
+            let Slot { row, lane } = layout.slot(block);
             slider.state.displacement[row][lane] = x[block];
             step.increment[row][lane] = x[block] - before[block];
         }

@@ -162,7 +162,7 @@ fn plan<S: Simd>(
             (chain, interface),
             drive,
             &segment,
-            [decay, left],
+            FreeEnd { after: decay, left },
             bounds,
         )
     {
@@ -176,8 +176,17 @@ fn plan<S: Simd>(
     })
 }
 
-/// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force:
-/// one as large is on record, or comes later in the segment, or comes after it, in this cycle and before any break.
+/// What counts as the end of free motion.
+#[derive(Clone, Copy, Debug)]
+struct FreeEnd {
+    /// In s after the start of the leap.
+    after: f64,
+    /// Part of the bound on free motion that remains then.
+    left: f64,
+}
+
+/// Whether free motion hides no largest shear force: one as large is on record, or comes later in the segment, or comes
+/// after it, in this cycle and before any break.
 #[inline(always)]
 fn hides_no_peak<S: Simd>(
     simd: S,
@@ -185,7 +194,7 @@ fn hides_no_peak<S: Simd>(
     (chain, interface): (&Chain, &mut Interface),
     drive: &Harmonic,
     segment: &Segment<'static>,
-    [moving, left]: [f64; 2],
+    FreeEnd { after, left }: FreeEnd,
     LeapBounds {
         start,
         horizon,
@@ -200,18 +209,18 @@ fn hides_no_peak<S: Simd>(
         ..*segment
     };
     let now = segment.force_after(0.0);
-    let later = segment.force_after(moving);
+    let later = segment.force_after(after);
     let highest = if drive.amplitude == 0.0 {
         // A rising line and a decaying bound: largest at an end.
         (now + swing).max(later + left * swing)
     } else {
-        driven(moving)
+        driven(after)
             .maximum_above(f64::NEG_INFINITY)
             .map_or(f64::INFINITY, |(_, force)| force)
             + swing
     };
     if highest <= largest_force
-        || (segment.duration > moving && segment.maximum_above(highest).is_some())
+        || (segment.duration > after && segment.maximum_above(highest).is_some())
     {
         return true;
     }
@@ -221,7 +230,7 @@ fn hides_no_peak<S: Simd>(
     } else {
         (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
     };
-    let mut ahead = (moving + further).min(until_cycle_end);
+    let mut ahead = (after + further).min(until_cycle_end);
     if ahead > horizon {
         // Nor does a contact break that attaches on the way.
         interface.look_ahead(|due, block, life| {
@@ -457,6 +466,7 @@ mod tests {
     use super::split::BlockMotion;
     use super::*;
     use crate::model::Parameters;
+    use crate::solver::event_driven::slider::Slot;
     use pulp::Scalar512b as Baseline;
 
     #[test]
@@ -488,17 +498,15 @@ mod tests {
             let blocks: Vec<BlockMotion> =
                 (0..21).map(|block| split.driven(chain, block)).collect();
             for (block, motion) in blocks.iter().enumerate() {
-                let (row, lane) = chain.layout.slot(block);
+                let Slot { row, lane } = chain.layout.slot(block);
                 let away = close * (1.0 + (block * 8 % 21) as f64 / 42.0);
                 chain.upper[row][lane] = motion.start + away * (motion.swing + 1e-3 * motion.rate);
                 chain.lower[row][lane] = motion.start - away.max(0.999) * motion.swing - 1e-20;
                 split.rows[row].bound[lane] = 0.0;
             }
             let is_beyond = |block: usize, seconds: f64| {
-                let (x, (row, lane)) = (
-                    blocks[block].displacement(&drive, seconds),
-                    chain.layout.slot(block),
-                );
+                let x = blocks[block].displacement(&drive, seconds);
+                let Slot { row, lane } = chain.layout.slot(block);
                 x >= chain.upper[row][lane] + 1e-16 || x <= chain.lower[row][lane] - 1e-16
             };
             for horizon in [1e-4, 1e-3, 4e-3, 0.01, 0.1, f64::INFINITY] {

@@ -15,7 +15,7 @@
 use super::elimination::{Elimination, Number, outer};
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Row};
-use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, State};
+use crate::solver::event_driven::slider::{Chain, FIRST_BLOCK, Slot, State};
 use crate::solver::harmonic::Harmonic;
 
 /// Halvings of the decay rate after which free motion counts as undamped.
@@ -62,7 +62,9 @@ impl Split {
     pub fn new(chain: &Chain) -> Self {
         let layout = chain.layout;
         let mut fixed = chain.layout.filled(0.0);
-        for (row, lane) in (layout.blocks..LANES * layout.rows).map(|block| layout.slot(block)) {
+        for Slot { row, lane } in
+            (layout.blocks..LANES * layout.rows).map(|block| layout.slot(block))
+        {
             fixed[row][lane] = FIXED;
         }
         let [stiffness, shifted] = [(); 2].map(|()| Elimination::new(layout.rows));
@@ -78,7 +80,7 @@ impl Split {
 
     /// The driven solution of a block.
     pub fn driven(&self, chain: &Chain, block: usize) -> BlockMotion {
-        let (row, lane) = chain.layout.slot(block);
+        let Slot { row, lane } = chain.layout.slot(block);
         let row = &self.rows[row];
         BlockMotion {
             start: row.start[lane],
@@ -92,7 +94,7 @@ impl Split {
     /// mass, in s².
     #[inline(always)]
     pub fn speed_and_compliance(&self, chain: &Chain, drive: &Harmonic, block: usize) -> [f64; 2] {
-        let (row, lane) = chain.layout.slot(block);
+        let Slot { row, lane } = chain.layout.slot(block);
         let row = &self.rows[row];
         let speed = row.rate[0][lane] + drive.angular_frequency * row.swing[lane];
         [speed, row.compliance[lane]]
@@ -363,7 +365,7 @@ mod tests {
         let frequency = (parameters.block_contact_stiffness() / parameters.block_mass()).sqrt();
         let Slider { chain, state, .. } = &mut slider;
         for block in 0..parameters.blocks {
-            let (row, lane) = chain.layout.slot(block);
+            let Slot { row, lane } = chain.layout.slot(block);
             let stiffness = next().powi(3) * parameters.block_contact_stiffness() / chain.mass;
             chain.diagonal[row][lane] = chain.bare[row][lane] / chain.mass + stiffness;
             chain.pull[row][lane] = stiffness * reach * (next() - 0.5);
@@ -543,7 +545,7 @@ mod tests {
         let mut before = 0.0;
         let mut widest = 0.0_f64;
         for block in 0..parameters.blocks {
-            let (row, lane) = chain.layout.slot(block);
+            let Slot { row, lane } = chain.layout.slot(block);
             let BlockMotion {
                 start,
                 rate: speed,
@@ -561,7 +563,7 @@ mod tests {
             before = y;
         }
         for (block, inverse) in inverse.into_iter().enumerate() {
-            let (row, lane) = chain.layout.slot(block);
+            let Slot { row, lane } = chain.layout.slot(block);
             let SplitRow {
                 bound, compliance, ..
             } = &split.rows[row];

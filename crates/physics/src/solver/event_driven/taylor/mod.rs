@@ -18,7 +18,7 @@ pub(super) use self::series::{StepInput, TaylorSeries, evaluate, expand, reachab
 
 use super::Integration;
 use super::event::{own_terms, term_beside};
-use super::slider::{BlockLayout, Chain, Slider};
+use super::slider::{BlockLayout, Chain, Slider, Slot};
 use crate::model::Change;
 use crate::solver::ledger::Audit;
 use crate::solver::polynomial;
@@ -110,7 +110,7 @@ impl Step {
 
     /// Notes and returns where in a part of the step a block first breaks; infinite if it does not.
     fn look_for_break(&mut self, chain: &Chain, block: usize, from: f64, end: f64) -> f64 {
-        let (row, lane) = chain.layout.slot(block);
+        let Slot { row, lane } = chain.layout.slot(block);
         let levels = [chain.lower[row][lane], chain.upper[row][lane]];
         let [lowest, highest] = self.series.range(row, lane);
         if lowest > levels[0] && highest < levels[1] {
@@ -134,14 +134,14 @@ impl Step {
 
     /// Value, slope and half the second derivative of a block's displacement at s, in m.
     fn expanded(&mut self, chain: &Chain, block: usize, s: f64) -> [f64; 3] {
-        let (row, lane) = chain.layout.slot(block);
+        let Slot { row, lane } = chain.layout.slot(block);
         self.series.block(row, lane, &mut self.coefficients);
         polynomial::expanded(&self.coefficients, s)
     }
 
     /// Adds coefficients to the series of a block, and changes F_S accordingly.
     fn amend(&mut self, chain: &Chain, block: usize, coefficients: [f64; MERGED_ORDER + 1]) {
-        let (row, lane) = chain.layout.slot(block);
+        let Slot { row, lane } = chain.layout.slot(block);
         self.series.add(row, lane, &coefficients);
         self.amended.push(block);
         if block == 0 {
@@ -302,7 +302,7 @@ impl Integration<'_> {
         match change {
             Change::Break => {
                 let mean = self.step.series.mean(&self.slider.chain, s);
-                self.break_block(block, [x, mean], force, observer);
+                self.break_block(block, x, mean, force, observer);
             }
             Change::Attach => self.attach_next(x, observer),
         }
