@@ -128,12 +128,12 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// Jobs that are missing, and jobs that are kept for later.
+/// Jobs that are missing, and finished jobs of unfinished parts.
 pub fn missing(jobs_missing: u64, jobs_spilled: u64) -> String {
     let missing = format!("{} missing", count(jobs_missing, "job"));
     match jobs_spilled {
         0 => missing,
-        spilled => format!("{missing}, {spilled} kept for later"),
+        spilled => format!("{missing}, {spilled} in unfinished parts"),
     }
 }
 

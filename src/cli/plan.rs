@@ -239,7 +239,7 @@ impl DirectoryState {
             return format!("refused: {}", self.refused.as_deref().unwrap_or_default());
         };
         let mut text = format!(
-            "{}: {} done, {} kept for later, {} failed, {} to run",
+            "{}: {} done, {} in unfinished parts, {} failed, {} to run",
             shown(&self.path),
             overview.jobs_done - overview.jobs_kept,
             overview.jobs_spilled,

@@ -63,14 +63,14 @@ fn pairs(status: &Status) -> Vec<(&'static str, String)> {
     let mut done = overview.jobs_done.to_string();
     if overview.jobs_kept > 0 {
         let kept = overview.jobs_kept;
-        done = format!("{done}, {kept} of them kept of values that the sweep no longer has");
+        done = format!("{done}, {kept} of them of values that the sweep no longer has");
     }
     let parts_done = overview.parts_done;
     let parts = format!("{parts_done} done, {} missing", overview.parts_missing);
     let mut pairs = vec![
         ("sweep", status.name.clone()),
         ("jobs done", done),
-        ("kept for later", overview.jobs_spilled.to_string()),
+        ("in unfinished parts", overview.jobs_spilled.to_string()),
         ("jobs failed", overview.jobs_failed.to_string()),
         ("jobs missing", overview.jobs_missing.to_string()),
         ("parts", parts),

@@ -56,22 +56,26 @@ impl<'a> Results<'a> {
     }
 
     /// The rows of a part that are there, in the tables or spilled.
-    pub fn kept(&self, part: &Part, place: Option<&Path>) -> Result<Kept, ResultsError> {
+    pub fn earlier_rows(
+        &self,
+        part: &Part,
+        place: Option<&Path>,
+    ) -> Result<EarlierRows, ResultsError> {
         let read = |table| {
             let file = place.map(|place| self.file_in(place, table, part.name));
             let before = Dataset::of(self.layout().storage, file.into_iter().collect());
-            Ok((table, KeptRows::read(before)?))
+            Ok((table, RowsByJob::read(before)?))
         };
         self.tables().map(read).collect()
     }
 
-    /// The files of a part in the tables or the spill: new rows of jobs with an outcome, kept ones of others. Uses no
+    /// The files of a part in the tables or the spill: new rows of jobs with an outcome, the earlier ones of others. Uses no
     /// disk.
     pub fn encode(
         &self,
         part: &Part,
         outcomes: &Outcomes,
-        kept: &Kept,
+        earlier: &EarlierRows,
         place: &Path,
     ) -> Result<PartFiles, ResultsError> {
         let sweep = &self.extensions()[part.name.extension].sweep;
@@ -82,17 +86,17 @@ impl<'a> Results<'a> {
         let gaps = gaps(sweep);
         let encoded = |table| {
             let file = self.file_in(place, table, part.name);
-            let kept = &kept[&table];
+            let rows = &earlier[&table];
             match table {
-                RecordedTable::Slips => encoded(file, &gaps, &jobs, kept, |job, outcome| {
+                RecordedTable::Slips => encoded(file, &gaps, &jobs, rows, |job, outcome| {
                     let slips = outcome.iter().flat_map(Measurements::all_slips);
                     slips.map(move |slip| (Cow::Borrowed(job), slip))
                 }),
-                RecordedTable::Precursors => encoded(file, &gaps, &jobs, kept, |job, outcome| {
+                RecordedTable::Precursors => encoded(file, &gaps, &jobs, rows, |job, outcome| {
                     let precursors = outcome.iter().flat_map(|measured| &measured.precursors);
                     precursors.map(move |precursor| (Cow::Borrowed(job), Cow::Borrowed(precursor)))
                 }),
-                RecordedTable::Jobs => encoded(file, &gaps, &jobs, kept, |job, outcome| {
+                RecordedTable::Jobs => encoded(file, &gaps, &jobs, rows, |job, outcome| {
                     let record = JobRecord::new(outcome.as_ref().map_err(String::as_str));
                     let row: JobRow = (relabel(job), record);
                     [row]
@@ -151,7 +155,7 @@ impl<'a> Results<'a> {
 pub type PartFiles = Vec<(PathBuf, Vec<u8>)>;
 
 /// Rows of jobs that are there already, by table.
-pub type Kept = HashMap<RecordedTable, KeptRows>;
+pub type EarlierRows = HashMap<RecordedTable, RowsByJob>;
 
 /// The jobs of a part, those that were run with their outcomes.
 type Jobs<'a> = Vec<(&'a JobLabel<DriveAndSeed>, Option<&'a Outcome>)>;
@@ -161,7 +165,7 @@ fn encoded<'j, R: Table, Rows: IntoIterator<Item = R>>(
     file: DataFile,
     gaps: &Gaps,
     jobs: &Jobs<'j>,
-    kept: &KeptRows,
+    earlier: &RowsByJob,
     rows: impl Fn(&'j JobLabel<DriveAndSeed>, &'j Outcome) -> Rows,
 ) -> Result<(PathBuf, Vec<u8>), ResultsError> {
     let footer = Footer::default().and(&file.footer).at(&file.path);
@@ -173,7 +177,7 @@ fn encoded<'j, R: Table, Rows: IntoIterator<Item = R>>(
                     .into_iter()
                     .try_for_each(|row| writer.push(&row))?;
             }
-            None => kept.copy(&mut writer, &job.0.job_id)?,
+            None => earlier.copy(&mut writer, &job.0.job_id)?,
         }
     }
     Ok((file.path, writer.finish()?))
@@ -223,28 +227,28 @@ pub(super) fn row_count(
 
 /// The rows of a file by job.
 #[derive(Default)]
-pub struct KeptRows {
+pub struct RowsByJob {
     batches: Vec<Batch>,
     by_job: HashMap<String, Vec<(usize, Range<usize>)>>,
 }
 
-impl KeptRows {
+impl RowsByJob {
     fn read(before: Dataset<'_>) -> Result<Self, ResultsError> {
-        let mut kept = Self::default();
+        let mut read = Self::default();
         for batch in before.batches() {
             let batch = batch?;
-            let number = kept.batches.len();
+            let number = read.batches.len();
             let mut begin = 0;
             let ids: Vec<RowOfJob> = batch.rows_of()?;
             for rows in ids.chunk_by(|row, next| row.job_id == next.job_id) {
                 let end = begin + rows.len();
-                let stretches = kept.by_job.entry(rows[0].job_id.clone()).or_default();
+                let stretches = read.by_job.entry(rows[0].job_id.clone()).or_default();
                 stretches.push((number, begin..end));
                 begin = end;
             }
-            kept.batches.push(batch);
+            read.batches.push(batch);
         }
-        Ok(kept)
+        Ok(read)
     }
 
     fn copy<R: Table>(

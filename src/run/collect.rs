@@ -2,7 +2,7 @@
 //! also encode the files of whole parts, so that small jobs do not wait for the collector. Only it uses the disk.
 
 use crate::results::layout::shorter_in_tests;
-use crate::results::parts::{Kept, Outcome, Outcomes, PartFiles};
+use crate::results::parts::{EarlierRows, Outcome, Outcomes, PartFiles};
 use crate::results::pending::Pending;
 use crate::results::{Results, ResultsError};
 use crate::run::take::{Done, LOOK, Left, PartJob, Taken, Work};
@@ -35,7 +35,7 @@ const MAX_AHEAD: usize = 256;
 /// What threads do.
 enum Task {
     Run(PartJob),
-    Encode(OpenPart, Kept),
+    Encode(OpenPart, EarlierRows),
 }
 
 /// What they have done.
@@ -180,9 +180,9 @@ impl Collector<'_, '_> {
                 workers.spawn(move |_| {
                     let ended = match task {
                         Task::Run(job) => run_job(job, kernel, interrupt, under_way),
-                        Task::Encode(whole, kept) => {
+                        Task::Encode(whole, earlier) => {
                             let begin = Instant::now();
-                            let encode = || encode(results, &whole, &kept);
+                            let encode = || encode(results, &whole, &earlier);
                             let files = catch_unwind(AssertUnwindSafe(encode));
                             Finished::Part {
                                 whole,
@@ -210,13 +210,13 @@ impl Collector<'_, '_> {
         let results = self.pending.results;
         for open in std::mem::take(&mut self.open).values() {
             let begin = Instant::now();
-            let kept = self.kept(&open.of)?;
+            let earlier = self.earlier_rows(&open.of)?;
             if open.of.again {
-                self.commit(open, begin, &encode(results, open, &kept)?)?;
+                self.commit(open, begin, &encode(results, open, &earlier)?)?;
             } else {
                 let layout = results.layout();
                 let files =
-                    results.encode(&open.of.part, &open.outcomes, &kept, &layout.spill())?;
+                    results.encode(&open.of.part, &open.outcomes, &earlier, &layout.spill())?;
                 results.put(self.joined.member, &files, &layout.run())?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
@@ -227,14 +227,16 @@ impl Collector<'_, '_> {
     }
 
     /// The rows that a part has already.
-    fn kept(&self, of: &Taken) -> Result<Kept, ResultsError> {
+    fn earlier_rows(&self, of: &Taken) -> Result<EarlierRows, ResultsError> {
         let layout = self.pending.results.layout();
         let place = match (of.again, of.spilled.is_empty()) {
             (true, _) => Some(layout.tables()),
             (false, false) => Some(layout.spill()),
             (false, true) => None,
         };
-        self.pending.results.kept(&of.part, place.as_deref())
+        self.pending
+            .results
+            .earlier_rows(&of.part, place.as_deref())
     }
 
     /// Hands out jobs and takes their outcomes until no more come. Returns whether it took all that it could.
@@ -399,9 +401,9 @@ impl Collector<'_, '_> {
         if open.outcomes.len() == of.of.together
             && let Some(whole) = self.open.remove(&key)
         {
-            let kept = self.kept(&whole.of)?;
+            let earlier = self.earlier_rows(&whole.of)?;
             out.parts += 1;
-            hand_out(Task::Encode(whole, kept));
+            hand_out(Task::Encode(whole, earlier));
         }
         Ok(())
     }
@@ -463,9 +465,13 @@ fn next(ended: &Receiver<Finished>) -> Option<Finished> {
 }
 
 /// The files of a part in the tables.
-fn encode(results: &Results<'_>, whole: &OpenPart, kept: &Kept) -> Result<PartFiles, ResultsError> {
+fn encode(
+    results: &Results<'_>,
+    whole: &OpenPart,
+    earlier: &EarlierRows,
+) -> Result<PartFiles, ResultsError> {
     let tables = results.layout().tables();
-    results.encode(&whole.of.part, &whole.outcomes, kept, &tables)
+    results.encode(&whole.of.part, &whole.outcomes, earlier, &tables)
 }
 
 fn run_job(

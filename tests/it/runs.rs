@@ -218,7 +218,7 @@ fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables()
             Some(folder.parts(signal, "jobs").len() as u64)
         );
         assert!(status["jobs_missing"].as_u64() > Some(0));
-        // Every command counts the same jobs as kept for later and as missing.
+        // Every command counts the same jobs as in unfinished parts and as missing.
         let reports = [
             json(
                 &folder
@@ -243,12 +243,12 @@ fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables()
             .map(|key| status[key].as_u64().unwrap())
             .sum();
         assert_eq!(sum, 28_000, "{status}");
-        let kept = match status["jobs_spilled"].as_u64().unwrap() {
+        let spilled = match status["jobs_spilled"].as_u64().unwrap() {
             0 => String::new(),
-            spilled => format!(", {spilled} kept for later"),
+            spilled => format!(", {spilled} in unfinished parts"),
         };
         let words = format!(
-            "{} jobs missing{kept}; stickslip run",
+            "{} jobs missing{spilled}; stickslip run",
             status["jobs_missing"]
         );
         let said = folder.ends(0, &format!("show {signal}")).stdout;
