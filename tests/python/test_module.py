@@ -559,5 +559,5 @@ def test_what_answers_to_guesses_name_is_there(opened):
     assert opened.jobs()["outcome"].value_counts()["done"] > 0
     assert opened.plot("intervals").get_ylabel() == opened.plot.intervals().get_ylabel()
     sources = "".join(path.read_text() for path in (ROOT / "src" / "figure").glob("*.rs"))
-    figures = set(re.findall(r'^pub\(super\) const [A-Z]+: &str = "(.+)";', sources, re.M))
+    figures = set(re.findall(r'^pub\(super\) const [A-Z]+: &str = "([\w-]+)";', sources, re.M))
     assert {figure.replace("-", "_") for figure in figures} == set(guesses.INSTEAD["Plot"])
