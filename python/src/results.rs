@@ -193,11 +193,15 @@ fn reduced_columns(results: &Results<'_>, table: &str) -> PyResult<(&'static str
     if table == SetRow::NAME && results.round().is_some() {
         return Ok((SetRow::NAME, schema::<SetInRounds>().fields().clone()));
     }
+    if let Some(optional) = OptionalTable::from_word(table) {
+        return Ok(match optional {
+            OptionalTable::Edges => of::<EdgeRow>(&gaps),
+            OptionalTable::Triggers => of::<TriggerRow>(&gaps),
+            OptionalTable::Pulses => of::<PulseRow>(&gaps),
+        });
+    }
     let all = [
         of::<SetRow>(&gaps),
-        of::<EdgeRow>(&gaps),
-        of::<TriggerRow>(&gaps),
-        of::<PulseRow>(&gaps),
         of::<HistogramBin>(&gaps),
         of::<BackboneBin>(&gaps),
         of::<Point>(&gaps),

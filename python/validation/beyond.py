@@ -12,7 +12,7 @@ from stickslip.tables import Sweep, select
 
 from .document import Section
 from .intervals import count_by_slip, of_same_jobs
-from .kinematics import beyond_drive, load_phase
+from .kinematics import load_phase, mean_excess
 
 #: η from which the window of the phase holds φ_min (docs/model.md).
 WHOLE_WINDOW = 1.014
@@ -124,7 +124,7 @@ def dependences(results: Path) -> Section:
                 "τ of the control (ms)": f"{tau.min():.1f} to {tau.max():.1f}",
                 "s.d. over mean": f"{spread.min():.2f} to {spread.max():.2f}",
                 "least R": f"{modulated['resultant_length'].min():.2f}",
-                "excess of R": beyond_drive(modulated, "resultant").text(2),
+                "excess of R": mean_excess(modulated, "resultant").text(2),
             }
         )
     section.remark(

@@ -40,7 +40,7 @@ def load_phase(slips: pandas.DataFrame) -> pandas.Series:
     return slips["phase"] + slips["eta"] * numpy.cos(slips["phase"])
 
 
-def beyond_drive(sets: pandas.DataFrame, column: str) -> Estimate:
+def mean_excess(sets: pandas.DataFrame, column: str) -> Estimate:
     """The mean excess of sets over what the drive alone gives, with the means of the ends of their intervals.
 
     Sets have seeds in common, so these ends hold even if all sets err alike.
@@ -49,16 +49,16 @@ def beyond_drive(sets: pandas.DataFrame, column: str) -> Estimate:
     return Estimate(*sets[ends].dropna().mean(), len(sets))
 
 
-def beyond_text(sets: pandas.DataFrame, column: str) -> str:
+def excess_text(sets: pandas.DataFrame, column: str) -> str:
     """The same, and the lowest and highest end of the interval of any set."""
     low, high = sets[f"{column}_excess_low"].min(), sets[f"{column}_excess_high"].max()
-    return f"{beyond_drive(sets, column).text(2)}; {low:.2f} to {high:.2f}".replace("-", "−")
+    return f"{mean_excess(sets, column).text(2)}; {low:.2f} to {high:.2f}".replace("-", "−")
 
 
 def bounds_text(sets: pandas.DataFrame, column: str) -> str:
     """The greatest excess of sets with slow drives, of either sign."""
     sets = sets[sets["V0"] < SLOW]
-    mean = beyond_drive(sets, column)
+    mean = mean_excess(sets, column)
     each = sets[[f"{column}_excess_low", f"{column}_excess_high"]].abs().max(axis=None)
     return f"at most {max(-mean.low, mean.high):.2f} in the mean over sets, {each:.2f} in each"
 

@@ -12,10 +12,10 @@ from stickslip.tables import Sweep
 from .document import Section
 from .kinematics import (
     SOURCE,
-    beyond_drive,
     bounds_text,
     in_words,
     load_phase,
+    mean_excess,
     minimum_phase,
     nucleation_phase,
     random_load_phases,
@@ -170,9 +170,9 @@ def below_one(results: Path) -> Section:
         section.rows.append(
             {
                 "V0": in_words(velocity),
-                "excess of R, η < 1": beyond_drive(mine[mine["eta"] < 1], "resultant").text(2),
-                "excess of R, η > 1": beyond_drive(mine[mine["eta"] > 1], "resultant").text(2),
-                "excess of the locking index, η > 1": beyond_drive(mine[mine["eta"] > 1], "locking_index").text(2),
+                "excess of R, η < 1": mean_excess(mine[mine["eta"] < 1], "resultant").text(2),
+                "excess of R, η > 1": mean_excess(mine[mine["eta"] > 1], "resultant").text(2),
+                "excess of the locking index, η > 1": mean_excess(mine[mine["eta"] > 1], "locking_index").text(2),
             }
         )
     slips = Sweep(results / "fig3").slips().dropna(subset="phase")

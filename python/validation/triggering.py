@@ -9,7 +9,7 @@ from stickslip.statistics import Estimate, jackknife, share
 from stickslip.tables import Sweep
 
 from .document import Section
-from .kinematics import beyond_text
+from .kinematics import excess_text
 
 #: Pulses up to this amplitude in m move nothing.
 NO_PULSE = 1e-12
@@ -29,7 +29,7 @@ def texts(found: dict[float, Estimate], digits: int) -> str:
 
 
 def of_thirds(rows: pandas.DataFrame) -> Estimate:
-    """The share triggered beyond the drive in the last third of the cycle, less that in the middle third."""
+    """The excess of the share triggered in the last third of the cycle, less that in the middle third."""
     rows = rows.assign(third=(3 * rows["place"]).astype(int), more=rows["triggered"] - rows["triggered_drive"])
 
     def less(rows: pandas.DataFrame) -> float:
@@ -86,7 +86,7 @@ def pulses(results: Path) -> Section:
     )
     later = {frequency: of_thirds(mine).among(COMPARISONS) for frequency, mine in by_frequency.items()}
     section.check(
-        "beyond the drive alone, most late in the cycle",
+        "excess over the drive alone, most late in the cycle",
         "excess of the share greater in the last third than in the middle third, at 1 µm",
         f"by {texts(later, 2)}",
         *(found.lies(above=0) for found in later.values()),
@@ -174,7 +174,7 @@ def tides(results: Path) -> Section:
     )
     section.remark(
         "[Zhou et al. 2026](https://arxiv.org/abs/2602.06703) find all three with rate-and-state friction.",
-        f"At {speed(slow)} the intervals of the excess of R lie from {beyond_text(slow, 'resultant').split('; ')[1]}.",
+        f"At {speed(slow)} the intervals of the excess of R lie from {excess_text(slow, 'resultant').split('; ')[1]}.",
     )
     section.why = "only the fast drive locks, where T is a part of ⟨τ⟩"
     return section

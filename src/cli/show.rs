@@ -356,10 +356,14 @@ fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
 /// Adds a column of the first sets.
 fn add_column(columns: &mut TextTable, values: &Values, rows: &[SetRow], most: usize) {
     let label = &values.label;
-    let is_interval = values.column.name == "tau_mean";
-    let bound = |set: usize| rows.get(set).filter(|_| is_interval)?.tau_bound;
-    let bounds = (0..values.numbers.len()).filter_map(bound);
-    let (factor, unit) = label.scale(bounds.fold(values.largest, f64::max));
+    let described = SetRow::columns();
+    let bound_of = described
+        .iter()
+        .find(|other| other.class.bounded() == Some(values.name()));
+    let bounds = bound_of.and_then(|bound| Values::of(rows, &bound.name).ok());
+    let bound = |set: usize| *bounds.as_ref()?.numbers.get(set)?;
+    let given = (0..values.numbers.len()).filter_map(bound);
+    let (factor, unit) = label.scale(given.fold(values.largest, f64::max));
     let digits = values.digits();
     let cell = |set: usize| match (values.numbers[set], values.intervals[set]) {
         (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
@@ -412,14 +416,14 @@ fn table_of_pulses(results: &Results<'_>, pulses: &[PulseRow]) -> Result<String>
     add("advance/⟨τ⟩", |row| {
         (row.advance_mean, row.advance_interval)
     });
-    add("by the drive", |row| (row.advance_drive, None));
+    add("drive alone", |row| (row.advance_drive, None));
     add("excess", |row| {
         (row.advance_excess, row.advance_excess_interval)
     });
     add("triggered", |row| {
         (Some(row.triggered_share), row.triggered_interval)
     });
-    add("by the drive", |row| (Some(row.triggered_drive), None));
+    add("drive alone", |row| (Some(row.triggered_drive), None));
     add("excess", |row| {
         (Some(row.triggered_excess), row.triggered_excess_interval)
     });
@@ -472,7 +476,7 @@ fn table_of_edges(edges: &[EdgeRow], sets: &[SetRow]) -> String {
         return String::new();
     };
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
-    let parameters = edges.iter().map(|edge| edge.parameters.parameters.clone());
+    let parameters = edges.iter().map(|edge| edge.parameters.all.clone());
     let mut columns = parameters_but(axis, parameters);
     let label = label(&first.axis);
     let brackets = edges.iter().map(|edge| edge.bracket_high);
@@ -517,7 +521,7 @@ fn table_of_pairs(pairs: &[EdgePair]) -> String {
     let axis = Symbol::from_key(&first.edges[0].axis).unwrap_or(Symbol::T);
     let parameters = pairs
         .iter()
-        .map(|pair| pair.edges[0].parameters.parameters.clone());
+        .map(|pair| pair.edges[0].parameters.all.clone());
     let mut columns = parameters_but(axis, parameters);
     let label = label(axis.key());
     let largest = pairs
@@ -706,7 +710,7 @@ fn note_on_control(sweep: &Sweep, rows: &[SetRow]) -> Option<String> {
         "control = true".to_owned()
     };
     Some(format!(
-        "R without {control}: the drive alone makes some of it, and what the slider adds is not known"
+        "R without {control}: the drive alone makes some of it, and the part due to the slider is not known"
     ))
 }
 

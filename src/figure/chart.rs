@@ -777,7 +777,7 @@ mod tests {
         assert!(lines(&rows, "tau_mean").is_empty() && lines(&rows, "Delta").is_empty());
         let mut periods = vec![rows[0].clone(); 3];
         for (row, period) in periods.iter_mut().zip([0.02, 0.01, 0.04]) {
-            row.parameters.parameters.modulation_period = Some(period);
+            row.parameters.all.modulation_period = Some(period);
             row.frequency = Some(1.0 / period);
         }
         assert_eq!(lines(&periods, "frequency"), [vec![2, 0, 1]]);

@@ -458,7 +458,7 @@ pub(super) mod tests {
     fn the_control_of_all_sets_is_a_level_where_it_lies_on_the_axis() {
         let mut rows = rows(8);
         for row in &mut rows {
-            row.parameters.parameters.drive_velocity = 1e-5;
+            row.parameters.all.drive_velocity = 1e-5;
         }
         let levels = |rows: &[SetRow], tau: f64| {
             let control = SetRow {
@@ -478,7 +478,7 @@ pub(super) mod tests {
         };
         // Colours name sets of Δ = 0, too.
         assert_eq!([levels(&rows, 1.0), levels(&rows, 1e6)], [2, 1]);
-        rows[0].parameters.parameters.drive_velocity = 2e-5;
+        rows[0].parameters.all.drive_velocity = 2e-5;
         assert_eq!(levels(&rows, 1.0), 1, "another set has another control");
     }
 

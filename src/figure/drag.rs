@@ -1,4 +1,4 @@
-//! Drag: τ on a ramp of the modulation, on the way there and on the way back, with the lines τ = nT, and τ/T in bins.
+//! Drag: τ on a ramp of the modulation, as it rises and as it falls, with the lines τ = nT, and τ/T in bins.
 
 use super::axis::{Axis, bounds, widened};
 use super::frame::{Ends, Layout};
@@ -22,12 +22,11 @@ const LAYOUT: Layout = Layout {
     right: NUMBERS,
     ..Layout::column(520.0)
 };
-/// The stages of the ramp, their names and large dots.
-const STAGES: [(RampStage, &str, Dot); 2] = [
-    (RampStage::Up, "there", Dot::solid(INKS[0], RADIUS)),
+/// The stages of the ramp and their large dots.
+const STAGES: [(RampStage, Dot); 2] = [
+    (RampStage::Up, Dot::solid(INKS[0], RADIUS)),
     (
         RampStage::Down,
-        "back",
         Dot::solid(INKS[1], RADIUS).with_shape(Some(SQUARE)),
     ),
 ];
@@ -45,6 +44,8 @@ const OFFSETS: [f64; 2] = [-0.12, 0.12];
 struct RampedSlip {
     /// Its place in [`STAGES`].
     stage: usize,
+    /// In s.
+    onset: f64,
     /// T or Δ at the onset.
     x: f64,
     tau: f64,
@@ -52,9 +53,30 @@ struct RampedSlip {
     ratio: f64,
 }
 
-/// Draws interval against period at the onset, or against amplitude if it is the amplitude alone that is ramped; `None`
-/// if no slip has an interval on a ramp.
-pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
+/// The line τ = nT.
+struct Multiple {
+    n: f64,
+    /// Where it begins and ends.
+    ends: [(f64, f64); 2],
+}
+
+/// What the figure shows, in the units of the axes.
+struct Ramp {
+    slips: Vec<RampedSlip>,
+    /// T or Δ.
+    symbol: &'static str,
+    x_label: String,
+    tau_label: String,
+    x: Ends,
+    tau: Ends,
+    ratio: Ends,
+    /// All that may lie among the slips.
+    multiples: Vec<Multiple>,
+}
+
+/// The slips on a ramp, by the period at the onset, or by the amplitude if it is the amplitude alone that is ramped;
+/// `None` if none has an interval.
+fn ramp(points: &[Point]) -> Option<Ramp> {
     let stage = |point: &Point| {
         let mut stages = STAGES.iter();
         stages.position(|(stage, ..)| point.ramp_stage == Some(*stage))
@@ -65,53 +87,172 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let is_period = periods.is_some_and(|(low, high)| high > low);
     let amplitude = |point: &Point| Some(point.amplitude).filter(|_| !is_period);
     let modulation = |point: &Point| amplitude(point).or(point.period);
-    let column = if is_period { "T" } else { "Delta" };
+    let (column, symbol) = if is_period {
+        ("T", "T")
+    } else {
+        ("Delta", "Δ")
+    };
     let (x_label, x_factor) = axis_of(column, ramped().filter_map(modulation));
     let longest = bounds(ramped().filter_map(|point| point.interval))?.1;
     let (factor, unit) = label("tau_mean").scale(longest);
     let slip = |point: &Point| {
         Some(RampedSlip {
             stage: stage(point)?,
+            onset: point.onset,
             x: x_factor * modulation(point)?,
             tau: factor * point.interval?,
             ratio: point.interval? / point.period?,
         })
     };
     let slips: Vec<RampedSlip> = ramped().filter_map(slip).collect();
-    let ends = bounds(slips.iter().map(|slip| slip.x))?;
-    let taus = widened(bounds(slips.iter().map(|slip| slip.tau))?);
+    let x = widened(bounds(slips.iter().map(|slip| slip.x))?);
+    let tau = widened(bounds(slips.iter().map(|slip| slip.tau))?);
     let ratios = ratios(slips.iter());
-    let [least, most] = [quantile(&ratios, RARE)?, quantile(&ratios, 1.0 - RARE)?];
+    let ratio = (quantile(&ratios, RARE)?, quantile(&ratios, 1.0 - RARE)?);
     let largest = *ratios.last()?;
-    let whole = (1..=u32::MAX).map(f64::from);
-    let multiples = || whole.clone().take_while(|&n| n < largest + 0.5);
-
-    let (low, high) = widened(ends);
-    let x = Axis::linear(&x_label, low, high);
-    let medians = STAGES.map(|(_, name, dot)| entry(Mark::Bar(dot), name));
-    let lines = entry(Mark::Line(GRID), "τ = nT");
-    let entries: Vec<LegendEntry> = medians.into_iter().chain([lines]).collect();
     // τ = nT is a curve in T, and level in Δ.
     let period = ramped().find_map(|point| point.period)?;
     let period_at = |at: f64| if is_period { at / x_factor } else { period };
-    let line = |n: f64| [low, high].map(|at| (at, n * factor * period_at(at)));
+    let multiple = |n: f64| Multiple {
+        n,
+        ends: [x.0, x.1].map(|at| (at, n * factor * period_at(at))),
+    };
+    let whole = (1..=u32::MAX).map(f64::from);
+    let multiples = whole.take_while(|n| *n < largest + 0.5).map(multiple);
+    Some(Ramp {
+        multiples: multiples.collect(),
+        slips,
+        symbol,
+        x_label,
+        tau_label: format!("Slip interval τ ({unit})"),
+        x,
+        tau,
+        ratio,
+    })
+}
+
+impl Ramp {
+    /// Whether the modulation rises along a stage.
+    fn rises(&self, stage: usize) -> bool {
+        let of_stage = || self.slips.iter().filter(|slip| slip.stage == stage);
+        let order = |left: &&RampedSlip, right: &&RampedSlip| left.onset.total_cmp(&right.onset);
+        let first = of_stage().min_by(order);
+        let last = of_stage().max_by(order);
+        first
+            .zip(last)
+            .is_some_and(|(first, last)| last.x > first.x)
+    }
+
+    /// Where lines leave the frame, at its right or through its top, with their numbers.
+    fn ends_of_lines(&self) -> Vec<(f64, (f64, f64))> {
+        let (low, high) = self.tau;
+        let end = |multiple: &Multiple| {
+            let [(left, first), (right, last)] = multiple.ends;
+            let share = ((high - first) / (last - first)).min(1.0);
+            (first < high && last > low)
+                .then(|| (multiple.n, (left + share * (right - left), last.min(high))))
+        };
+        self.multiples.iter().filter_map(end).collect()
+    }
+
+    /// Quartiles of τ/T in bins of the modulation, of both stages.
+    fn quartiles(&self) -> Vec<Quartiles> {
+        let Some((low, high)) = bounds(self.slips.iter().map(|slip| slip.x)) else {
+            return Vec::new();
+        };
+        let width = (high - low) / f64::from(BINS);
+        let bins = |stage: usize| (0..BINS).map(move |bin| (stage, bin));
+        let of_bin = |(stage, bin): (usize, u32)| {
+            let start = low + f64::from(bin) * width;
+            let is_last = bin + 1 == BINS;
+            let end = if is_last {
+                f64::INFINITY
+            } else {
+                start + width
+            };
+            let is_in_bin =
+                |slip: &&RampedSlip| slip.stage == stage && (start..end).contains(&slip.x);
+            let ratios = ratios(self.slips.iter().filter(is_in_bin));
+            let quartile = |share: f64| quantile(&ratios, share);
+            Some(Quartiles {
+                stage,
+                x: start + (0.5 + OFFSETS[stage]) * width,
+                first: quartile(0.25)?,
+                median: quartile(0.5)?,
+                third: quartile(0.75)?,
+            })
+            .filter(|_| ratios.len() >= MIN_INTERVALS)
+        };
+        let all = (0..STAGES.len()).flat_map(bins);
+        all.filter_map(of_bin).collect()
+    }
+}
+
+/// Of the ratios in a bin.
+struct Quartiles {
+    /// Its place in [`STAGES`].
+    stage: usize,
+    x: f64,
+    first: f64,
+    median: f64,
+    third: f64,
+}
+
+/// Draws the intervals of slips on a ramp, and their ratios to the period; `None` if there are none.
+pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
+    let ramp = ramp(points)?;
+    let medians = [0, 1].map(|stage| {
+        let direction = if ramp.rises(stage) {
+            "rising"
+        } else {
+            "falling"
+        };
+        let dot = STAGES[stage].1;
+        entry(Mark::Bar(dot), format!("{} {direction}", ramp.symbol))
+    });
+    let lines = entry(Mark::Line(GRID), "τ = nT");
+    let entries: Vec<LegendEntry> = medians.into_iter().chain([lines]).collect();
+    let x = Axis::linear(&ramp.x_label, ramp.x.0, ramp.x.1);
+    let tau = Axis::linear(&ramp.tau_label, ramp.tau.0, ramp.tau.1);
+    let lines = ramp.multiples.iter();
+    let lines = lines.map(|multiple| Layer::Curve(multiple.ends.into(), GRID));
     // Slip by slip, so that neither stage covers the other.
-    let dots = slips.iter().map(|slip| {
+    let dots = ramp.slips.iter().map(|slip| {
         let dot = Dot {
             radius: SLIP_RADIUS,
-            ..STAGES[slip.stage].2.with_opacity(0.45)
+            ..STAGES[slip.stage].1.with_opacity(0.45)
         };
         Layer::Dots(vec![(slip.x, slip.tau)], dot)
     });
-    // Where lines leave the frame: at its right, or through its top.
-    let end = |n: f64| {
-        let [(_, first), (right, last)] = line(n);
-        let share = ((taus.1 - first) / (last - first)).min(1.0);
-        (first < taus.1 && last > taus.0)
-            .then(|| (n, (low + share * (right - low), last.min(taus.1))))
-    };
-    let ends_of_lines: Vec<_> = multiples().filter_map(end).collect();
-    let numbers = Layer::Drawn(Box::new(move |sheet, frame| {
+    let inside = Layer::Inside(lines.chain(dots).collect());
+    let upper = vec![inside, numbers(ramp.ends_of_lines())];
+    let upper = Panel::new(320.0, x.clone(), tau, upper);
+    let (least, most) = ramp.ratio;
+    let ratio = Axis::linear("Median and quartiles of τ / T", least - 0.3, most + 0.3);
+    let levels = ramp.multiples.iter();
+    let levels = levels.map(|multiple| Layer::Level(multiple.n, GRID));
+    let bars = ramp.quartiles().into_iter().flat_map(|of_bin| {
+        let dot = STAGES[of_bin.stage].1;
+        let bar = vec![(of_bin.x, (of_bin.first, of_bin.third))];
+        let median = vec![(of_bin.x, of_bin.median)];
+        [
+            Layer::Bars(bar, Stroke::solid(dot.ink, 2.0)),
+            Layer::Dots(median, dot),
+        ]
+    });
+    let lower = Panel::inside(210.0, x, ratio, levels.chain(bars));
+    Some(panel::draw(
+        NAME,
+        look,
+        LAYOUT,
+        &entries,
+        vec![upper, lower],
+    ))
+}
+
+/// The numbers of lines, where these leave the frame.
+fn numbers<'a>(ends_of_lines: Vec<(f64, (f64, f64))>) -> Layer<'a> {
+    Layer::Drawn(Box::new(move |sheet, frame| {
         for (n, end) in ends_of_lines {
             let (x, y) = frame.place(end);
             let left = x + 6.0;
@@ -134,46 +275,7 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
             );
             sheet.centred_text((left, middle), &text, LEGEND_TEXT, Anchor::Start);
         }
-    }));
-    let lines = multiples().map(|n| Layer::Curve(line(n).into(), GRID));
-    let lines = Layer::Inside(lines.chain(dots).collect());
-    let tau = Axis::linear(&format!("Slip interval τ ({unit})"), taus.0, taus.1);
-    let upper = Panel::new(320.0, x.clone(), tau, vec![lines, numbers]);
-    let ratio = Axis::linear("Median and quartiles of τ / T", least - 0.3, most + 0.3);
-    let levels = multiples().map(|n| Layer::Level(n, GRID));
-    let lower = Panel::inside(210.0, x, ratio, levels.chain(medians_of(&slips, ends)));
-    let panels = vec![upper, lower];
-    Some(panel::draw(NAME, look, LAYOUT, &entries, panels))
-}
-
-/// Medians and quartiles of τ/T in bins of the modulation, of both stages.
-fn medians_of<'a>(slips: &[RampedSlip], (low, high): Ends) -> Vec<Layer<'a>> {
-    let width = (high - low) / f64::from(BINS);
-    let mut layers = Vec::new();
-    for (stage, (_, _, dot)) in STAGES.into_iter().enumerate() {
-        for bin in 0..BINS {
-            let start = low + f64::from(bin) * width;
-            let is_last = bin + 1 == BINS;
-            let end = if is_last {
-                f64::INFINITY
-            } else {
-                start + width
-            };
-            let is_in_bin =
-                |slip: &&RampedSlip| slip.stage == stage && (start..end).contains(&slip.x);
-            let of_bin = ratios(slips.iter().filter(is_in_bin));
-            let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&of_bin, share));
-            if let [Some(first), Some(median), Some(third)] = quartiles
-                && of_bin.len() >= MIN_INTERVALS
-            {
-                let x = start + (0.5 + OFFSETS[stage]) * width;
-                let stroke = Stroke::solid(dot.ink, 2.0);
-                layers.push(Layer::Bars(vec![(x, (first, third))], stroke));
-                layers.push(Layer::Dots(vec![(x, median)], dot));
-            }
-        }
-    }
-    layers
+    }))
 }
 
 /// τ/T of some slips, ascending.
@@ -204,11 +306,16 @@ mod tests {
         let on = |stage, n| {
             (0..200).map(move |step| point(Some(stage), 0.03 + 5e-5 * f64::from(step), n))
         };
-        let points: Vec<Point> = on(RampStage::Up, 4.0)
-            .chain(on(RampStage::Down, 3.0))
-            .collect();
+        let order = [
+            on(RampStage::Up, 4.0).collect::<Vec<_>>(),
+            on(RampStage::Down, 3.0).rev().collect(),
+        ];
+        let mut points = order.concat();
+        for (point, onset) in points.iter_mut().zip(0..) {
+            point.onset = f64::from(onset);
+        }
         let svg = drag(&points, &Look::default()).unwrap().svg();
-        for text in ["n = 3", "n = 4", "there", "back", "τ / T"] {
+        for text in ["n = 3", "n = 4", "T rising", "T falling", "τ / T"] {
             assert!(svg.contains(text), "{text}");
         }
         let after: Vec<Point> = on(RampStage::After, 4.0)

@@ -123,7 +123,7 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<HistogramPanel<'
         *identical.parameters
             == Parameters {
                 threshold_deviation: 0.0,
-                ..other.parameters.parameters.clone()
+                ..other.parameters.all.clone()
             }
     };
     let is_shown =

@@ -375,9 +375,9 @@ mod tests {
             locking(&sets, &Look::default()).is_some(),
             "a set without modulation lies on no grid"
         );
-        sets[3].parameters.parameters = Parameters {
+        sets[3].parameters.all = Parameters {
             drive_velocity: 1e-5,
-            ..sets[3].parameters.parameters.clone()
+            ..sets[3].parameters.all.clone()
         };
         assert!(locking(&sets, &Look::default()).is_none(), "two velocities");
     }
@@ -457,7 +457,7 @@ mod tests {
         let parameters = Parameters {
             drive_velocity: velocity,
             reattachment_time: delay,
-            ..plain.parameters.parameters.clone()
+            ..plain.parameters.all.clone()
         };
         let regime = Some(Regime::at(share));
         let is_sliding = regime == Some(Regime::Sliding);

@@ -40,9 +40,9 @@ mod tests {
 
     #[test]
     fn small_print_has_what_all_have_in_common_and_symbols_have_their_subscripts() {
-        let mut other = set(1e-6, 0.02, 4.0).parameters.parameters;
+        let mut other = set(1e-6, 0.02, 4.0).parameters.all;
         other.blocks = 9;
-        let all = [set(1e-6, 0.02, 4.0).parameters.parameters, other];
+        let all = [set(1e-6, 0.02, 4.0).parameters.all, other];
         let found = common(all.iter(), &[]).replace('\u{a0}', " ");
         assert!(
             found.starts_with("Nₛ = 20, M = 11.5 kg, K = 10⁸ N/m, K_d = 4·10⁷ N/m"),

@@ -90,7 +90,7 @@ mod tests {
     /// Sets with this spread of thresholds in N, under a modulation of this amplitude in m.
     fn spread(deviation: f64, amplitude: f64) -> SetRow {
         let mut set = set(amplitude, 0.02, 4.0);
-        set.parameters.parameters.threshold_deviation = deviation;
+        set.parameters.all.threshold_deviation = deviation;
         set
     }
 
@@ -117,7 +117,7 @@ mod tests {
         );
         let mut larger = sets.clone();
         for set in &mut larger {
-            set.parameters.parameters.blocks = 9;
+            set.parameters.all.blocks = 9;
         }
         sets.extend(larger);
         let svg = overview_of(&sets);

@@ -136,10 +136,10 @@ fn retain<R: Row>(rows: &mut Vec<R>, of: &str, text: &str) -> Result<(), BadOpti
 }
 
 /// A figure, or `None` if its data are not there.
-type Draw = fn(&Data<'_>) -> Option<Picture>;
+type DrawFigure = fn(&Data<'_>) -> Option<Picture>;
 
 /// The figures that [`draw_all`] draws if their data are there, in the order of the report.
-const STANDING: &[(&str, Draw)] = &[
+const STANDING: &[(&str, DrawFigure)] = &[
     (overview::NAME, overview_of_sets),
     (map::LOCKING, |data| map::locking(data.still(), &data.own())),
     (map::REGIMES, |data| map::regimes(data.still(), &data.own())),

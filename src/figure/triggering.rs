@@ -79,7 +79,7 @@ fn parts_of(rows: &[PulseRow], [x, y]: [&str; 2], panels: Option<&str>) -> Optio
     y.holds_bars = true;
     if panels.is_some() {
         x.limits = (Some(0.0), Some(1.0));
-        x.label = Some("Place in the cycle p");
+        x.label = Some("Elapsed fraction of the interval p");
     } else {
         y.limits = (Some(0.0), None);
     }
@@ -128,14 +128,14 @@ mod tests {
                 "by the drive alone",
                 "no advance",
                 "Δ = 1 µm",
-                "Place in the cycle p",
+                "Elapsed fraction of the interval p",
             ] {
                 assert!(svg.contains(&format!(">{text}<")), "{amplitudes} {text}");
             }
             assert_eq!(svg.matches(">Δ = ").count(), amplitudes as usize);
         }
         let mut longer = [row(0, 1e-6), row(0, 2e-6)];
-        longer[1].parameters.parameters.pulse_cycles = Some(2);
+        longer[1].parameters.all.pulse_cycles = Some(2);
         assert!(triggering(&longer, &Look::default()).is_none());
         assert!(triggering(&[], &Look::default()).is_none());
     }

@@ -102,12 +102,28 @@ pub struct SetOfEdges {
     pub(crate) excesses: Vec<Option<Estimate>>,
 }
 
+/// Of a threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Below,
+    Above,
+}
+
+impl Side {
+    const fn sign(self) -> f64 {
+        match self {
+            Self::Below => -1.0,
+            Self::Above => 1.0,
+        }
+    }
+}
+
 /// A set on the refined axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
     pub row: u64,
-    /// Below the threshold, above it, or 0 if that is not clear.
-    side: f64,
+    /// Where it lies, if that is clear.
+    side: Option<Side>,
     excess: &'a Estimate,
     pub set: &'a SetOfEdges,
 }
@@ -116,12 +132,16 @@ impl<'a> Placed<'a> {
     fn new(row: u64, excess: &'a Estimate, set: &'a SetOfEdges) -> Self {
         let mut placed = Self {
             row,
-            side: 0.0,
+            side: None,
             excess,
             set,
         };
         if placed.error() < 1.0 {
-            placed.side = excess.value.signum();
+            placed.side = Some(if excess.value < 0.0 {
+                Side::Below
+            } else {
+                Side::Above
+            });
         }
         placed
     }
@@ -206,13 +226,14 @@ impl<'a> Edge<'a> {
         window: impl Fn(f64) -> u64,
     ) -> Option<Self> {
         let bracket = [all[first], all[last]];
-        let excess = |set: &Placed<'_>| bracket[1].side * set.excess.value;
+        let sign = bracket[1].side?.sign();
+        let excess = |set: &Placed<'_>| sign * set.excess.value;
         let rise = |pair: &&[Placed<'_>]| excess(&pair[1]) - excess(&pair[0]);
         let crosses = |pair: &&[Placed<'_>]| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0;
         let crossings = all[first..=last].windows(2).filter(crosses);
         let pair = crossings.max_by(|left, right| rise(left).total_cmp(&rise(right)))?;
         let ends = [pair[0].row, pair[1].row].map(|row| row as f64);
-        if pair.iter().all(|set| set.side != 0.0) {
+        if pair.iter().all(|set| set.side.is_some()) {
             let gap = pair[1].row - pair[0].row;
             let wanted_row = (gap > 1).then(|| pair[0].row + gap / 2);
             let place = ends[0] - gap as f64 * excess(&pair[0]) / rise(&pair);
@@ -235,7 +256,7 @@ impl<'a> Edge<'a> {
         for _ in 0..MOVES {
             let sets = all.iter().filter(|set| near(set, place));
             let line = fit(&sets.copied().collect::<Vec<_>>(), place);
-            let Some(line) = line.filter(|line| line.slope * bracket[1].side > 0.0) else {
+            let Some(line) = line.filter(|line| line.slope * sign > 0.0) else {
                 break;
             };
             place = line.crossing.clamp(ends[0], ends[1]);
@@ -379,7 +400,7 @@ pub fn lines<'a>(
                 Some(Placed::new(row, excess, set))
             };
             let known: Vec<Placed<'_>> = sets.iter().filter_map(placed).collect();
-            let is_clear = |index: &usize| known[*index].side != 0.0;
+            let is_clear = |index: &usize| known[*index].side.is_some();
             let clear = (0..known.len()).filter(is_clear).map(Some);
             let bounds: Vec<Option<usize>> = once(None).chain(clear).chain([None]).collect();
             let mut line = Line {
@@ -455,7 +476,7 @@ pub(super) fn edge_rows(
                     low: scale.value(edge.interval[0]),
                     high: scale.value(edge.interval[1]),
                 }),
-                rises: Some(high.side > 0.0),
+                rises: Some(high.side == Some(Side::Above)),
                 jobs: edge.sets.iter().map(|set| set.set.seeds).sum(),
                 ended: edge.ended(sweep.seed_count(), is_over),
                 ..row_between(sweep, refinement, key, (low.row, low.set), high.row)

@@ -149,7 +149,12 @@ pub(super) fn sets_of(
 ) -> Result<Vec<SetJobs>, ResultsError> {
     let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
     for row in jobs.clone().rows::<(JobFacts, Selected<All>)>() {
-        let (job, Selected { parameters, .. }) = row?;
+        let (
+            job,
+            Selected {
+                all: parameters, ..
+            },
+        ) = row?;
         if !is_wanted(&parameters) {
             continue;
         }

@@ -37,7 +37,12 @@ impl Pool {
         let slips = results.committed_files(RecordedTable::Slips, &jobs)?;
         let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
         for row in jobs.rows::<(JobFacts, Selected<All>)>() {
-            let (facts, Selected { parameters, .. }) = row?;
+            let (
+                facts,
+                Selected {
+                    all: parameters, ..
+                },
+            ) = row?;
             if plan.is_control(&parameters) {
                 continue;
             }

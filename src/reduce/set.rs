@@ -29,7 +29,7 @@ pub(super) struct SlipStats {
     pub(super) phase: f64,
     /// In N.
     peak_force: f64,
-    /// Stress drop, in N.
+    /// Force drop, in N.
     drop: f64,
 }
 

@@ -94,7 +94,7 @@ impl PulseRow {
     pub fn pulse(&self) -> Parameters {
         Parameters {
             pulse_start: None,
-            ..self.parameters.parameters.clone()
+            ..self.parameters.all.clone()
         }
     }
 }
@@ -429,11 +429,11 @@ mod tests {
             row(1.13, 1e-7, &[1.2]),
             row(1.13, 1e-7, &[1.2]),
         ];
-        rows[1].parameters.parameters.seed = 3;
+        rows[1].parameters.all.seed = 3;
         for row in &mut rows[3..5] {
-            row.parameters.parameters.damping_rate = 30.0;
+            row.parameters.all.damping_rate = 30.0;
         }
-        rows[5].parameters.parameters.drive_velocity = 1e-5;
+        rows[5].parameters.all.drive_velocity = 1e-5;
         note_noise(&mut rows);
         for (row, noise) in rows.iter().zip([2e-9, 2e-9, 2e-9, 0.02, 0.02]) {
             assert!((row.noise.unwrap() - noise).abs() < 1e-15);
@@ -471,8 +471,8 @@ mod tests {
         let of_seed = |seed: u64, amplitude: f64, advance: f64| {
             let mut row = row(1.15, amplitude, &[1.21 - advance]);
             row.tau_control = Some(0.1);
-            row.parameters.parameters.seed = seed;
-            row.parameters.parameters.pulse_start = Some(1.15 + 1e-3 * advance);
+            row.parameters.all.seed = seed;
+            row.parameters.all.pulse_start = Some(1.15 + 1e-3 * advance);
             row
         };
         let mut rows = vec![of_seed(0, 1e-15, 0.0), of_seed(0, 2e-7, 0.02)];

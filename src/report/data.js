@@ -81,8 +81,8 @@ function save(name, blob) {
 }
 const isNumeric = (column) => column.kind === "real" || column.kind === "count";
 /** Whether a menu offers it: it has values, and is no end of an interval, which is shown with its value. */
-const isOffered = ({ name, is_end, values }) =>
-  name !== "set_id" && !is_end && values.some((value) => value !== null && !Number.isNaN(value));
+const isOffered = ({ name, end_of, values }) =>
+  name !== "set_id" && end_of === null && values.some((value) => value !== null && !Number.isNaN(value));
 /** The columns of a table by name, each with its values. */
 const byName = ({ columns, values }) =>
   new Map(columns.map((column, k) => [column.name, { ...column, values: values[k] }]));
@@ -145,9 +145,12 @@ class Report {
   /** A value of a set with its 95 % interval, or its bound, in the unit of its label, without that unit. */
   estimate(name, set) {
     const column = this.columns.get(name);
-    const end = (of) => column.factor * (this.columns.get(name + of)?.values[set] ?? NaN);
-    if (end("_bound") > 0) return `> ${number(end("_bound"), 3)}`;
-    return Number.isNaN(end("_low")) ? shownValue(column, set, 3) : withInterval(end(""), end("_low"), end("_high"));
+    const columns = [...this.columns.values()];
+    const value = (of) => column.factor * (of?.values[set] ?? NaN);
+    const bound = value(columns.find(({ bound_of }) => bound_of === name));
+    if (bound > 0) return `> ${number(bound, 3)}`;
+    const [low, high] = columns.filter(({ end_of }) => end_of === name).map(value);
+    return Number.isNaN(low ?? NaN) ? shownValue(column, set, 3) : withInterval(value(column), low, high);
   }
 
   /** The command that runs one job of a set alone; measured slips have none. */

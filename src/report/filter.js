@@ -97,7 +97,7 @@ function condition(report, text) {
 function unknown({ columns, synonyms }, name) {
   const names = [...columns.keys()];
   const synonym = synonyms.find(([word]) => word === name.replaceAll("_", " "))?.[1];
-  const longer = names.filter((known) => (known.startsWith(name) || known.endsWith(`_${name}`)) && !columns.get(known).is_end).slice(0, 8);
+  const longer = names.filter((known) => (known.startsWith(name) || known.endsWith(`_${name}`)) && columns.get(known).end_of === null).slice(0, 8);
   const near = (most) => names.find((known) => isNear(name.toLowerCase(), known.toLowerCase(), most));
   const nearest = [0, 1, 2].slice(0, 1 + name.length / 2).map(near).find(Boolean);
   const meant = synonym ?? (longer.join(", ") || nearest);

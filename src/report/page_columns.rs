@@ -9,7 +9,7 @@ use crate::sets::Label;
 use crate::sets::SetRow;
 use crate::sweep::Sweep;
 use crate::table::Table;
-use crate::table::columns::{Column, Row, Value};
+use crate::table::columns::{Column, Row, Value, whose_end};
 use crate::table::file::Dataset;
 use crate::table::value::floored;
 use serde::Serialize;
@@ -35,14 +35,19 @@ impl Columns {
     fn of<R: Row>(is_shown: impl Fn(&Column) -> bool) -> Self {
         let columns = R::columns();
         let label = |place| is_shown(&columns[place]).then(|| Label::of(&columns, place));
-        let described = |column: &Column| {
-            let Column { name, unit, .. } = column;
-            let meaning = column.meaning;
-            let kind = column.kind.word();
-            let [is_end, by_drive] = [json!(column.is_end()), json!(column.class.explained())];
-            json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind, "is_end": is_end, "by_drive": by_drive })
+        let described = |(place, column): (usize, &Column)| {
+            json!({
+                "name": column.name,
+                "unit": column.unit,
+                "meaning": column.meaning,
+                "kind": column.kind.word(),
+                "end_of": whose_end(&columns, place).map(|of| &of.name),
+                "bound_of": column.class.bounded(),
+                "by_drive": column.class.explained(),
+            })
         };
-        let shown = columns.iter().filter(|column| is_shown(column));
+        let shown = columns.iter().enumerate();
+        let shown = shown.filter(|(_, column)| is_shown(column));
         let described: Vec<Json> = shown.map(described).collect();
         Self {
             values: vec![Vec::new(); described.len()],

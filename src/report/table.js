@@ -50,8 +50,8 @@ class SetTable {
 
   /** Saves the sets that are shown as CSV, in SI, with the ends of intervals. */
   save() {
-    const isSaved = (name) => name === "set_id" || this.chosen.has(name.replace(/_(low|high)$/, ""));
-    const columns = [...this.report.columns.values()].filter(({ name }) => isSaved(name));
+    const isSaved = ({ name, end_of }) => name === "set_id" || this.chosen.has(end_of ?? name);
+    const columns = [...this.report.columns.values()].filter(isSaved);
     const lines = this.order().map((set) => columns.map(({ values }) => values[set] ?? "").join());
     save("sets.csv", new Blob([[columns.map(({ name }) => name).join(), ...lines, ""].join("\n")], { type: "text/csv" }));
   }

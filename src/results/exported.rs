@@ -252,7 +252,7 @@ impl<'a> JoinedTable<'a> {
             if self.has_controls {
                 let jobs: Vec<Selected<All>> = batch.rows_of()?;
                 let plan = self.results.plan();
-                controls.extend(jobs.iter().map(|job| plan.is_control(&job.parameters)));
+                controls.extend(jobs.iter().map(|job| plan.is_control(&job.all)));
             }
             batches.push(batch.rows);
         }

@@ -5,9 +5,10 @@
 
 use crate::model::{Parameters, Selected, Selection, Symbol};
 use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
+use crate::sets::SetRow;
 use crate::sweep::Sweep;
 use crate::table::arrow::{Gaps, RowBuffer};
-use crate::table::columns::{Class, Row as _, columns};
+use crate::table::columns::{Class, Row as _, columns, whose_end};
 use crate::table::tables;
 use crate::table::value::words;
 use arrow_schema::SchemaRef;
@@ -137,15 +138,8 @@ impl RecordedTable {
     }
 }
 
-/// What sets say of drops in N.
-const DROPS_IN_NEWTONS: [&str; 6] = [
-    "drop_mean",
-    "drop_mean_low",
-    "drop_mean_high",
-    "drop_sd",
-    "drop_sd_low",
-    "drop_sd_high",
-];
+/// What sets say of drops in N; their intervals have it, too.
+const DROPS_IN_NEWTONS: [&str; 2] = ["drop_mean", "drop_sd"];
 
 /// In what the tables of a sweep have not all that their row types describe.
 pub fn gaps(sweep: &Sweep) -> Gaps {
@@ -160,7 +154,13 @@ pub fn gaps(sweep: &Sweep) -> Gaps {
             unknown.extend(["eta", "Delta_onset"].map(Cow::from));
         }
         if !measured.pure.is_empty() {
-            unknown.extend(DROPS_IN_NEWTONS.map(Cow::from));
+            let columns = SetRow::columns();
+            let of_drops = |place: &usize| {
+                let column = whose_end(&columns, *place).unwrap_or(&columns[*place]);
+                DROPS_IN_NEWTONS.contains(&&*column.name)
+            };
+            let places = (0..columns.len()).filter(of_drops);
+            unknown.extend(places.map(|place| columns[place].name.clone()));
         }
     }
     Gaps {
@@ -184,11 +184,7 @@ pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> JobLabel<S> {
 /// The same label with other parameters; its ids, which are hashes, are not computed again.
 pub fn relabel<S, T>(label: &JobLabel<S>) -> JobLabel<T> {
     let (names, selected, loading) = label;
-    (
-        names.clone(),
-        Selected::new(selected.parameters.clone()),
-        *loading,
-    )
+    (names.clone(), Selected::new(selected.all.clone()), *loading)
 }
 
 pub type SlipRow<'a> = (Cow<'a, JobLabel<DriveAndSeed>>, Cow<'a, Slip>);

@@ -88,7 +88,7 @@ columns! {
         tau_mean: Option<f64> = "s", "mean interval", "⟨τ⟩", Class::Mean;
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_bound as "tau_mean_bound": Option<f64> = "s",
-            "lower bound of tau_mean, if it is null as a job gave up", "⟨τ⟩, at least" "Least mean interval", Class::Auxiliary;
+            "lower bound of tau_mean, if it is null as a job gave up", "⟨τ⟩, at least" "Least mean interval", Class::Bound("tau_mean");
         tau_control: Option<f64> = "s", "mean interval of the control; null without a control", "⟨τ⟩, control" "Mean interval of the control", Class::Auxiliary;
         tau_off as "tau_mean_off": Option<f64> = "",
             "relative bias of tau_mean where `max_time` cut intervals; null if it cut none", "tau mean off" "Relative bias of the mean interval", Class::Auxiliary;
@@ -105,7 +105,7 @@ columns! {
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
         locking_index_drive: Option<f64> = "",
             "the same by the drive alone: slips at the loads of the control; null without a control", "locking, drive" "Locking index by the drive alone", Class::ByDrive("locking_index");
-        locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: what the slider adds", "locking, excess" "Excess of the locking index", Class::Excess;
+        locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: the part due to the slider", "locking, excess" "Excess of the locking index", Class::Excess;
         locking_excess_interval as "locking_index_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         phase_mean: Option<f64> = "rad", "circular mean of the phase; if T is tau_mean or more, over whole cycles from the first onset of each job, and null below two of them a job", "⟨φ⟩" "Mean phase", Class::Mean;
         phase_interval as "phase_mean": Option<Interval> = "rad",
@@ -116,14 +116,14 @@ columns! {
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
         resultant_drive: Option<f64> = "",
             "the same by the drive alone: slips at the loads of the control; null without a control", "R, drive" "Resultant length by the drive alone", Class::ByDrive("resultant_length");
-        resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds", "R, excess" "Excess of the resultant length", Class::Excess;
+        resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: the part due to the slider", "R, excess" "Excess of the resultant length", Class::Excess;
         resultant_excess_interval as "resultant_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         schuster as "schuster_log10_p": Option<f64> = "", "log10 of Schuster's p, that phases have no direction, correlated slips counting less; it rejects this where the drive alone makes R, too: quote resultant_excess", "log p" "log₁₀ of Schuster's p", Class::Auxiliary;
-        drop_mean: Option<f64> = "N", "mean stress drop", "⟨ΔF⟩", Class::Mean;
+        drop_mean: Option<f64> = "N", "mean force drop", "⟨ΔF⟩", Class::Mean;
         drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
-        drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop", "σ(ΔF)" "S.d. of the stress drop", Class::Spread;
+        drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the force drop", "σ(ΔF)" "S.d. of the force drop", Class::Spread;
         drop_deviation_interval as "drop_sd": Option<Interval> = "N", "lower end of its 95 % confidence interval";
-        drop_variation as "drop_cv": Option<f64> = "", "drop_sd over drop_mean: the shape of drops in any unit", "cv(ΔF)" "Coefficient of variation of the stress drop", Class::Spread;
+        drop_variation as "drop_cv": Option<f64> = "", "drop_sd over drop_mean: the shape of drops in any unit", "cv(ΔF)" "Coefficient of variation of the force drop", Class::Spread;
         peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips", "⟨F⟩ at onsets" "Mean peak force", Class::Mean;
         peak_force_interval as "peak_force_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         mean_friction: Option<f64> = "N", "shear force, over the time of all jobs", "⟨F_S⟩" "Mean friction", Class::Mean;
@@ -176,7 +176,9 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
             }
             Class::Mean | Class::Spread | Class::Share => (!column.is_angle(), false),
             Class::ByDrive(_) | Class::Excess => (true, true),
-            Class::Quantile | Class::Auxiliary | Class::Category => (false, false),
+            Class::Quantile | Class::Auxiliary | Class::Bound(_) | Class::Category => {
+                (false, false)
+            }
         };
         let Cow::Borrowed(key) = column.name else {
             return None;

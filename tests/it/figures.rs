@@ -106,7 +106,7 @@ fn each_slip_is_a_dot_with_the_unit_of_its_column_or_formula() {
     assert!(plain.matches("<circle").count() >= slips);
     for text in [
         "Interval τ (ms)",
-        "Stress drop ΔF (N)",
+        "Force drop ΔF (N)",
         &format!("{slips} slips"),
     ] {
         assert!(plain.contains(text), "{text}");

@@ -59,7 +59,7 @@ def test_slips_at_random_loads_have_a_uniform_load_phase(eta):
 
 def test_the_mean_excess_has_the_error_that_sets_have_if_they_err_alike():
     ends = {"resultant_excess": [0.1, 0.2], "resultant_excess_low": [0.0, 0.0], "resultant_excess_high": [0.2, 0.5]}
-    assert kinematics.beyond_text(pandas.DataFrame(ends), "resultant") == "0.15 (0.00–0.35); 0.00 to 0.50"
+    assert kinematics.excess_text(pandas.DataFrame(ends), "resultant") == "0.15 (0.00–0.35); 0.00 to 0.50"
 
 
 class Tables:

@@ -40,8 +40,10 @@ pub enum Class {
     Share,
     /// A quantile, which jumps from value to value.
     Quantile,
-    /// What goes with a statistic: a lower bound, a bias, the mean of the control, the p of a test.
+    /// What goes with a statistic: a bias, the mean of the control, the p of a test.
     Auxiliary,
+    /// A lower bound on the column of this name, where it has no value.
+    Bound(&'static str),
     /// A word, flag or count that distinguishes rows.
     Category,
     /// What the drive alone explains of the column of this name.
@@ -58,6 +60,14 @@ impl Class {
     pub const fn explained(self) -> Option<&'static str> {
         match self {
             Self::ByDrive(of) => Some(of),
+            _ => None,
+        }
+    }
+
+    /// The column on which this is a bound.
+    pub const fn bounded(self) -> Option<&'static str> {
+        match self {
+            Self::Bound(of) => Some(of),
             _ => None,
         }
     }
@@ -92,6 +102,15 @@ impl Column {
 /// Whether the column at a place has an interval, whose ends are the next two.
 pub fn has_interval(columns: &[Column], place: usize) -> bool {
     matches!(columns.get(place + 1), Some(next) if next.class == Class::Low)
+}
+
+/// The column whose interval the one at a place ends; `None` if that is no end.
+pub fn whose_end(columns: &[Column], place: usize) -> Option<&Column> {
+    match columns[place].class {
+        Class::Low => columns.get(place - 1),
+        Class::High => columns.get(place - 2),
+        _ => None,
+    }
 }
 
 /// A row, or a part of one: a single cell, or several that belong together.

@@ -274,14 +274,14 @@ pub trait Selection {
 /// their defaults; what is null and may not be so is not known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selected<S> {
-    pub parameters: Parameters,
+    pub all: Parameters,
     selection: PhantomData<S>,
 }
 
 impl<S> Selected<S> {
-    pub const fn new(parameters: Parameters) -> Self {
+    pub const fn new(all: Parameters) -> Self {
         Self {
-            parameters,
+            all,
             selection: PhantomData,
         }
     }
@@ -291,7 +291,7 @@ impl<S> Deref for Selected<S> {
     type Target = Parameters;
 
     fn deref(&self) -> &Parameters {
-        &self.parameters
+        &self.all
     }
 }
 
@@ -303,7 +303,7 @@ impl<S: Selection> Row for Selected<S> {
 
     fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
         for &symbol in S::SYMBOLS {
-            give(self.parameters.get(symbol));
+            give(self.all.get(symbol));
         }
     }
 

@@ -77,7 +77,7 @@ columns! {
         periods: Option<u64> = "", "interval in periods T_onset, rounded; null without modulation", "n" "Interval in periods";
         phase: Option<f64> = "rad", "phase of the onset against the modulation", "φ" "Phase of the onset";
         peak_force: f64 = "N", "shear force at the onset", "F" "Shear force at the onset";
-        drop: f64 = "N", "peak force minus the least shear force during the slip", "ΔF" "Stress drop";
+        drop: f64 = "N", "peak force minus the least shear force during the slip", "ΔF" "Force drop";
         nucleation: f64 = "s", "time of the first break";
         nucleation_block: u64 = "", "block of the first break, from 1 at the trailing edge";
         duration: f64 = "s", "from the first to the last break", "duration" "Duration of the slip";
