@@ -5,8 +5,7 @@ use crate::reduce::{BackboneBin, HistogramBin, read_reduced, read_sets, swept};
 use crate::results::layout::Layout;
 use crate::results::tables::{JobOfSlip, RecordedTable};
 use crate::results::{Results, ResultsError};
-use crate::sets::Label;
-use crate::sets::SetRow;
+use crate::sets::{Label, SetRow, by_frequency};
 use crate::sweep::Sweep;
 use crate::table::Table;
 use crate::table::columns::{Column, Row, Value, whose_end};
@@ -148,7 +147,7 @@ pub(super) struct Sets {
 }
 
 impl Sets {
-    /// Every k-th of the sets in the reduced data.
+    /// Every k-th of the sets in the reduced data, in the order of `show`.
     pub(super) fn read(
         layout: &Layout<'_>,
         sweep: &Sweep,
@@ -163,15 +162,18 @@ impl Sets {
         for (row, number) in read_sets(layout).zip(0_u64..) {
             let row = row?;
             if number.is_multiple_of(spacing) {
-                let command = || sweep.command_of_set(&row.parameters);
-                let is_computed = sweep.measured().is_none();
-                sets.commands.extend(is_computed.then(command));
-                sets.histograms.push(Vec::new());
-                // With all digits, so that a condition holds for the same sets as on the command line.
-                sets.columns.push(&row, |cell| json!(cell));
-                sets.places.insert(row.set_id.clone(), shown.len());
                 shown.push(row);
             }
+        }
+        by_frequency(&mut shown, |row| &row.parameters);
+        for (place, row) in shown.iter().enumerate() {
+            let command = || sweep.command_of_set(&row.parameters);
+            let is_computed = sweep.measured().is_none();
+            sets.commands.extend(is_computed.then(command));
+            sets.histograms.push(Vec::new());
+            // With all digits, so that a condition holds for the same sets as on the command line.
+            sets.columns.push(row, |cell| json!(cell));
+            sets.places.insert(row.set_id.clone(), place);
         }
         sets.columns.label();
         for swept in &swept(&shown) {
