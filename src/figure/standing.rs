@@ -183,9 +183,9 @@ pub fn draw_all(
     let mut remarks = remarks(&pictures);
     let is_beside = |picture: &Picture| BESIDE.contains(&picture.name());
     if !beside.others.is_empty() && !pictures.iter().any(is_beside) {
-        let figures = BESIDE.join(", ");
+        let figures = BESIDE.join(" and ");
         remarks.push(format!(
-            "no figure shows other directories: there is none of {figures}"
+            "other directories are not shown: only {figures} can show them, and neither is drawn"
         ));
     }
     let files = write(layout, &pictures, formats)?;

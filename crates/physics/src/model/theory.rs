@@ -1,6 +1,5 @@
 //! Closed forms of the paper: η, Φ_max, Eq. 2 and its asymptote, the resultant of slips at random loads, and a typical
-//! interval. Eq. 1 and the friction of a
-//! rigid block are tests: `crates/physics/tests/physics/deterministic_rows.rs`.
+//! interval. Eq. 1 and the friction of a rigid block are tests: `crates/physics/tests/physics/deterministic_rows.rs`.
 
 use super::Parameters;
 use std::f64::consts::{PI, TAU};
