@@ -88,11 +88,8 @@ pub fn reduce_and_draw(layout: &Layout<'_>, name: &str) -> Result<(), Error> {
 
 /// Runs or resumes a sweep file, or the text of one. Returns the results directory, and warnings.
 #[pyfunction]
-#[pyo3(signature = (file, text, out, threads, retry_failed, walltime, reduce, callback))]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "called by keyword-only Python code"
-)]
+#[pyo3(signature = (*, file, text, out, threads, retry_failed, walltime, reduce, callback))]
+#[expect(clippy::too_many_arguments, reason = "called by keywords alone")]
 pub fn run(
     py: Python<'_>,
     file: Option<PathBuf>,

@@ -61,11 +61,11 @@ type Simulated<'py> = (
 
 /// Simulates the only job of a sweep.
 #[pyfunction]
-#[pyo3(signature = (file, text, source, sample, trace, map, profile, contacts))]
+#[pyo3(signature = (*, file, text, source, sample, trace, map, profile, contacts))]
 #[expect(
     clippy::too_many_arguments,
     clippy::fn_params_excessive_bools,
-    reason = "called by keyword-only Python code"
+    reason = "called by keywords alone"
 )]
 pub fn simulate<'py>(
     py: Python<'py>,

@@ -94,8 +94,13 @@ def simulate(
     else:
         file = arguments.path("sweep", sweep)
     recorded = {"trace": trace, "map": map, "profile": profile, "contacts": contacts}
-    flags = (arguments.flag(name, given) for name, given in recorded.items())
-    job, text, warned, tables = _stickslip.simulate(file, text, source, arguments.seconds("sample", sample), *flags)
+    job, text, warned, tables = _stickslip.simulate(
+        file=file,
+        text=text,
+        source=source,
+        sample=arguments.seconds("sample", sample),
+        **{name: arguments.flag(name, given) for name, given in recorded.items()},
+    )
     for warning in warned:
         warnings.warn(warning, stacklevel=2)
     return Simulation(job, text, tables)

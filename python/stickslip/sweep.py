@@ -64,7 +64,16 @@ def run(
     retry_failed, reduce = arguments.flag("retry_failed", retry_failed), arguments.flag("reduce", reduce)
     shown = display(progress)
     try:
-        directory, warned = _stickslip.run(file, text, out, threads, retry_failed, walltime, reduce, shown)
+        directory, warned = _stickslip.run(
+            file=file,
+            text=text,
+            out=out,
+            threads=threads,
+            retry_failed=retry_failed,
+            walltime=walltime,
+            reduce=reduce,
+            callback=shown,
+        )
     finally:
         shown.close()
     for warning in warned:

@@ -184,7 +184,7 @@ fn trace(results: &Results<'_>, arguments: &Arguments, look: &Look) -> Result<Pi
     let refused = |error: anyhow::Error| UsageError(format!("{error:#}"));
     let trace = stretch(measured, from..=until).map_err(refused)?;
     let sets = read_sets(results.layout()).collect::<Result<Vec<_>, _>>()?;
-    let (slips, ..) = sample_of_slips(results, &sets, None)?;
+    let slips = sample_of_slips(results, &sets, None)?.kept;
     let onsets: Vec<f64> = slips.iter().map(|slip| slip.1.1.onset).collect();
     let mut parameters = sweep
         .jobs_of_grid()

@@ -188,22 +188,24 @@ fn draw_slips(
     look: &Look,
 ) -> Result<Picture> {
     let condition = figure.condition::<SlipOfSet>()?;
-    let (slips, every, matching) = sample_of_slips(results, sets, condition.as_ref())?;
+    let sample = sample_of_slips(results, sets, condition.as_ref())?;
+    let slips = &sample.kept;
     if let Some(condition) = condition.filter(|_| slips.is_empty()) {
-        let (all, ..) = sample_of_slips(results, sets, None)?;
+        let all = sample_of_slips(results, sets, None)?.kept;
         return Err(figure.unmatched(&condition, &all).into());
     }
-    let part = if every > 1 {
-        format!("one in {every} of ")
+    let part = if sample.every > 1 {
+        format!("one in {} of ", sample.every)
     } else {
         String::new()
     };
     let shared = common(slips.iter().map(|slip| &*slip.0.1), &[]);
     let condition = figure.shown_condition();
+    let matching = sample.count;
     let noted = look.with_note(&format!("{shared}{condition}; {part}{matching} slips"));
     let unknown = gaps(results.sweep()).unknown;
     let quantity = |option, name: &str| {
-        let quantity = Quantity::of(&slips, option, name)?;
+        let quantity = Quantity::of(slips, option, name)?;
         let mut sources = quantity.column.sources.iter();
         match sources.find(|source| unknown.contains(&source.name)) {
             Some(source) => Err(BadOption::new(option, &source.name, "was not measured").into()),

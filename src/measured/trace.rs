@@ -253,13 +253,13 @@ pub fn find(
             force.unit
         );
     }
-    let (sizes, plateau, chosen) = reader.choose(size, &survey)?;
-    let mut finder = Finder::new(chosen, sizes.noise);
+    let chosen = reader.choose(size, &survey)?;
+    let mut finder = Finder::new(chosen.size, chosen.sizes.noise);
     let read = reader.read(&mut finder, survey.stiffness())?;
-    let found = sizes.found(
+    let found = chosen.sizes.found(
         &survey,
-        chosen,
-        plateau,
+        chosen.size,
+        chosen.plateau,
         read.iter().flat_map(|(runs, _)| runs),
     );
     let all_runs = || read.iter().flat_map(|(runs, _)| runs);
@@ -297,7 +297,7 @@ pub fn find(
     let rows = rows.collect::<Result<_>>()?;
     Ok(Traced {
         rows,
-        sizes,
+        sizes: chosen.sizes,
         columns,
         found,
     })
@@ -361,6 +361,14 @@ fn sizes(size: Option<f64>, noise: f64, range: f64) -> Result<impl Iterator<Item
     Ok((0..=steps).map(move |step| low * (high / low).powf(step as f64 / steps as f64)))
 }
 
+/// A drop size, with the plateau of the number of slips around it, from the lowest to the highest size.
+struct ChosenSize {
+    size: f64,
+    plateau: [f64; 2],
+    /// All that were tried.
+    sizes: DropSizes,
+}
+
 struct TraceReader<'a> {
     tables: &'a [(String, SourceTable)],
     request: &'a Request,
@@ -369,8 +377,8 @@ struct TraceReader<'a> {
 }
 
 impl TraceReader<'_> {
-    /// The number of slips for many drop sizes, the plateau of that which is asked for, or the widest, and the size.
-    fn choose(&self, size: Option<f64>, survey: &Survey) -> Result<(DropSizes, [f64; 2], f64)> {
+    /// Chooses the drop size that is asked for, or the middle of the widest plateau.
+    fn choose(&self, size: Option<f64>, survey: &Survey) -> Result<ChosenSize> {
         let noise = survey.noise();
         let mut counts = Counts::new(sizes(size, noise, survey.high - survey.low)?);
         self.read(&mut counts, survey.stiffness())?;
@@ -384,9 +392,11 @@ impl TraceReader<'_> {
             unit: self.force.unit,
         };
         match (plateau, chosen) {
-            (Some(plateau), Some(chosen)) if chosen >= MIN_SIZE * noise => {
-                Ok((sizes, plateau, chosen))
-            }
+            (Some(plateau), Some(size)) if size >= MIN_SIZE * noise => Ok(ChosenSize {
+                size,
+                plateau,
+                sizes,
+            }),
             (Some(_), _) => Err(sizes
                 .refused("the drop size is less than ten times the noise")
                 .into()),

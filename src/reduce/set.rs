@@ -365,8 +365,7 @@ impl FinishedSet {
                 self.note("tau_sd", deviation, POSITIVE);
             self.row.median_interval = median_interval(&intervals, &ranked);
         } else {
-            let waited = jobs.running.iter().map(|(_, interval)| interval);
-            let total = ranked.sorted.iter().chain(waited).sum::<f64>();
+            let total = ranked.sorted.iter().chain(&jobs.running).sum::<f64>();
             self.row.tau_bound = Some(total / (ranked.sorted.len() + jobs.running.len()) as f64);
         }
         if jobs.cut > 0 {
@@ -500,8 +499,8 @@ pub(super) struct SetJobs {
     pub averages: BTreeMap<u64, JobAverages>,
     /// Jobs that `max_time` ended.
     pub cut: u64,
-    /// Seeds of jobs that gave up after a slip, and the time since it, in s.
-    pub running: Vec<(u64, f64)>,
+    /// Times since the last slip in jobs that gave up after one, in s.
+    pub running: Vec<f64>,
     /// How the slider moved in the jobs; mixed if they differ.
     pub regime: Option<Regime>,
 }
@@ -535,8 +534,7 @@ impl SetJobs {
             Some((seed, averages))
         };
         self.averages.extend(averages());
-        let running = job.running_interval.map(|interval| (seed, interval));
-        self.running.extend(running);
+        self.running.extend(job.running_interval);
         self.regime = match (self.regime, job.regime) {
             (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
             (regime, other) => other.or(regime),

@@ -62,12 +62,12 @@ fn each_slip(
 }
 
 /// Every k-th of some slips: all of few, and at most [`MAX_SLIPS`].
-struct EveryKth<T> {
-    kept: Vec<T>,
+pub struct EveryKth<T> {
+    pub kept: Vec<T>,
     /// k.
-    every: usize,
+    pub every: usize,
     /// Slips that were given.
-    count: usize,
+    pub count: usize,
 }
 
 impl<T> EveryKth<T> {
@@ -92,19 +92,19 @@ impl<T> EveryKth<T> {
     }
 }
 
-/// Every k-th slip of these sets for which a condition holds, with k and the number of all such slips.
+/// Some of the slips of these sets for which a condition holds.
 pub fn sample_of_slips(
     results: &Results<'_>,
     sets: &[SetRow],
     condition: Option<&Condition>,
-) -> Result<(Vec<SlipOfSet>, usize, usize), ResultsError> {
+) -> Result<EveryKth<SlipOfSet>, ResultsError> {
     let mut slips = EveryKth::new();
     each_slip(results, sets, |_, slip| {
         if condition.is_none_or(|condition| condition.holds(&slip)) {
             slips.push(slip);
         }
     })?;
-    Ok((slips.kept, slips.every, slips.count))
+    Ok(slips)
 }
 
 /// Every k-th slip of these sets, as a point of the standing figures.

@@ -34,10 +34,28 @@ const GRID_WITH_LEDGER: f64 = 2.4;
 const LEAP: f64 = 410e-9;
 const LEAP_OF_A_BLOCK: f64 = 4e-9;
 
-/// CPU time in Taylor steps, in s: of a job beside its motion, a break with its reattachment, a step, and a step on one
-/// block. A ledger sets up a quadrature for each job.
-const TAYLOR: [f64; 4] = [0.0, 400e-9, 230e-9, 4.8e-9];
-const TAYLOR_WITH_LEDGER: [f64; 4] = [4e-4, 1.4e-6, 100e-9, 30e-9];
+/// CPU time in Taylor steps, in s.
+struct TaylorCosts {
+    /// Beside the motion. A ledger sets up a quadrature for each job.
+    job: f64,
+    /// With its reattachment.
+    a_break: f64,
+    step: f64,
+    step_of_a_block: f64,
+}
+
+const TAYLOR: TaylorCosts = TaylorCosts {
+    job: 0.0,
+    a_break: 400e-9,
+    step: 230e-9,
+    step_of_a_block: 4.8e-9,
+};
+const TAYLOR_WITH_LEDGER: TaylorCosts = TaylorCosts {
+    job: 4e-4,
+    a_break: 1.4e-6,
+    step: 100e-9,
+    step_of_a_block: 30e-9,
+};
 /// Taylor steps for each break at a tolerance of 1e-3, and the share of resolved motion that they resolve.
 const TAYLOR_STEPS_OF_A_BREAK: f64 = 1.0;
 const TAYLOR_SHARE: f64 = 0.3;
@@ -89,7 +107,7 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
         }
         Method::EventDriven => {
             let finer = fourth_root(fourth_root(1e-3 / setting));
-            let [of_a_job, of_a_break, of_a_step, of_a_block] = if recording.energies {
+            let costs = if recording.energies {
                 TAYLOR_WITH_LEDGER
             } else {
                 TAYLOR
@@ -98,8 +116,8 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
             let steps = TAYLOR_STEPS_OF_A_BREAK * finer * motion.breaks
                 + motion.steps_of_periods
                 + resolved / longest_taylor_step(parameters);
-            let of_steps = steps * (of_a_step + of_a_block * blocks);
-            of_a_job + motion.breaks * of_a_break + of_steps + motion.cost_of_leaps(blocks)
+            let of_steps = steps * (costs.step + costs.step_of_a_block * blocks);
+            costs.job + motion.breaks * costs.a_break + of_steps + motion.cost_of_leaps(blocks)
         }
         Method::FixedStep => motion.time / setting * (STEP_OVERHEAD + STEP_OF_A_BLOCK * blocks),
     };

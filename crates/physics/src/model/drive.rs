@@ -37,6 +37,13 @@ pub struct Drive {
     course: Course,
 }
 
+/// Displacement u(t) of the driven end, in m, and its velocity u'(t), in m/s.
+#[derive(Clone, Copy, Debug)]
+pub struct DriveMotion {
+    pub displacement: f64,
+    pub velocity: f64,
+}
+
 /// How the modulation goes on after a cycle.
 #[derive(Clone, Copy, Debug)]
 enum Course {
@@ -145,8 +152,8 @@ impl Ramp {
         })
     }
 
-    /// Period in s and amplitude in m at a time in s.
-    fn at(&self, time: f64) -> (f64, f64) {
+    /// A quantity at a time in s, from its values at the start and at the turning point.
+    fn at(&self, time: f64, [start, turning]: [f64; 2]) -> f64 {
         let elapsed = time / self.time;
         let fraction = if elapsed <= 1.0 {
             elapsed
@@ -154,8 +161,7 @@ impl Ramp {
             (2.0 - elapsed).max(0.0)
         };
         // With these weights both ends are met exactly, and nothing between them is zero.
-        let between = |[start, turning]: [f64; 2]| (1.0 - fraction) * start + fraction * turning;
-        (between(self.period), between(self.amplitude))
+        (1.0 - fraction) * start + fraction * turning
     }
 }
 
@@ -225,7 +231,8 @@ impl Drive {
 
     fn next_of_ramp(&mut self, ramp: &Ramp) {
         let start = self.cycle_end;
-        (self.period, self.amplitude) = ramp.at(start);
+        self.period = ramp.at(start, ramp.period);
+        self.amplitude = ramp.at(start, ramp.amplitude);
         self.angular_frequency = TAU / self.period;
         self.eta = eta(self.angular_frequency, self.amplitude, self.velocity);
         self.cycle_start = start;
@@ -290,18 +297,21 @@ impl Drive {
         self.cycle_start + (whole + angle / TAU) * self.period
     }
 
-    /// Displacement u(t) in m and velocity u'(t) in m/s of the driven end, at a time in s.
-    pub fn motion(&self, time: f64) -> (f64, f64) {
+    /// The motion of the driven end at a time in s.
+    pub fn motion(&self, time: f64) -> DriveMotion {
         let ramp = self.velocity * time;
         if self.is_modulated() {
             let (sine, cosine) = libm::sincos(self.phase(time));
             let rate = self.amplitude * self.angular_frequency;
-            (
-                ramp + self.amplitude * (cosine - 1.0) + self.lift,
-                self.velocity - rate * sine,
-            )
+            DriveMotion {
+                displacement: ramp + self.amplitude * (cosine - 1.0) + self.lift,
+                velocity: self.velocity - rate * sine,
+            }
         } else {
-            (ramp, self.velocity)
+            DriveMotion {
+                displacement: ramp,
+                velocity: self.velocity,
+            }
         }
     }
 }
@@ -332,11 +342,11 @@ mod tests {
             drive.next_cycle();
             let after = drive.motion(joint);
             assert!(
-                (before.0 - after.0).abs() < 1e-18,
+                (before.displacement - after.displacement).abs() < 1e-18,
                 "{before:?} and {after:?} at {joint} s"
             );
             assert!(
-                (before.1 - after.1).abs() < 1e-15,
+                (before.velocity - after.velocity).abs() < 1e-15,
                 "{before:?} and {after:?} at {joint} s"
             );
             joints += 1;
@@ -371,12 +381,15 @@ mod tests {
                 let passage = drive.first_passage(time);
                 let level = drive.velocity * time;
                 assert!(passage >= time - 1e-12 && passage <= time + drive.period);
-                assert!((drive.motion(passage).0 - level).abs() < 1e-15, "{number}");
+                assert!(
+                    (drive.motion(passage).displacement - level).abs() < 1e-15,
+                    "{number}"
+                );
                 // Nowhere before.
                 while f64::from(step) * 1e-5 < passage - 1e-9 {
                     let now = f64::from(step) * 1e-5;
                     walked.advance_to(now);
-                    furthest = furthest.max(walked.motion(now).0);
+                    furthest = furthest.max(walked.motion(now).displacement);
                     step += 1;
                 }
                 assert!(
@@ -406,18 +419,20 @@ mod tests {
             let end = start + cycles as f64 * period;
             let mut walked = drive;
             for joint in [start, end] {
-                let (before, rate) = drive.motion(joint);
+                let before = drive.motion(joint);
                 assert_eq!(drive.cycle_end, joint);
                 drive.next_cycle();
-                let (after, rate_after) = drive.motion(joint);
-                assert!((before - drive.velocity * joint).abs() < 1e-19 + 1e-15 * before);
+                let after = drive.motion(joint);
+                let displacement = before.displacement;
+                let allowed = 1e-19 + 1e-15 * displacement;
+                assert!((displacement - drive.velocity * joint).abs() < allowed);
                 assert!(
-                    (after - before).abs() < 1e-19 + 1e-15 * before,
-                    "{before} {after}"
+                    (after.displacement - displacement).abs() < allowed,
+                    "{before:?} {after:?}"
                 );
                 assert!(
-                    (rate - rate_after).abs() < 1e-11 * rate.abs(),
-                    "{rate} {rate_after}"
+                    (before.velocity - after.velocity).abs() < 1e-11 * before.velocity.abs(),
+                    "{before:?} {after:?}"
                 );
             }
             assert_eq!(drive.cycle_end, f64::INFINITY);
@@ -431,7 +446,7 @@ mod tests {
                     number += 1;
                     let now = spacing * f64::from(number);
                     walked.advance_to(now);
-                    furthest = walked.motion(now).0.max(furthest);
+                    furthest = walked.motion(now).displacement.max(furthest);
                 }
                 let passage = drive.first_passage(time);
                 assert!(passage <= time);

@@ -45,6 +45,15 @@ pub struct ContactChange {
     pub stiffness: f64,
 }
 
+/// A contact that its block reaches.
+#[derive(Clone, Copy, Debug)]
+pub struct ReachedContact {
+    /// Within its block, from 0.
+    pub contact: usize,
+    /// Where it breaks, in m.
+    pub level: f64,
+}
+
 /// A contact breaks or attaches, as observers see it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactEvent {
@@ -235,13 +244,10 @@ impl Interface {
         self.reattachments.next().map_or(f64::INFINITY, Due::time)
     }
 
-    /// Time in s and block of the next reattachment, if it is due by a time in s.
+    /// The next reattachment, if it is due by a time in s.
     #[inline(always)]
-    pub fn next_reattachment_by(&self, time: f64) -> Option<(f64, usize)> {
-        self.reattachments
-            .next()
-            .map(|due| (due.time(), due.block()))
-            .filter(|(due, _)| *due <= time)
+    pub fn next_reattachment_by(&self, time: f64) -> Option<Due> {
+        self.reattachments.next().filter(|due| due.time() <= time)
     }
 
     /// Time in s of the next reattachment at a block, if it is due by a time in s; else infinite.
@@ -339,15 +345,15 @@ impl Interface {
         self.gather(Scalar512b, block);
     }
 
-    /// Writes the contacts of a block that break up to a displacement in m, with their break positions in m, in the
-    /// order in which the block comes to them.
+    /// Writes the contacts of a block that break up to a displacement in m, in the order in which the block comes to
+    /// them.
     #[inline(always)]
     pub(crate) fn reached<S: Simd>(
         &self,
         simd: S,
         block: usize,
         displacement: f64,
-        contacts: &mut Vec<(f64, usize)>,
+        contacts: &mut Vec<ReachedContact>,
     ) {
         contacts.clear();
         let falls = displacement <= self.block_lower[block];
@@ -368,16 +374,19 @@ impl Interface {
                 };
                 // A displacement that is not finite reaches lanes beyond the last contact.
                 if level.is_finite() {
-                    contacts.push((level, chunk * LANES * LANES + contact));
+                    contacts.push(ReachedContact {
+                        contact: chunk * LANES * LANES + contact,
+                        level,
+                    });
                 }
             }
         }
         if contacts.len() > 1 {
             contacts.sort_by(|a, b| {
                 if falls {
-                    b.0.total_cmp(&a.0)
+                    b.level.total_cmp(&a.level)
                 } else {
-                    a.0.total_cmp(&b.0)
+                    a.level.total_cmp(&b.level)
                 }
             });
         }

@@ -14,7 +14,7 @@ pub mod theory;
 pub use disorder::{Contact, Disorder, RNG_SCHEME, standard_normal_quantile};
 pub use drive::Drive;
 pub use fields::Description;
-pub(crate) use interface::AttachedContacts;
+pub(crate) use interface::{AttachedContacts, ReachedContact};
 pub use interface::{Change, ContactChange, ContactEvent, Interface};
 pub use parameters::{BreakOn, ParameterError, Parameters, Selected, Selection, Symbol};
 pub(crate) use simd::{LANES, Row};

@@ -16,7 +16,7 @@ const NONE: u32 = u32::MAX;
 
 /// A reattachment that is due, in order of time, then block, then contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Due {
+pub struct Due {
     /// Bits of the time in s, which order as it does, since it is not negative.
     time: u64,
     block: u32,

@@ -121,7 +121,7 @@ impl DropDetector {
     /// Follows a force that does not turn in between.
     fn follow(&mut self, time: f64, force: f64) {
         self.drive.advance_to(time);
-        let driven = self.drive.motion(time).0;
+        let driven = self.drive.motion(time).displacement;
         let ended = self.zigzag.follow(Instant {
             time,
             force,

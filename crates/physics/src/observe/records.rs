@@ -90,7 +90,7 @@ impl Observer for Trace {
         while let Some(time) = self.sampling.within(segment) {
             let force = segment.force_after(time - segment.start);
             self.drive.advance_to(time);
-            let (driven, _) = self.drive.motion(time);
+            let driven = self.drive.motion(time).displacement;
             self.rows.push(TraceRow {
                 time,
                 force,

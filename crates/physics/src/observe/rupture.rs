@@ -4,6 +4,14 @@
 use crate::model::{ContactEvent, Parameters};
 use crate::solver::Spent;
 
+#[derive(Clone, Copy, Debug)]
+struct FirstBreak {
+    /// From 0.
+    block: usize,
+    /// In s.
+    time: f64,
+}
+
 /// A rupture in progress or just ended, with what is measured on its force.
 #[derive(Clone, Debug)]
 pub(super) struct Rupture {
@@ -12,8 +20,8 @@ pub(super) struct Rupture {
     pub size: u64,
     /// The furthest block with a break, from 0.
     pub reach: usize,
-    /// Blocks with a break, in the order of their first break, and its time in s.
-    pub fronts: Vec<(usize, f64)>,
+    /// The first break at each block, in order of time.
+    first_breaks: Vec<FirstBreak>,
     broken: Vec<bool>,
     pub attached_before: u64,
     /// Fewest contacts attached so far.
@@ -43,7 +51,7 @@ impl Rupture {
             first_block: event.block,
             size: 0,
             reach: event.block,
-            fronts: Vec::new(),
+            first_breaks: Vec::new(),
             broken: vec![false; blocks],
             attached_before: event.attached + 1,
             least_attached: event.attached,
@@ -62,13 +70,16 @@ impl Rupture {
         self.least_attached = self.least_attached.min(event.attached);
         self.reach = self.reach.max(event.block);
         if !std::mem::replace(&mut self.broken[event.block], true) {
-            self.fronts.push((event.block, event.time));
+            self.first_breaks.push(FirstBreak {
+                block: event.block,
+                time: event.time,
+            });
         }
     }
 
     /// Number of distinct blocks with a break.
     pub fn extent(&self) -> usize {
-        self.fronts.len()
+        self.first_breaks.len()
     }
 
     /// Whether it is a slip: it breaks contacts at every block, and lets go of at least half of those that were
@@ -84,10 +95,11 @@ impl Rupture {
     /// by block, by least squares. `None` below three blocks or without an advance.
     pub fn front_speed(&self, parameters: &Parameters) -> Option<f64> {
         let spacing = parameters.slider_length / parameters.blocks as f64;
-        let points = self
-            .fronts
-            .iter()
-            .map(|&(block, time)| (time, spacing * block.abs_diff(self.first_block) as f64));
+        let point = |first: &FirstBreak| FrontPoint {
+            time: first.time,
+            position: spacing * first.block.abs_diff(self.first_block) as f64,
+        };
+        let points: Vec<FrontPoint> = self.first_breaks.iter().map(point).collect();
         advance_speed(&points).filter(|_| self.extent() >= 3)
     }
 }
@@ -125,14 +137,22 @@ pub(super) struct RunningTotals {
     pub spent: Spent,
 }
 
+/// Where a front is, in m, and when, in s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FrontPoint {
+    pub time: f64,
+    pub position: f64,
+}
+
 /// Slope of position against time by least squares; `None` unless it is positive and finite.
-pub(super) fn advance_speed(points: &(impl Iterator<Item = (f64, f64)> + Clone)) -> Option<f64> {
-    let count = points.clone().count() as f64;
-    let sum = |of: &dyn Fn((f64, f64)) -> f64| points.clone().map(of).sum::<f64>();
-    let mean_time = sum(&|(time, _)| time) / count;
-    let mean_position = sum(&|(_, position)| position) / count;
-    let covariance = sum(&|(time, position)| (time - mean_time) * (position - mean_position));
-    let variance = sum(&|(time, _)| (time - mean_time) * (time - mean_time));
+pub(super) fn advance_speed(points: &[FrontPoint]) -> Option<f64> {
+    let sum = |of: &dyn Fn(&FrontPoint) -> f64| points.iter().map(of).sum::<f64>();
+    let count = points.len() as f64;
+    let mean_time = sum(&|point| point.time) / count;
+    let mean_position = sum(&|point| point.position) / count;
+    let since_mean = |point: &FrontPoint| point.time - mean_time;
+    let covariance = sum(&|point| since_mean(point) * (point.position - mean_position));
+    let variance = sum(&|point| since_mean(point) * since_mean(point));
     let speed = covariance / variance;
     (speed.is_finite() && speed > 0.0).then_some(speed)
 }

@@ -5,7 +5,7 @@
 //! rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::drops::{DropDetector, Drops};
-use super::rupture::{Peak, RunningTotals, Rupture, advance_speed};
+use super::rupture::{FrontPoint, Peak, RunningTotals, Rupture, advance_speed};
 use super::slip::{Energies, Modulation, Precursor, Slip, phase};
 use super::{Averages, Measurements, Recording};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
@@ -26,8 +26,8 @@ struct PendingPrecursors {
     /// Breaks in the largest.
     largest: u64,
     last_onset: Option<f64>,
-    /// Those that advanced the reach: time and position.
-    advances: Vec<(f64, f64)>,
+    /// Where those that advanced the reach brought it.
+    advances: Vec<FrontPoint>,
     /// Blocks up to the furthest that they reach.
     furthest: usize,
 }
@@ -275,7 +275,7 @@ impl SlipObserver {
             front_speed: rupture.front_speed(&self.parameters),
             precursors: self.pending.count,
             largest_precursor: self.pending.largest,
-            slow_front_speed: advance_speed(&self.pending.advances.iter().copied()),
+            slow_front_speed: advance_speed(&self.pending.advances),
             energies: energies.unwrap_or_default(),
             drops: Drops::default(),
         }
@@ -291,7 +291,7 @@ impl SlipObserver {
     /// Displacement of the driven edge at an instant since the last slip's end, from the force and the drive, in m.
     fn edge_displacement(&self, at: RunningTotals) -> f64 {
         let drive = self.drive_at(at.time);
-        drive.motion(at.time).0 - at.force / drive.stiffness
+        drive.motion(at.time).displacement - at.force / drive.stiffness
     }
 
     fn record_precursor(&mut self, rupture: &Rupture) {
@@ -320,7 +320,10 @@ impl SlipObserver {
         if reach > self.pending.furthest {
             let position =
                 reach as f64 * self.parameters.slider_length / self.parameters.blocks as f64;
-            self.pending.advances.push((first.time, position));
+            self.pending.advances.push(FrontPoint {
+                time: first.time,
+                position,
+            });
             self.pending.furthest = reach;
         }
         self.pending.count += 1;
@@ -343,16 +346,19 @@ impl Observer for SlipObserver {
         } else {
             self.peaks_since.precursor.force
         };
-        if let Some((time, force)) = segment.maximum_above(floor) {
-            let peak = Peak { time, force };
+        if let Some(largest) = segment.maximum_above(floor) {
+            let peak = Peak {
+                time: largest.at,
+                force: largest.value,
+            };
             self.peaks_since.last_break = peak;
             self.peaks_since.precursor.raise(peak);
             self.peaks_since.slip.raise(peak);
         }
         if let Some(rupture) = &mut self.rupture
-            && let Some((_, force)) = segment.minimum_below(rupture.least)
+            && let Some(least) = segment.minimum_below(rupture.least)
         {
-            rupture.least = force;
+            rupture.least = least.value;
         }
         if let Some(drops) = &mut self.drops {
             drops.advance(segment);

@@ -162,13 +162,13 @@ impl WithSimd for FixedStepRun<'_> {
                 audit.damping.update(|sum| sum + loss);
             }
             drive.advance_to(time);
-            let (driven, drive_velocity) = drive.motion(time);
-            let next_force = drive.stiffness * (driven - motion.displacement[0]);
+            let driven = drive.motion(time);
+            let next_force = drive.stiffness * (driven.displacement - motion.displacement[0]);
             motion.accelerate(&interface, next_force, coupling, mass);
             for (v, a) in motion.velocity.iter_mut().zip(&motion.acceleration) {
                 *v = (*v + half * a) * damp_after;
             }
-            let next_rate = drive.stiffness * (drive_velocity - motion.velocity[0]);
+            let next_rate = drive.stiffness * (driven.velocity - motion.velocity[0]);
             let forces = [force, next_force];
             report_force(observer, start, time_step, forces, [force_rate, next_rate]);
             force = next_force;
@@ -204,7 +204,7 @@ impl WithSimd for FixedStepRun<'_> {
         }
         motion.check(summary.end_time)?;
         if let Some(audit) = audit {
-            let driven = drive.motion(summary.end_time).0;
+            let driven = drive.motion(summary.end_time).displacement;
             audit.record_final_energy(&interface, &motion.displacement, &motion.velocity, driven);
         }
         observer.end(summary.end_time, &motion.displacement);
@@ -222,8 +222,8 @@ fn change_contacts(
     observer: &mut dyn Observer,
 ) {
     let mean_displacement = displacement.iter().sum::<f64>() / displacement.len() as f64;
-    while let Some((_, block)) = interface.next_reattachment_by(time) {
-        let change = interface.reattach_next(displacement[block]);
+    while let Some(due) = interface.next_reattachment_by(time) {
+        let change = interface.reattach_next(displacement[due.block()]);
         let count = interface.count(Change::Attach, change.time);
         summary.reattachments += 1;
         let change = ContactChange { time, ..change };

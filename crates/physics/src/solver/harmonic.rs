@@ -1,7 +1,7 @@
 //! A ramp with a cosine, a + b τ + A cos(ω τ + φ): the drive, the driven motion of a block, and the shear force that
 //! follows; values, integral, extremes, and first crossings of a level.
 
-use super::polynomial::{QUADRATIC, newton_step, rising_root};
+use super::polynomial::{Extreme, QUADRATIC, newton_step, rising_root};
 use std::f64::consts::{PI, TAU};
 
 /// `start` + `rate` τ + `amplitude` cos(`angular_frequency` τ + `phase`), with the time τ in s since some instant. In N
@@ -101,15 +101,18 @@ impl Harmonic {
         }
     }
 
-    /// Time and value of the largest `sign` · value in [0, `duration`].
-    pub(super) fn extreme(&self, duration: f64, sign: f64) -> (f64, f64) {
-        let mut best = (0.0, f64::NEG_INFINITY);
+    /// The largest `sign` · value in [0, `duration`].
+    pub(super) fn extreme(&self, duration: f64, sign: f64) -> Extreme {
+        let mut best = Extreme {
+            at: 0.0,
+            value: f64::NEG_INFINITY,
+        };
         let ends = [Some(0.0), Some(duration)];
         let turns = self.times(sign).crests(duration);
         for elapsed in ends.into_iter().chain(turns).flatten() {
             let value = sign * self.value(elapsed);
-            if value > best.1 {
-                best = (elapsed, value);
+            if value > best.value {
+                best = Extreme { at: elapsed, value };
             }
         }
         best

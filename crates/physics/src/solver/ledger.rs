@@ -188,12 +188,12 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
             let nodes = quadrature.nodes(coefficients.len().div_ceil(2) + NODES_FOR_DRIVE);
             let power = |s: f64| {
                 let elapsed = s * segment.duration;
-                segment.force_after(elapsed) * drive.motion(segment.start + elapsed).1
+                segment.force_after(elapsed) * drive.motion(segment.start + elapsed).velocity
             };
             segment.duration
                 * nodes
                     .iter()
-                    .map(|&(s, weight)| weight * power(s))
+                    .map(|node| node.weight * power(node.at))
                     .sum::<f64>()
         }
         ForcePath::Harmonic(harmonic) => {
@@ -225,12 +225,12 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
                 let begin = begin as f64;
                 let from = (path.first - begin).max(0.0);
                 let part = (end - begin).min(1.0) - from;
-                let power = |node: f64| {
-                    let s = from + part * node;
+                let power = |at: f64| {
+                    let s = from + part * at;
                     let elapsed = (begin + s - path.first) * path.spacing;
-                    step.value(s) * drive.motion(segment.start + elapsed).1
+                    step.value(s) * drive.motion(segment.start + elapsed).velocity
                 };
-                let mean = nodes.iter().map(|&(s, weight)| weight * power(s));
+                let mean = nodes.iter().map(|node| node.weight * power(node.at));
                 part * mean.sum::<f64>()
             };
             path.spacing * path.steps.iter().enumerate().map(of_step).sum::<f64>()
@@ -243,10 +243,17 @@ const MAX_NODES: usize = 33;
 /// Newton's method doubles the correct digits of a node each time, and starts with two.
 const NEWTON_STEPS: usize = 6;
 
+/// A node of a rule in (0, 1), and its weight.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    pub at: f64,
+    pub weight: f64,
+}
+
 /// Gauss-Legendre rules on [0, 1] of 1 to [`MAX_NODES`] nodes; n nodes integrate polynomials of degree 2n - 1 exactly.
 #[derive(Clone, Debug)]
 pub(super) struct Quadrature {
-    rules: Vec<Vec<(f64, f64)>>,
+    rules: Vec<Vec<Node>>,
 }
 
 impl Quadrature {
@@ -256,14 +263,14 @@ impl Quadrature {
         }
     }
 
-    /// Nodes in (0, 1) and weights, which sum to 1, of the rule with `count` nodes, limited to 1 to [`MAX_NODES`].
-    pub fn nodes(&self, count: usize) -> &[(f64, f64)] {
+    /// The rule with `count` nodes, limited to 1 to [`MAX_NODES`]; weights sum to 1.
+    pub fn nodes(&self, count: usize) -> &[Node] {
         &self.rules[count.clamp(1, MAX_NODES) - 1]
     }
 }
 
 /// Roots of the Legendre polynomial by Newton's method, with the weights 2/((1 - z²) P'(z)²), moved to [0, 1].
-fn rule(count: usize) -> Vec<(f64, f64)> {
+fn rule(count: usize) -> Vec<Node> {
     let order = count as f64;
     let node = |i: usize| {
         let mut z = libm::cos(PI * (i as f64 + 0.75) / (order + 0.5));
@@ -281,7 +288,10 @@ fn rule(count: usize) -> Vec<(f64, f64)> {
             slope = order * (before - z * value) / (1.0 - z * z);
             z -= value / slope;
         }
-        (0.5 * (1.0 - z), 1.0 / ((1.0 - z * z) * slope * slope))
+        Node {
+            at: 0.5 * (1.0 - z),
+            weight: 1.0 / ((1.0 - z * z) * slope * slope),
+        }
     };
     (0..count).map(node).collect()
 }
@@ -318,14 +328,15 @@ mod tests {
         };
         let pieces = 200;
         let width = segment.duration / f64::from(pieces);
-        let power =
-            |elapsed: f64| segment.force_after(elapsed) * drive.motion(segment.start + elapsed).1;
+        let power = |elapsed: f64| {
+            segment.force_after(elapsed) * drive.motion(segment.start + elapsed).velocity
+        };
         let numeric: f64 = (0..pieces)
             .flat_map(|piece| {
                 quadrature
                     .nodes(8)
                     .iter()
-                    .map(move |(s, weight)| (f64::from(piece) + s, weight))
+                    .map(move |node| (f64::from(piece) + node.at, node.weight))
             })
             .map(|(s, weight)| weight * width * power(s * width))
             .sum();
@@ -374,7 +385,7 @@ mod tests {
                 let terms = quadrature
                     .nodes(count)
                     .iter()
-                    .map(|(s, weight)| weight * s.powi(i32::try_from(degree).unwrap()));
+                    .map(|node| node.weight * node.at.powi(i32::try_from(degree).unwrap()));
                 let error = terms.sum::<f64>() * (degree + 1) as f64 - 1.0;
                 // Rounding, times the degree by which the integral is scaled.
                 assert!(

@@ -22,7 +22,8 @@ mod segment;
 pub use event_driven::{GRID_TOLERANCE, Resolve};
 pub use harmonic::Harmonic;
 pub use ledger::{Ledger, Spent};
-pub use segment::{CubicStep, Extreme, Extremes, ForcePath, GridPath, PolynomialPath, Segment};
+pub use polynomial::Extreme;
+pub use segment::{CubicStep, Extremes, ForcePath, GridPath, PolynomialPath, Segment};
 
 use self::ledger::Audit;
 use crate::model::fields::fields;

@@ -100,13 +100,24 @@ pub(crate) fn value_and_integral(coefficients: &[f64], s: f64) -> (f64, f64) {
     (sums[0] + s * sums[1], s * (integrals[0] + s * integrals[1]))
 }
 
-/// Where the polynomial is largest on [`first`, `last`], and its value there.
-pub(crate) fn maximum(coefficients: &[f64], first: f64, last: f64) -> (f64, f64) {
-    let mut best = (first, value(coefficients, first));
+/// The largest or the least value of a function, and where it has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extreme {
+    pub at: f64,
+    pub value: f64,
+}
+
+/// Where the polynomial is largest on [`first`, `last`].
+pub(crate) fn maximum(coefficients: &[f64], first: f64, last: f64) -> Extreme {
+    let at = |s: f64| Extreme {
+        at: s,
+        value: value(coefficients, s),
+    };
+    let mut best = at(first);
     let mut offer = |s: f64| {
-        let candidate = value(coefficients, s);
-        if candidate > best.1 {
-            best = (s, candidate);
+        let candidate = at(s);
+        if candidate.value > best.value {
+            best = candidate;
         }
     };
     offer(last);
@@ -366,7 +377,7 @@ mod tests {
     fn a_maximum_between_ends_that_both_fall_is_found() {
         // A narrow bump inside the interval, of which the ends show nothing.
         let coefficients = [0.0, -0.1, 0.0, 0.0, 16.0 * 0.5, -40.0 * 0.5, 24.5 * 0.5];
-        let (at, largest) = maximum(&coefficients, 0.0, 1.0);
+        let Extreme { at, value: largest } = maximum(&coefficients, 0.0, 1.0);
         let sampled = (0..=100_000)
             .map(|i| value(&coefficients, f64::from(i) * 1e-5))
             .fold(f64::MIN, f64::max);
@@ -424,7 +435,7 @@ mod tests {
             coefficients in prop::collection::vec(-1.0_f64..1.0, 1..14), first in 0.0_f64..0.9, length in 0.01_f64..0.1
         ) {
             let last = first + length;
-            let (at, largest) = maximum(&coefficients, first, last);
+            let Extreme { at, value: largest } = maximum(&coefficients, first, last);
             prop_assert!((first..=last).contains(&at));
             for i in 0..=500 {
                 prop_assert!(value(&coefficients, first + length * f64::from(i) / 500.0) <= largest + 1e-13);

@@ -1,7 +1,7 @@
 //! The shear force between two contact events, as a closed-form function of time: values, extremes and integral of F_S.
 
 use super::harmonic::Harmonic;
-use super::polynomial;
+use super::polynomial::{self, Extreme};
 use crate::value::floored;
 
 /// How F_S runs along a segment.
@@ -53,24 +53,16 @@ pub struct Extremes {
     pub least: Extreme,
 }
 
-#[derive(Clone, Copy, Debug)]
-pub struct Extreme {
-    /// How many steps from the beginning.
-    pub at: f64,
-    /// F_S, in N.
-    pub force: f64,
-}
-
 impl Default for Extremes {
     fn default() -> Self {
         Self {
             largest: Extreme {
                 at: 0.0,
-                force: f64::NEG_INFINITY,
+                value: f64::NEG_INFINITY,
             },
             least: Extreme {
                 at: 0.0,
-                force: f64::INFINITY,
+                value: f64::INFINITY,
             },
         }
     }
@@ -78,12 +70,12 @@ impl Default for Extremes {
 
 impl Extremes {
     #[inline(always)]
-    fn include(&mut self, at: f64, force: f64) {
-        if force > self.largest.force {
-            self.largest = Extreme { at, force };
+    fn include(&mut self, at: f64, value: f64) {
+        if value > self.largest.value {
+            self.largest = Extreme { at, value };
         }
-        if force < self.least.force {
-            self.least = Extreme { at, force };
+        if value < self.least.value {
+            self.least = Extreme { at, value };
         }
     }
 
@@ -91,8 +83,8 @@ impl Extremes {
     #[inline(always)]
     pub(super) fn include_step(&mut self, begin: f64, step: &CubicStep) {
         for sign in [1.0, -1.0] {
-            let (s, value) = step.maximum(sign, 0.0, 1.0);
-            self.include(begin + s, sign * value);
+            let largest = step.maximum(sign, 0.0, 1.0);
+            self.include(begin + largest.at, sign * largest.value);
         }
     }
 }
@@ -140,15 +132,22 @@ impl CubicStep {
         }
     }
 
-    /// Where `sign` · F_S is largest between `from` and `to`, and its value there.
+    /// The largest `sign` · F_S between `from` and `to`, in N.
     #[inline]
-    fn maximum(&self, sign: f64, from: f64, to: f64) -> (f64, f64) {
+    fn maximum(&self, sign: f64, from: f64, to: f64) -> Extreme {
         let [c0, c1, c2, c3] = self.coefficients().map(|coefficient| sign * coefficient);
-        let value = |s: f64| (s, c0 + s * (c1 + s * (c2 + s * c3)));
+        let force = |s: f64| Extreme {
+            at: s,
+            value: c0 + s * (c1 + s * (c2 + s * c3)),
+        };
         let slope = |s: f64| c1 + s * (2.0 * c2 + s * 3.0 * c3);
-        let at_from = value(from);
-        let at_to = value(to);
-        let at_end = if at_to.1 > at_from.1 { at_to } else { at_from };
+        let at_from = force(from);
+        let at_to = force(to);
+        let at_end = if at_to.value > at_from.value {
+            at_to
+        } else {
+            at_from
+        };
         // The second derivative is linear. If it keeps its sign, there is a crest only where the slope changes its own.
         let keeps_sign = (c2 + 3.0 * c3 * from) * (c2 + 3.0 * c3 * to) > 0.0;
         if keeps_sign && !(slope(from) > 0.0 && slope(to) < 0.0) {
@@ -158,8 +157,8 @@ impl CubicStep {
         if !(crest > from && crest < to) {
             return at_end;
         }
-        let at_crest = value(crest);
-        if at_crest.1 > at_end.1 {
+        let at_crest = force(crest);
+        if at_crest.value > at_end.value {
             at_crest
         } else {
             at_end
@@ -270,25 +269,31 @@ impl Segment<'_> {
         }
     }
 
-    /// Time in s and value in N of the largest F_S, if it lies above `floor`.
-    pub fn maximum_above(&self, floor: f64) -> Option<(f64, f64)> {
+    /// The largest F_S in N, at a time in s, if it lies above `floor`.
+    pub fn maximum_above(&self, floor: f64) -> Option<Extreme> {
         self.extreme_beyond(floor, 1.0)
     }
 
-    /// Time in s and value in N of the smallest F_S, if it lies below `ceiling`.
-    pub fn minimum_below(&self, ceiling: f64) -> Option<(f64, f64)> {
-        let (time, mirrored) = self.extreme_beyond(-ceiling, -1.0)?;
-        Some((time, -mirrored))
+    /// The least F_S in N, at a time in s, if it lies below `ceiling`.
+    pub fn minimum_below(&self, ceiling: f64) -> Option<Extreme> {
+        let mirrored = self.extreme_beyond(-ceiling, -1.0)?;
+        Some(Extreme {
+            value: -mirrored.value,
+            ..mirrored
+        })
     }
 
-    /// The largest `sign` · F_S and its time, if it lies above `floor`.
-    fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
-        let (elapsed, extreme) = match self.path {
+    /// The largest `sign` · F_S, if it lies above `floor`.
+    fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<Extreme> {
+        let largest = match self.path {
             ForcePath::Polynomial(path) => path.extreme(self.duration, floor, sign)?,
             ForcePath::Harmonic(harmonic) => harmonic.extreme(self.duration, sign),
             ForcePath::Grid(path) => path.extreme(self.duration, floor, sign)?,
         };
-        (extreme > floor).then_some((self.start + elapsed, extreme))
+        (largest.value > floor).then_some(Extreme {
+            at: self.start + largest.at,
+            ..largest
+        })
     }
 
     /// Lower and upper bound on F_S, in N; not the tightest.
@@ -357,18 +362,24 @@ impl PolynomialPath<'_> {
         });
     }
 
-    /// Time and value of the largest `sign` · F_S; `None` if a bound shows that it does not exceed `floor`.
-    fn extreme(&self, duration: f64, floor: f64, sign: f64) -> Option<(f64, f64)> {
+    /// The largest `sign` · F_S; `None` if a bound shows that it does not exceed `floor`.
+    fn extreme(&self, duration: f64, floor: f64, sign: f64) -> Option<Extreme> {
         let [at_first, at_last] = self.ends.map(|at| sign * at.force);
         let width = duration / self.scale;
         let last = self.first + width;
-        let (mut s, mut extreme) = if at_last > at_first {
-            (last, at_last)
+        let mut largest = if at_last > at_first {
+            Extreme {
+                at: last,
+                value: at_last,
+            }
         } else {
-            (self.first, at_first)
+            Extreme {
+                at: self.first,
+                value: at_first,
+            }
         };
         // The second derivative bounds both how far the ends are exceeded and how much the slope turns.
-        if extreme + 0.125 * self.curvature_bound * width * width <= floor {
+        if largest.value + 0.125 * self.curvature_bound * width * width <= floor {
             return None;
         }
         let rises_or_falls = (at_last - at_first).abs() >= self.curvature_bound * width * width
@@ -379,9 +390,12 @@ impl PolynomialPath<'_> {
                 *signed = sign * coefficient;
             }
             let signed = &signed[..self.coefficients.len()];
-            (s, extreme) = polynomial::maximum(signed, self.first, last);
+            largest = polynomial::maximum(signed, self.first, last);
         }
-        Some(((s - self.first) * self.scale, extreme))
+        Some(Extreme {
+            at: (largest.at - self.first) * self.scale,
+            ..largest
+        })
     }
 }
 
@@ -411,8 +425,8 @@ impl GridPath<'_> {
         }
     }
 
-    /// Time and value of the largest `sign` · F_S; `None` if a bound shows that it does not exceed `floor`.
-    fn extreme(&self, duration: f64, floor: f64, sign: f64) -> Option<(f64, f64)> {
+    /// The largest `sign` · F_S; `None` if a bound shows that it does not exceed `floor`.
+    fn extreme(&self, duration: f64, floor: f64, sign: f64) -> Option<Extreme> {
         let above = |[low, high]: [f64; 2]| if sign > 0.0 { high } else { -low };
         if above(self.bounds) <= floor {
             return None;
@@ -422,14 +436,23 @@ impl GridPath<'_> {
         } else {
             self.inner.least
         };
-        let mut at = inner.at;
-        let mut extreme = sign * inner.force;
+        let mut largest = Extreme {
+            at: inner.at,
+            value: sign * inner.value,
+        };
         let mut offer = |begin: f64, cubic: &CubicStep, from: f64, to: f64| {
-            let least = if extreme > floor { extreme } else { floor };
+            let least = if largest.value > floor {
+                largest.value
+            } else {
+                floor
+            };
             if above(cubic.bounds()) > least {
-                let (s, value) = cubic.maximum(sign, from, to);
-                if value > extreme {
-                    (at, extreme) = (begin + s, value);
+                let found = cubic.maximum(sign, from, to);
+                if found.value > largest.value {
+                    largest = Extreme {
+                        at: begin + found.at,
+                        ..found
+                    };
                 }
             }
         };
@@ -442,7 +465,10 @@ impl GridPath<'_> {
         if begin > 0.0 {
             offer(0.0, &self.steps[0], self.first, 1.0);
         }
-        Some(((at - self.first) * self.spacing, extreme))
+        Some(Extreme {
+            at: (largest.at - self.first) * self.spacing,
+            ..largest
+        })
     }
 }
 
@@ -511,8 +537,8 @@ mod tests {
             let samples = || (0..=2000).map(|i| segment.force_after(segment.duration * f64::from(i) / 2000.0));
             let highest = samples().fold(f64::MIN, f64::max);
             let lowest = samples().fold(f64::MAX, f64::min);
-            let (_, maximum) = segment.maximum_above(f64::NEG_INFINITY).unwrap();
-            let (_, minimum) = segment.minimum_below(f64::INFINITY).unwrap();
+            let maximum = segment.maximum_above(f64::NEG_INFINITY).unwrap().value;
+            let minimum = segment.minimum_below(f64::INFINITY).unwrap().value;
             prop_assert!(maximum >= highest - 1e-12 && maximum < highest + 2e-2, "{} {}", maximum, highest);
             prop_assert!(minimum <= lowest + 1e-12 && minimum > lowest - 2e-2, "{} {}", minimum, lowest);
             prop_assert_eq!(segment.maximum_above(maximum), None);

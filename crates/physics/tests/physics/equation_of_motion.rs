@@ -5,7 +5,7 @@ use stickslip_physics::solver::{Limits, Observer, Solver, simulate};
 
 /// Shear force `F_S = K_d (u(t) - x_1)` at a time in s, for a trailing edge at `trailing_edge` m, in N.
 fn shear_force(drive: &Drive, time: f64, trailing_edge: f64) -> f64 {
-    drive.stiffness * (drive.motion(time).0 - trailing_edge)
+    drive.stiffness * (drive.motion(time).displacement - trailing_edge)
 }
 
 /// Forces of the attached contacts of one block: Σ `k_i` in N/m and Σ `k_i a_i` in N.

@@ -34,7 +34,7 @@ pub struct TraceDrive {
 impl TraceDrive {
     /// The displacement of the driven end at a time, in m.
     pub fn driven(&self, time: f64) -> f64 {
-        self.drive.motion(time - self.maximum).0
+        self.drive.motion(time - self.maximum).displacement
     }
 
     fn instant(&self, samples: Samples<'_>, place: usize) -> Instant {

@@ -3,7 +3,7 @@
 use super::grid::{Grid, GridStep, advance, velocity};
 use super::leap::{LeapBounds, PlannedLeap, Split, leap};
 use super::moving_frame::StepDrive;
-use super::slider::{Chain, Slider, State};
+use super::slider::{Chain, Slider, Slot, State};
 use super::taylor::{StepInput, TaylorSeries, evaluate, expand, reachable};
 use crate::model::simd::Simd;
 use crate::solver::harmonic::Harmonic;
@@ -36,8 +36,8 @@ kernels! {
     fn expand(chain: &Chain, state: &State, input: &StepInput, series: &mut TaylorSeries) -> bool = expand::<S, R>;
     /// State at s in [0, 1] of a step of `length` s.
     fn evaluate(series: &TaylorSeries, s: f64, length: f64, state: &mut State) -> () = evaluate::<S, R>;
-    /// Row and lane of every block that may reach a break position within the step.
-    fn reachable(chain: &Chain, series: &mut TaylorSeries, blocks: &mut Vec<(usize, usize)>) -> () = reachable::<S, R>;
+    /// The blocks that may reach a break position within the step.
+    fn reachable(chain: &Chain, series: &mut TaylorSeries, blocks: &mut Vec<Slot>) -> () = reachable::<S, R>;
     /// Takes up to `steps` steps of the grid; see [`advance`].
     fn advance(slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize = advance::<S, R>;
     /// Writes the velocities of a motion on the grid; see [`velocity`].

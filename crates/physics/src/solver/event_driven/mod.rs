@@ -336,19 +336,20 @@ impl<'a> Integration<'a> {
             reported = until;
         };
         // What is due at the very end is attached to the state there.
-        while let Some((due, block)) = self
+        while let Some(due) = self
             .slider
             .interface
             .next_reattachment_by(began + leap.duration)
-            && due - began < leap.duration
+            && due.time() - began < leap.duration
         {
+            let elapsed = due.time() - began;
             if self.grid.wants_attachments() {
-                report(due - began, observer);
+                report(elapsed, observer);
             }
             let x = self
                 .split
-                .driven(&self.slider.chain, block)
-                .displacement(drive, due - began);
+                .driven(&self.slider.chain, due.block())
+                .displacement(drive, elapsed);
             self.attach_next(x, observer);
         }
         report(leap.duration, observer);
@@ -382,8 +383,8 @@ impl<'a> Integration<'a> {
     /// Reattaches all contacts that are due.
     fn reattach_due(&mut self, observer: &mut dyn Observer) {
         let now = self.frame.time;
-        while let Some((_, block)) = self.slider.interface.next_reattachment_by(now) {
-            self.attach_next(self.slider.displacement(block), observer);
+        while let Some(due) = self.slider.interface.next_reattachment_by(now) {
+            self.attach_next(self.slider.displacement(due.block()), observer);
         }
     }
 
@@ -401,9 +402,9 @@ impl<'a> Integration<'a> {
     #[inline(never)]
     fn move_frame(&mut self, observer: &mut dyn Observer) {
         self.update_velocities(observer);
-        let (time, displacement) = self.frame.move_origin(self.slider.state.displacement[0][0]);
-        self.slider.move_origin(time, displacement);
-        self.next_leap -= time;
+        let shift = self.frame.move_origin(self.slider.state.displacement[0][0]);
+        self.slider.move_origin(shift);
+        self.next_leap -= shift.time;
         if self.grid.is_on {
             self.grid.follow_frame(&self.slider.chain, &self.frame);
         }

@@ -17,8 +17,9 @@ const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
 /// next step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StepDrive {
-    /// Displacement of the ramp, in m, and its rise in a step.
-    pub ramp: [f64; 2],
+    /// Displacement of the ramp, and its rise in a step, in m.
+    pub ramp: f64,
+    pub rise: f64,
     /// Δ cos θ and -Δ sin θ at the phase θ, in m.
     pub swing: [f64; 2],
     /// ωh, in rad; 0 if the drive is never modulated.
@@ -29,13 +30,13 @@ impl StepDrive {
     /// Displacement, in m.
     #[inline(always)]
     pub fn displacement(&self) -> f64 {
-        self.ramp[0] + self.swing[0]
+        self.ramp + self.swing[0]
     }
 
     /// h u', in m.
     #[inline(always)]
     pub fn increment(&self) -> f64 {
-        self.ramp[1] + self.angle * self.swing[1]
+        self.rise + self.angle * self.swing[1]
     }
 
     /// h² u'', in m.
@@ -48,7 +49,8 @@ impl StepDrive {
     #[inline(always)]
     pub fn derivative(&self) -> Self {
         Self {
-            ramp: [self.ramp[1], 0.0],
+            ramp: self.rise,
+            rise: 0.0,
             swing: [self.angle * self.swing[1], -self.angle * self.swing[0]],
             angle: self.angle,
         }
@@ -68,7 +70,7 @@ impl StepDrive {
     /// Goes on by a step.
     #[inline(always)]
     pub fn advance(&mut self, turn: [f64; 2]) {
-        self.ramp[0] += self.ramp[1];
+        self.ramp += self.rise;
         if self.angle != 0.0 {
             self.swing = self.turned(turn);
         }
@@ -78,11 +80,18 @@ impl StepDrive {
     #[inline(always)]
     pub fn before(&self, [sine, cosine]: [f64; 2]) -> Self {
         Self {
-            ramp: [self.ramp[0] - self.ramp[1], self.ramp[1]],
+            ramp: self.ramp - self.rise,
             swing: self.turned([-sine, cosine]),
-            angle: self.angle,
+            ..*self
         }
     }
+}
+
+/// How far the origin moves: in s, and in m.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OriginShift {
+    pub time: f64,
+    pub displacement: f64,
 }
 
 /// The frame, and the drive in it.
@@ -191,15 +200,15 @@ impl MovingFrame {
         self.swing = [along, 0.0];
     }
 
-    /// Moves the origin close to the present time and a displacement. Returns by how much, in s and m.
-    pub fn move_origin(&mut self, displacement: f64) -> (f64, f64) {
+    /// Moves the origin close to the present time and a displacement, in m.
+    pub fn move_origin(&mut self, displacement: f64) -> OriginShift {
         let time = (self.time / TIME_QUANTUM).floor() * TIME_QUANTUM;
         let displacement = (displacement / DISPLACEMENT_QUANTUM).floor() * DISPLACEMENT_QUANTUM;
         self.ramp_at_origin += self.drive.velocity * time - displacement;
         self.time -= time;
         self.origin_time += time;
         self.origin_displacement += displacement;
-        (time, displacement)
+        OriginShift { time, displacement }
     }
 
     /// Present phase of the modulation, in rad.
@@ -235,7 +244,8 @@ impl MovingFrame {
     #[inline]
     pub fn step_drive(&self, length: f64) -> StepDrive {
         StepDrive {
-            ramp: [self.ramp(), self.drive.velocity * length],
+            ramp: self.ramp(),
+            rise: self.drive.velocity * length,
             swing: self.swing,
             angle: self.drive.angular_frequency * length,
         }

@@ -4,6 +4,7 @@
 //! are then the rows above and below in the same lane; beyond the first and the last row they lie in the next lane.
 //! Slots beyond the last block keep a coupling, a stiffness and a force of zero and stay at rest.
 
+use super::moving_frame::OriginShift;
 use crate::model::equation::StiffnessMatrix;
 use crate::model::simd::{Simd, Vector};
 use crate::model::{AttachedContacts, ContactChange, Interface, LANES, Parameters, Row};
@@ -46,7 +47,7 @@ impl BlockLayout {
     }
 
     /// Block in a slot; beyond the last one for padding.
-    pub fn block(self, row: usize, lane: usize) -> usize {
+    pub fn block(self, Slot { row, lane }: Slot) -> usize {
         lane * self.rows + row
     }
 
@@ -212,8 +213,7 @@ impl Slider {
         change
     }
 
-    /// Moves the origin by `time` s and `displacement` m.
-    pub fn move_origin(&mut self, time: f64, displacement: f64) {
+    pub fn move_origin(&mut self, OriginShift { time, displacement }: OriginShift) {
         self.interface.move_origin(time, displacement);
         for block in 0..self.chain.layout.blocks {
             let Slot { row, lane } = self.chain.layout.slot(block);

@@ -12,7 +12,7 @@
 use super::Grid;
 use super::step::{Correction, GridStep, add};
 use crate::model::simd::Simd;
-use crate::model::{ContactChange, Interface};
+use crate::model::{ContactChange, Interface, ReachedContact};
 use crate::solver::event_driven::event::{own_terms, term_beside};
 use crate::solver::event_driven::moving_frame::StepDrive;
 use crate::solver::event_driven::slider::{Slider, Slot};
@@ -214,14 +214,15 @@ pub(super) struct StepEvents {
     pub changes: Vec<ContactChange>,
     pub breaks: u64,
     pub reattachments: u64,
-    /// Means over the blocks after breaks: displacement and increment, in m.
-    pub mean: [f64; 2],
+    /// Means over the blocks after breaks, in m.
+    pub mean_displacement: f64,
+    pub mean_increment: f64,
     /// Blocks that reach a break position, and where in the step.
     paths: Vec<(Path, f64)>,
     /// Times of attachments that are not collected, in the frame, in s, in order.
     pub attachments: Vec<f64>,
-    /// Contacts that a block reaches, and where they break, in m.
-    contacts: Vec<(f64, usize)>,
+    /// Contacts that a block reaches.
+    contacts: Vec<ReachedContact>,
 }
 
 /// Breaks and attaches what the last step reaches and what is due in it, in the order of time at each block. The step
@@ -247,8 +248,8 @@ fn break_reached<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: 
     } = grid;
     let mut paths = std::mem::take(&mut events.paths);
     paths.clear();
-    for &(row, lane) in &step.reached {
-        let block = slider.chain.layout.block(row, lane);
+    for &slot in &step.reached {
+        let block = slider.chain.layout.block(slot);
         paths.push((Path::new(slider, step, drive, block), 0.0));
     }
     for (path, first) in &mut paths {
@@ -276,8 +277,9 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
         ..
     } = grid;
     let end = events.cut.min(start + step.length);
-    while let Some((due, block)) = slider.interface.next_reattachment_by(end) {
-        let s = ((due - start) * step.inverse_length).clamp(0.0, 1.0);
+    while let Some(due) = slider.interface.next_reattachment_by(end) {
+        let block = due.block();
+        let s = ((due.time() - start) * step.inverse_length).clamp(0.0, 1.0);
         let left = 1.0 - s;
         let place = step.places[block];
         let Slot { row, lane } = place.slot;
@@ -357,7 +359,7 @@ fn break_along<S: Simd>(
         let mut until = interface.next_reattachment_at(block, start + step.length);
         until = until.min(events.cut);
         let mut broken = 0;
-        for &(level, contact) in &events.contacts {
+        for &ReachedContact { contact, level } in &events.contacts {
             let s = first.take().unwrap_or_else(
                 #[inline(always)]
                 || path.crossing(level),

@@ -75,8 +75,8 @@ impl ForceHistory {
             spacing,
             inner: self.inner,
             bounds: [
-                self.inner.least.force.min(low).min(lowest),
-                self.inner.largest.force.max(high).max(highest),
+                self.inner.least.value.min(low).min(lowest),
+                self.inner.largest.value.max(high).max(highest),
             ],
             end: last.value(s),
             integral: self.integral - before - beyond,

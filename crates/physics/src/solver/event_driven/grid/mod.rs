@@ -195,10 +195,8 @@ pub(super) fn advance<S: Simd, const R: usize>(
         change_contacts(simd, slider, grid, start);
         if grid.events.breaks > 0 {
             let Slider { chain, state, .. } = slider;
-            grid.events.mean = [
-                chain.mean(simd, &state.displacement),
-                chain.mean(simd, &grid.step.increment),
-            ];
+            grid.events.mean_displacement = chain.mean(simd, &state.displacement);
+            grid.events.mean_increment = chain.mean(simd, &grid.step.increment);
         }
     }
     grid.follow_last(&slider.chain, &slider.state, at_start, start_bend);
@@ -330,8 +328,8 @@ impl Integration<'_> {
                 .max(self.frame.time + WORTHWHILE_GRID_LEAP * length);
         }
         self.grid.entered = 0.0;
-        let [run, last] = self.grid.step.dissipation;
-        self.enter_dissipation(run - last);
+        let step = &self.grid.step;
+        self.enter_dissipation(step.dissipation - step.last_dissipation);
         self.report_changes(start, observer);
         self.enter_dissipation_to(1.0);
         if self.frame.time >= self.cut {
@@ -355,7 +353,7 @@ impl Integration<'_> {
 
     /// Enters that of the last step up to s, as if it were even there.
     fn enter_dissipation_to(&mut self, s: f64) {
-        self.enter_dissipation(self.grid.step.dissipation[1] * (s - self.grid.entered));
+        self.enter_dissipation(self.grid.step.last_dissipation * (s - self.grid.entered));
         self.grid.entered = s;
     }
 
@@ -392,7 +390,6 @@ impl Integration<'_> {
         if let Some(last) = backwards.find(|change| change.change == Change::Break) {
             self.largest_force = self.grid.history.last_force(place(last));
         }
-        let [mean, rise] = self.grid.events.mean;
         let leading = self.slider.chain.layout.blocks - 1;
         let mut rest = &changes[..];
         while let [first, ..] = rest {
@@ -416,11 +413,12 @@ impl Integration<'_> {
                 }
                 let count = self.slider.interface.count(change.change, change.time);
                 let left = 1.0 - place(change);
-                let mean = self.frame.absolute_displacement(mean - left * rise);
+                let events = &self.grid.events;
+                let mean = events.mean_displacement - left * events.mean_increment;
                 observer.contact(&ContactEvent::new(
                     self.frame.absolute(*change),
                     count,
-                    mean,
+                    self.frame.absolute_displacement(mean),
                 ));
             }
             rest = later;

@@ -115,9 +115,10 @@ pub struct GridStep {
     /// φ at the end of a step under its own law, in m; `None` unless [`Self::dissipation`] is kept.
     pub end_force: Option<Vec<Row>>,
     /// ∫ X'² ds summed over the blocks, in m²: over all steps of the last run, and over its last step.
-    pub dissipation: [f64; 2],
-    /// Row and lane of every block that reached a break position in the last step.
-    pub reached: Vec<(usize, usize)>,
+    pub dissipation: f64,
+    pub last_dissipation: f64,
+    /// The blocks that reached a break position in the last step.
+    pub reached: Vec<Slot>,
     pub(super) places: Vec<BlockPlace>,
     saved_displacement: Vec<Row>,
     saved_increment: Vec<Row>,
@@ -157,7 +158,8 @@ impl GridStep {
             force: layout.filled(0.0),
             trail: [0.0; MAX_RUN],
             end_force: None,
-            dissipation: [0.0; 2],
+            dissipation: 0.0,
+            last_dissipation: 0.0,
             reached: Vec::new(),
             places: (0..layout.blocks)
                 .map(|block| BlockPlace::new(layout, block))
@@ -252,7 +254,8 @@ impl GridStep {
     /// Adds what events change in the dissipation of the last step, in m².
     #[inline(always)]
     pub(super) fn add_dissipation(&mut self, change: f64) {
-        self.dissipation = self.dissipation.map(|sum| sum + change);
+        self.dissipation += change;
+        self.last_dissipation += change;
     }
 
     /// What φ of a block gains in a step, from the rises of it and of both blocks beside together, in m.
@@ -318,7 +321,8 @@ pub(super) fn march<S: Simd, const R: usize>(
 ) -> usize {
     let steps = steps.min(MAX_RUN);
     step.reached.clear();
-    step.dissipation = [0.0; 2];
+    step.dissipation = 0.0;
+    step.last_dissipation = 0.0;
     if R > 0 && S::HAS_MANY_REGISTERS && step.end_force.is_none() {
         march_in_registers::<S, R>(simd, chain, step, drive, displacement, steps)
     } else {
@@ -417,7 +421,10 @@ fn march_in_registers<S: Simd, const R: usize>(
             .fold(0_u128, |bits, lanes| bits << LANES | u128::from(*lanes));
         while bits != 0 {
             let first = bits.trailing_zeros() as usize;
-            step.reached.push((first / LANES, first % LANES));
+            step.reached.push(Slot {
+                row: first / LANES,
+                lane: first % LANES,
+            });
             bits &= bits - 1;
         }
     }
@@ -478,8 +485,9 @@ fn march_in_memory<S: Simd, const R: usize>(
         step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0][0]);
         if let Some(end_force) = &mut step.end_force {
             forces(simd, x, law, step.pulling * drive.displacement(), end_force);
-            let last = dissipation(simd, step.damping, step.damped, [force, end_force], q);
-            step.dissipation = [step.dissipation[0] + last, last];
+            step.last_dissipation =
+                dissipation(simd, step.damping, step.damped, [force, end_force], q);
+            step.dissipation += step.last_dissipation;
         }
         if reached != 0 {
             note_reached(simd, [&step.upper, &step.lower], x, &mut step.reached);
@@ -557,19 +565,15 @@ fn pushes(pulling: f64, second: f64, damping: f64, drive: &StepDrive) -> [f64; 2
     ]
 }
 
-/// Notes row and lane of every block at or beyond a break position.
+/// Notes every block at or beyond a break position.
 #[inline(always)]
-fn note_reached<S: Simd>(
-    simd: S,
-    [upper, lower]: [&[Row]; 2],
-    x: &[Row],
-    reached: &mut Vec<(usize, usize)>,
-) {
+fn note_reached<S: Simd>(simd: S, [upper, lower]: [&[Row]; 2], x: &[Row], reached: &mut Vec<Slot>) {
     for (row, ((x, upper), lower)) in x.iter().zip(upper).zip(lower).enumerate() {
         let x = simd.load(x);
         let mut lanes = x.reaches(simd.load(upper)) | simd.load(lower).reaches(x);
         while lanes != 0 {
-            reached.push((row, lanes.trailing_zeros() as usize));
+            let lane = lanes.trailing_zeros() as usize;
+            reached.push(Slot { row, lane });
             lanes &= lanes - 1;
         }
     }
@@ -774,7 +778,7 @@ mod tests {
             let x = slider.state.displacement[row][lane];
             assert_eq!(
                 x == 0.0,
-                layout.block(row, lane) >= layout.blocks,
+                layout.block(Slot { row, lane }) >= layout.blocks,
                 "{x} in row {row}, lane {lane}"
             );
         }

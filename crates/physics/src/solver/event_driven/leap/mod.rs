@@ -13,7 +13,7 @@ mod split;
 pub(super) use self::split::Split;
 
 use self::split::SplitRow;
-use super::slider::{Chain, Slider, State};
+use super::slider::{Chain, Slider, Slot, State};
 use crate::model::Interface;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::harmonic::Harmonic;
@@ -97,8 +97,9 @@ fn passing_horizon(
             return false;
         }
         (displaced, last) = (by_then, seconds);
-        let [speed, compliance] = split.speed_and_compliance(chain, drive, block);
-        rate += per_mass * life.stiffness * speed * compliance;
+        let slot = chain.layout.slot(block);
+        let speed = split.largest_speed(drive, slot);
+        rate += per_mass * life.stiffness * speed * split.compliance(slot);
         // Nor may it break.
         limit = limit.min(seconds + (life.reach - ASTRAY * error).max(0.0) / speed);
         true
@@ -142,7 +143,8 @@ fn plan<S: Simd>(
     if decay > 0.0 && !stays_clear(simd, chain, split, decay, left) {
         return Err(wait);
     }
-    let (elapsed, reached) = first_reached(simd, chain, split, drive, [decay, horizon]);
+    let FirstReached { elapsed, block } =
+        first_reached(simd, chain, split, drive, [decay, horizon]);
     if elapsed <= decay && decay > 0.0 {
         return Err(wait);
     }
@@ -171,7 +173,7 @@ fn plan<S: Simd>(
     Ok(PlannedLeap {
         force,
         duration: elapsed,
-        reached,
+        reached: block,
         is_whole: elapsed == horizon,
     })
 }
@@ -216,7 +218,7 @@ fn hides_no_peak<S: Simd>(
     } else {
         driven(after)
             .maximum_above(f64::NEG_INFINITY)
-            .map_or(f64::INFINITY, |(_, force)| force)
+            .map_or(f64::INFINITY, |largest| largest.value)
             + swing
     };
     if highest <= largest_force
@@ -234,7 +236,7 @@ fn hides_no_peak<S: Simd>(
     if ahead > horizon {
         // Nor does a contact break that attaches on the way.
         interface.look_ahead(|due, block, life| {
-            let [speed, _] = split.speed_and_compliance(chain, drive, block);
+            let speed = split.largest_speed(drive, chain.layout.slot(block));
             ahead = ahead.min(due - start + life.reach / speed);
             due - start < ahead
         });
@@ -372,28 +374,39 @@ fn stays_clear<S: Simd>(simd: S, chain: &Chain, split: &Split, seconds: f64, lef
     clear == u8::MAX
 }
 
-/// The first instant after `decay` at which a block reaches a break position, up to `horizon`, and that block.
+/// Where a leap ends at the latest.
+struct FirstReached {
+    /// In s after the start of the leap.
+    elapsed: f64,
+    /// The block that reaches a break position then; `None` if the horizon comes first.
+    block: Option<usize>,
+}
+
+/// The first instant in [`from`, `horizon`], in s, at which a block reaches a break position.
 #[inline(always)]
 fn first_reached<S: Simd>(
     simd: S,
     chain: &Chain,
     split: &Split,
     drive: &Harmonic,
-    [decay, horizon]: [f64; 2],
-) -> (f64, Option<usize>) {
-    let mut first = (horizon, None);
+    [from, horizon]: [f64; 2],
+) -> FirstReached {
+    let mut first = FirstReached {
+        elapsed: horizon,
+        block: None,
+    };
     let mut until = f64::NAN;
     let mut ends = [(0.0, 0.0); 2];
     let mut bend = 0.0;
     for (r, row) in split.rows.iter().enumerate() {
-        if until != first.0 {
+        if until != first.elapsed {
             // The cosine exceeds its ends by no more than it bends in between; over long times it is anything up to
             // |q|.
-            until = first.0;
-            let half = 0.5 * drive.angular_frequency * (until - decay);
+            until = first.elapsed;
+            let half = 0.5 * drive.angular_frequency * (until - from);
             let is_short = drive.amplitude > 0.0 && half < 1.0;
             ends = if is_short {
-                [decay, until].map(|at| libm::sincos(drive.turn(at)))
+                [from, until].map(|at| libm::sincos(drive.turn(at)))
             } else {
                 [(0.0, 0.0); 2]
             };
@@ -401,26 +414,29 @@ fn first_reached<S: Simd>(
         }
         let start = simd.load(&row.start);
         let rate = simd.load(&row.rate[0]);
-        let from = start
-            .plus(rate.times(simd.splat(decay)))
+        let at_start = start
+            .plus(rate.times(simd.splat(from)))
             .plus(turned(simd, row, ends[0]));
-        let to = start
+        let at_end = start
             .plus(rate.times(simd.splat(until)))
             .plus(turned(simd, row, ends[1]));
         let beyond = simd.load(&row.swing).times(simd.splat(bend));
-        let highest = from.larger(to).plus(beyond);
-        let lowest = from.smaller(to).minus(beyond);
+        let highest = at_start.larger(at_end).plus(beyond);
+        let lowest = at_start.smaller(at_end).minus(beyond);
         let mut lanes = highest.reaches(simd.load(&chain.upper[r]))
             | simd.load(&chain.lower[r]).reaches(lowest);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
-            let block = chain.layout.block(r, lane);
+            let block = chain.layout.block(Slot { row: r, lane });
             let levels = [chain.lower[r][lane], chain.upper[r][lane]];
             let elapsed = split
                 .driven(chain, block)
-                .reaches(drive, levels, [decay, first.0]);
-            if elapsed < first.0 {
-                first = (elapsed, Some(block));
+                .reaches(drive, levels, [from, first.elapsed]);
+            if elapsed < first.elapsed {
+                first = FirstReached {
+                    elapsed,
+                    block: Some(block),
+                };
             }
             lanes &= lanes - 1;
         }
@@ -466,7 +482,6 @@ mod tests {
     use super::split::BlockMotion;
     use super::*;
     use crate::model::Parameters;
-    use crate::solver::event_driven::slider::Slot;
     use pulp::Scalar512b as Baseline;
 
     #[test]
@@ -510,15 +525,15 @@ mod tests {
                 x >= chain.upper[row][lane] + 1e-16 || x <= chain.lower[row][lane] - 1e-16
             };
             for horizon in [1e-4, 1e-3, 4e-3, 0.01, 0.1, f64::INFINITY] {
-                let (elapsed, reached) =
+                let FirstReached { elapsed, block } =
                     first_reached(Baseline, chain, &split, &drive, [1e-6, horizon]);
-                assert!(reached.is_some() || elapsed == horizon);
+                assert!(block.is_some() || elapsed == horizon);
                 let sample = |i: u32| 1e-6 + 0.999 * (elapsed - 1e-6) * f64::from(i) / 100.0;
                 let mut samples = (0..21).flat_map(|block| (0..100).map(move |i| (block, i)));
                 let early =
                     samples.find(|&(block, i)| elapsed > 1e-6 && is_beyond(block, sample(i)));
                 assert_eq!(early, None, "{elapsed} s, at {drive:?}");
-                if let Some(block) = reached {
+                if let Some(block) = block {
                     assert!(
                         (1..100).any(|i| is_beyond(block, elapsed + 1e-7 * f64::from(i))),
                         "{block} is not there"

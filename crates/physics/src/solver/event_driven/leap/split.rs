@@ -90,14 +90,17 @@ impl Split {
         }
     }
 
-    /// Largest speed of a block on the driven solution, in m/s, and how far a force on it displaces it at most, per
-    /// mass, in s².
+    /// Largest speed of a block on the driven solution, in m/s.
     #[inline(always)]
-    pub fn speed_and_compliance(&self, chain: &Chain, drive: &Harmonic, block: usize) -> [f64; 2] {
-        let Slot { row, lane } = chain.layout.slot(block);
+    pub fn largest_speed(&self, drive: &Harmonic, Slot { row, lane }: Slot) -> f64 {
         let row = &self.rows[row];
-        let speed = row.rate[0][lane] + drive.angular_frequency * row.swing[lane];
-        [speed, row.compliance[lane]]
+        row.rate[0][lane] + drive.angular_frequency * row.swing[lane]
+    }
+
+    /// How far a force on a block displaces it at most, per mass, in s².
+    #[inline(always)]
+    pub fn compliance(&self, Slot { row, lane }: Slot) -> f64 {
+        self.rows[row].compliance[lane]
     }
 
     /// Splits a state, and bounds the free motion. Returns the largest bound on a displacement, in m; `None` if the

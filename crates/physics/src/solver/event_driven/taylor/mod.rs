@@ -20,7 +20,7 @@ use super::Integration;
 use super::event::{own_terms, term_beside};
 use super::slider::{BlockLayout, Chain, Slider, Slot};
 use crate::model::Change;
-use crate::solver::ledger::Audit;
+use crate::solver::ledger::{Audit, Node};
 use crate::solver::polynomial;
 use crate::solver::segment::{ForceAt, ForcePath, PolynomialPath, Segment};
 use crate::solver::{Observer, SimulationError};
@@ -68,6 +68,15 @@ impl StepControl {
     }
 }
 
+/// A contact event to come in the step.
+#[derive(Clone, Copy, Debug)]
+struct EventAhead {
+    change: Change,
+    block: usize,
+    /// Where in the step, from 0 to 1.
+    s: f64,
+}
+
 /// The step in progress: its series, and what may still happen in it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Step {
@@ -79,10 +88,10 @@ pub(super) struct Step {
     force: Vec<f64>,
     /// Bound on the second derivative of F_S by s, in N.
     curvature_bound: f64,
-    /// Row and lane of every block that may break.
-    candidates: Vec<(usize, usize)>,
-    /// Breaks to come: where in the step, and the block.
-    breaks: Vec<(f64, usize)>,
+    /// The blocks that may break.
+    candidates: Vec<Slot>,
+    /// Breaks to come.
+    breaks: Vec<EventAhead>,
     /// Blocks whose series an event has changed.
     amended: Vec<usize>,
     /// Work space for the coefficients of a block.
@@ -110,39 +119,43 @@ impl Step {
 
     /// Notes and returns where in a part of the step a block first breaks; infinite if it does not.
     fn look_for_break(&mut self, chain: &Chain, block: usize, from: f64, end: f64) -> f64 {
-        let Slot { row, lane } = chain.layout.slot(block);
+        let slot = chain.layout.slot(block);
+        let Slot { row, lane } = slot;
         let levels = [chain.lower[row][lane], chain.upper[row][lane]];
-        let [lowest, highest] = self.series.range(row, lane);
+        let [lowest, highest] = self.series.range(slot);
         if lowest > levels[0] && highest < levels[1] {
             return f64::INFINITY;
         }
-        self.series.block(row, lane, &mut self.coefficients);
+        self.series.block(slot, &mut self.coefficients);
         let Some(s) = polynomial::first_exit(&mut self.coefficients, levels, from, end) else {
             return f64::INFINITY;
         };
-        self.breaks.push((s, block));
+        self.breaks.push(EventAhead {
+            change: Change::Break,
+            block,
+            s,
+        });
         s
     }
 
     /// The first break noted; ties go to the smaller block.
-    fn first_break(&self) -> Option<(f64, usize)> {
+    fn first_break(&self) -> Option<EventAhead> {
         self.breaks
             .iter()
             .copied()
-            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+            .min_by(|a, b| a.s.total_cmp(&b.s).then(a.block.cmp(&b.block)))
     }
 
     /// Value, slope and half the second derivative of a block's displacement at s, in m.
     fn expanded(&mut self, chain: &Chain, block: usize, s: f64) -> [f64; 3] {
-        let Slot { row, lane } = chain.layout.slot(block);
-        self.series.block(row, lane, &mut self.coefficients);
+        let slot = chain.layout.slot(block);
+        self.series.block(slot, &mut self.coefficients);
         polynomial::expanded(&self.coefficients, s)
     }
 
     /// Adds coefficients to the series of a block, and changes F_S accordingly.
     fn amend(&mut self, chain: &Chain, block: usize, coefficients: [f64; MERGED_ORDER + 1]) {
-        let Slot { row, lane } = chain.layout.slot(block);
-        self.series.add(row, lane, &coefficients);
+        self.series.add(chain.layout.slot(block), &coefficients);
         self.amended.push(block);
         if block == 0 {
             for (force, coefficient) in self.force.iter_mut().zip(coefficients) {
@@ -172,11 +185,11 @@ impl Integration<'_> {
         let mut end = self.look_for_breaks(1.0);
         loop {
             let event = self.next_event(done, end.min(cut));
-            let s = event.map_or(end.min(cut), |(_, _, s)| s);
+            let s = event.map_or(end.min(cut), |event| event.s);
             force = self.report([done, s], force, observer);
             done = s;
             self.frame.time = start + s * length;
-            let Some((change, block, _)) = event else {
+            let Some(EventAhead { change, block, .. }) = event else {
                 break;
             };
             if change == Change::Attach {
@@ -193,7 +206,7 @@ impl Integration<'_> {
             }
             end = end.min(s + window);
             while let Some(block) = self.step.amended.pop() {
-                self.step.breaks.retain(|&(_, other)| other != block);
+                self.step.breaks.retain(|ahead| ahead.block != block);
                 self.step.look_for_break(&self.slider.chain, block, s, end);
                 if block == 0 {
                     // The same force from here on, as another polynomial.
@@ -222,8 +235,8 @@ impl Integration<'_> {
         } = &mut self.step;
         self.kernels.reachable(chain, series, candidates);
         self.step.breaks.clear();
-        while let Some((row, lane)) = self.step.candidates.pop() {
-            let block = chain.layout.block(row, lane);
+        while let Some(slot) = self.step.candidates.pop() {
+            let block = chain.layout.block(slot);
             let found = self.step.look_for_break(chain, block, 0.0, end);
             // Events this long after the first are left to the next step.
             end = end.min(found + self.control.break_window / self.step.length);
@@ -231,16 +244,21 @@ impl Integration<'_> {
         end
     }
 
-    /// The first event from `done` to `end`: what happens, at which block, and where in the step.
-    fn next_event(&self, done: f64, end: f64) -> Option<(Change, usize, f64)> {
+    /// The first event from `done` to `end` in the step.
+    fn next_event(&self, done: f64, end: f64) -> Option<EventAhead> {
         let interface = &self.slider.interface;
         let Step { start, length, .. } = self.step;
         let due = ((interface.next_reattachment() - start) / length).max(done);
         match self.step.first_break() {
-            Some((s, block)) if s <= due && s <= end => Some((Change::Break, block, s)),
-            _ if due <= end => interface
-                .next_reattachment_by(f64::INFINITY)
-                .map(|(_, block)| (Change::Attach, block, due)),
+            Some(ahead) if ahead.s <= due && ahead.s <= end => Some(ahead),
+            _ if due <= end => {
+                let next = interface.next_reattachment_by(f64::INFINITY)?;
+                Some(EventAhead {
+                    change: Change::Attach,
+                    block: next.block(),
+                    s: due,
+                })
+            }
             _ => None,
         }
     }
@@ -275,8 +293,8 @@ impl Integration<'_> {
         let mut probe = state.clone();
         let nodes = audit.quadrature.nodes(series.order).iter();
         let mean_square: f64 = nodes
-            .map(|&(s, weight)| {
-                let s = first + s * (last - first);
+            .map(|&Node { at, weight }| {
+                let s = first + at * (last - first);
                 self.kernels.evaluate(series, s, length, &mut probe);
                 let velocities = probe.velocity.iter().flat_map(|row| row.iter());
                 weight * velocities.map(|v| v * v).sum::<f64>()

@@ -9,7 +9,7 @@
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::event_driven::moving_frame::StepDrive;
-use crate::solver::event_driven::slider::{BlockLayout, Chain, FIRST_BLOCK, State};
+use crate::solver::event_driven::slider::{BlockLayout, Chain, FIRST_BLOCK, Slot, State};
 use crate::solver::polynomial::{INVERSE, MAX_COEFFICIENTS};
 use pulp::Scalar512b;
 
@@ -69,7 +69,7 @@ impl TaylorSeries {
     }
 
     /// Writes the coefficients Y_p/p! of one block, in m.
-    pub fn block(&self, row: usize, lane: usize, coefficients: &mut Vec<f64>) {
+    pub fn block(&self, Slot { row, lane }: Slot, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
         let mut at = row;
         for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
@@ -92,7 +92,7 @@ impl TaylorSeries {
     }
 
     /// Adds to the first coefficients Y_p/p! of one block, in m. The order is at least that of the last.
-    pub fn add(&mut self, row: usize, lane: usize, coefficients: &[f64]) {
+    pub fn add(&mut self, Slot { row, lane }: Slot, coefficients: &[f64]) {
         let mut at = row;
         let mut factorial = 1.0;
         let mut order = 0.0;
@@ -106,7 +106,7 @@ impl TaylorSeries {
     }
 
     /// Lower and upper bound on the displacement of one block within the step, in m.
-    pub fn range(&self, row: usize, lane: usize) -> [f64; 2] {
+    pub fn range(&self, Slot { row, lane }: Slot) -> [f64; 2] {
         let start = self.terms[row][lane];
         let excursion = self.excursion[row][lane];
         [start - excursion, start + excursion]
@@ -169,13 +169,13 @@ pub fn evaluate<S: Simd, const R: usize>(
     }
 }
 
-/// Row and lane of every block that may reach a break position within the step.
+/// The blocks that may reach a break position within the step.
 #[inline(always)]
 pub fn reachable<S: Simd, const R: usize>(
     simd: S,
     chain: &Chain,
     series: &mut TaylorSeries,
-    blocks: &mut Vec<(usize, usize)>,
+    blocks: &mut Vec<Slot>,
 ) {
     let rows = series.rows_in::<R>();
     let (starts, later) = series.terms.split_at(rows);
@@ -200,7 +200,8 @@ pub fn reachable<S: Simd, const R: usize>(
         let below = simd.load(&chain.lower[r]).reaches(x.minus(excursion));
         let mut reached = above | below;
         while reached != 0 {
-            blocks.push((r, reached.trailing_zeros() as usize));
+            let lane = reached.trailing_zeros() as usize;
+            blocks.push(Slot { row: r, lane });
             reached &= reached - 1;
         }
     }
