@@ -16,14 +16,10 @@ INSTEAD = {
         "plot": "with trace=True write one.trace().to_pandas().plot('time', 'force'), or `stickslip simulate --plot one.svg`",
         "to_pandas": "write one.slips().to_pandas()",
     },
-    "Plot": {
-        **{"phi_eta": "write phase_eta", "tau_T": "write intervals", "tau_histograms": "write histograms"},
-        **dict.fromkeys(
-            ("overview", "drag", "edges", "locking_map", "regime_map", "triggering"),
-            "`stickslip plot {_results.directory}` draws it",
-        ),
-    },
+    "Plot": {"phi_eta": "write phase_eta", "tau_T": "write intervals", "tau_histograms": "write histograms"},
 }
+#: What is elsewhere, by class.
+ELSEWHERE = {"Plot": "; `stickslip plot {_results.directory}` draws others"}
 
 
 class Guessed:
@@ -33,7 +29,8 @@ class Guessed:
         def __getattr__(self, name):
             known = [one for one in dir(self) if not one.startswith("_")]
             near = get_close_matches(name, known, 1)
-            answer = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+            elsewhere = ELSEWHERE.get(type(self).__name__, "")
+            answer = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}{elsewhere}"
             if name in vars(self).get("job", ()):
                 answer = f"write one.job[{name!r}]"
             answer = INSTEAD[type(self).__name__].get(name, answer).format(**vars(self))

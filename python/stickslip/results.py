@@ -79,7 +79,7 @@ class Results(Guessed):
         return self._table("triggers", columns)
 
     def pulses(self, columns: Sequence[str] | None = None) -> Table:
-        """One row per pulse and per tenth of the cycle in which it begins: mean advance and share of triggered slips."""
+        """One row per pulse and per tenth of the interval in which it begins: mean advance and share of triggered slips."""
         return self._table("pulses", columns)
 
     def histograms(self, columns: Sequence[str] | None = None) -> Table:

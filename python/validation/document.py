@@ -23,7 +23,7 @@ CAPTIONS = {
     "contacts": "Statistics of slips by the number of contacts per block",
     "disorder": "Statistics of slips by the spread of the thresholds",
     "stiff-drive-phase": "Slip phases against η with a stiff drive, and the backbone of Eq. 2",
-    "triggering": "Advance of slips against the place of a pulse in the cycle, and triggered slips",
+    "triggering": "Advance of slips against where in the interval a pulse begins, and triggered slips",
     "tide-phase": "Mean phase of slips against the period over the interval of the control",
     "tide-excess": "Excess of the resultant length against the period over the interval of the control",
     "correlation": "Resultant length against η at four amplitudes, beside random loads and the drive alone",

@@ -29,7 +29,7 @@ def texts(found: dict[float, Estimate], digits: int) -> str:
 
 
 def of_thirds(rows: pandas.DataFrame) -> Estimate:
-    """The excess of the share triggered in the last third of the cycle, less that in the middle third."""
+    """The excess of the share triggered in the last third of the interval, less that in the middle third."""
     rows = rows.assign(third=(3 * rows["place"]).astype(int), more=rows["triggered"] - rows["triggered_drive"])
 
     def less(rows: pandas.DataFrame) -> float:
@@ -86,7 +86,7 @@ def pulses(results: Path) -> Section:
     )
     later = {frequency: of_thirds(mine).among(COMPARISONS) for frequency, mine in by_frequency.items()}
     section.check(
-        "excess over the drive alone, most late in the cycle",
+        "excess over the drive alone, most late in the interval",
         "excess of the share greater in the last third than in the middle third, at 1 µm",
         f"by {texts(later, 2)}",
         *(found.lies(above=0) for found in later.values()),
@@ -115,7 +115,7 @@ def pulses(results: Path) -> Section:
         for frequency, mine in by_frequency.items()
     }
     section.check(
-        "in the middle of the cycle they hold slips up",
+        "in the middle of the interval they hold slips up",
         "mean advance below 0 in the middle third, at 1 µm",
         f"{texts(held, 2)} ⟨τ⟩",
         *(found.lies(below=0) for found in held.values()),
@@ -134,7 +134,7 @@ def pulses(results: Path) -> Section:
         " excess."
     )
     section.why = (
-        "weak pulses do what the drive alone does; in the middle of the cycle strong ones hold slips up at 29 Hz, and"
+        "weak pulses do what the drive alone does; in the middle of the interval strong ones hold slips up at 29 Hz, and"
         " have the greatest excess at 116 Hz"
     )
     return section

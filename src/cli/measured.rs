@@ -92,7 +92,7 @@ impl Arguments {
 pub fn measured(arguments: &Arguments) -> Result<Exit> {
     let refused = |error: anyhow::Error| UsageError(shown_text(&format!("{error:#}")).to_string());
     let request = arguments.request().map_err(refused)?;
-    // A library that panics on a damaged file has nothing to say to a user.
+    // Reading catches the panic of a library on a damaged file; its message is of no use to a user.
     let hook = panic::take_hook();
     panic::set_hook(Box::new(|_| ()));
     let outcome = Experiment::read(&arguments.files, &request);

@@ -439,10 +439,10 @@ fn table_of_pulses(results: &Results<'_>, pulses: &[PulseRow]) -> Result<String>
     ))
 }
 
-/// What pulses did, wherever in the cycle they begin.
+/// What pulses did, wherever in the interval they begin.
 fn pulses(results: &Results<'_>) -> Result<Vec<PulseRow>> {
     let mut pulses: Vec<PulseRow> = read_optional(results.layout())?;
-    pulses.retain(PulseRow::is_of_whole_cycle);
+    pulses.retain(PulseRow::is_of_whole_interval);
     Ok(pulses)
 }
 

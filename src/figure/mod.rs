@@ -1,4 +1,4 @@
-//! Figures: reduced data -> pictures, as SVG, PNG and PDF bytes. `files.rs` alone reads and writes results directories.
+//! Figures: reduced data -> pictures, as SVG, PNG and PDF bytes. `files.rs` alone writes them.
 //!
 //! ```text
 //! standing.rs            -> a file for each standing figure: its data, its panels; `None` where the data do not fit

@@ -60,13 +60,19 @@ fn parts(color: &Color) -> [f32; 3] {
     }
 }
 
+struct Letter {
+    letter: char,
+    /// In units of 1/1000 em.
+    width: f32,
+}
+
 struct PdfPage {
     content: Content,
     /// Numbers of the letters in the embedded font.
     glyphs: GlyphRemapper,
-    /// Letter and width in ems / 1000 of each number.
-    letters: BTreeMap<u16, (char, f32)>,
-    /// Each is a graphics state.
+    /// By number.
+    letters: BTreeMap<u16, Letter>,
+    /// One graphics state for each.
     opacities: Vec<f64>,
 }
 
@@ -233,7 +239,10 @@ impl PdfPage {
             let glyph = FACE.glyph_index(letter).unwrap_or(GlyphId(0));
             let advance = EM * f32::from(FACE.glyph_hor_advance(glyph).unwrap_or(0)) / em;
             let code = self.glyphs.remap(glyph.0);
-            self.letters.entry(code).or_insert((letter, advance));
+            self.letters.entry(code).or_insert(Letter {
+                letter,
+                width: advance,
+            });
             codes.extend(code.to_be_bytes());
             width += advance;
         }
@@ -308,7 +317,7 @@ impl PdfPage {
         cid.cid_to_gid_map_predefined(Name(b"Identity"))
             .default_width(0.0);
         let mut widths = cid.widths();
-        for (&code, &(_, width)) in &self.letters {
+        for (&code, &Letter { width, .. }) in &self.letters {
             widths.same(code, code, width);
         }
         widths.finish();
@@ -332,7 +341,7 @@ impl PdfPage {
         described.cap_height(ems(FACE.capital_height().unwrap_or(FACE.ascender())));
         described.finish();
         let mut cmap: UnicodeCmap = UnicodeCmap::new(Name(b"Letters"), SYSTEM);
-        for (&code, &(letter, _)) in &self.letters {
+        for (&code, &Letter { letter, .. }) in &self.letters {
             cmap.pair(code, letter);
         }
         pdf.cmap(to_unicode, &cmap.finish());

@@ -1,5 +1,6 @@
-//! Triggering: how much earlier slips come after a pulse, against where in the cycle it begins, a panel for each
-//! amplitude; and the share of triggered slips against the amplitude. Both beside the drive alone.
+//! Triggering: the mean advance of slips by a pulse against where in the control's interval it begins, a panel for each
+//! amplitude; and the share of triggered slips against the amplitude. What the drive alone does is dashed
+//! ([`Quantity`] finds it by the class of a column).
 
 use super::chart::{Chart, ChartParts};
 use super::frame::{LEFT, Layout};
@@ -21,13 +22,15 @@ const COLUMNS: usize = 2;
 const GAP: f64 = 20.0;
 /// Panels of amplitudes, at most.
 const MAX_AMPLITUDES: usize = 5;
-/// Where in the cycle the pulses of a row begin.
+/// Where in the control's interval the pulses of a row begin.
 const PLACE: &str = "(place_low + place_high) / 2";
 
 /// `None` without pulses, or if they differ in more than where they begin, amplitude and period.
 pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
-    let (whole, tenths): (Vec<PulseRow>, Vec<PulseRow>) =
-        rows.iter().cloned().partition(PulseRow::is_of_whole_cycle);
+    let (whole, tenths): (Vec<PulseRow>, Vec<PulseRow>) = rows
+        .iter()
+        .cloned()
+        .partition(PulseRow::is_of_whole_interval);
     let others = |row: &PulseRow| Parameters {
         pulse_cycles: row.pulse().pulse_cycles,
         ..row.pulse().without_modulation()
@@ -70,7 +73,7 @@ pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
     Some(panel::draw(NAME, &noted, layout, &legend, panels))
 }
 
-/// A series for each frequency: advances over the cycle, with a panel for each value of a column; else shares from 0 on.
+/// A series for each frequency: advances over the interval, with a panel for each value of a column; else shares from 0 on.
 fn parts_of(rows: &[PulseRow], [x, y]: [&str; 2], panels: Option<&str>) -> Option<ChartParts> {
     let series = [Values::of(rows, FREQUENCY).ok()?];
     let mut x = Quantity::of(rows, "x", x).ok()?;

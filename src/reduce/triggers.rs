@@ -22,8 +22,8 @@ const NO_PULSE: f64 = 1e-12;
 
 /// Seeds that a mean needs for an interval.
 const MIN_SEEDS: usize = 8;
-/// Parts of the cycle that have means of their own.
-const PARTS_OF_CYCLE: u32 = 10;
+/// Parts of the control's interval that have means of their own.
+const PARTS_OF_INTERVAL: u32 = 10;
 
 words! {
     /// Why a job does not say what its pulse did.
@@ -43,7 +43,7 @@ columns! {
         set_id: String = "", "hash of all that defines a job but the seed";
         parameters: Selected<All>;
         tau_control: Option<f64> = "s", "mean interval of the control; null without a control";
-        cycle: Option<f64> = "s", "interval of the control in which the pulse begins";
+        control_interval: Option<f64> = "s", "interval of the control in which the pulse begins";
         place: Option<f64> = "", "share of it elapsed by then";
         advance: Option<f64> = "s", "how much earlier the onset of the next slip comes";
         advance_drive: Option<f64> = "s", "the same by the drive alone";
@@ -59,13 +59,13 @@ columns! {
 tables! { TriggerRow = "triggers", "One row per job with a pulse, if there are any"; }
 
 columns! {
-    /// Pulses that differ in their start and seed alone, and begin in the same part of the cycle. Parameters are those of
-    /// the first.
+    /// Pulses that differ in their start and seed alone, and begin in the same part of an interval of the control.
+    /// Parameters are those of the first.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct PulseRow {
         parameters: Selected<AllButSeed>;
-        place_low: f64 = "", "share of the cycle from which on they begin";
-        place_high: f64 = "", "the share before which they begin; 0 and 1: the whole cycle";
+        place_low: f64 = "", "elapsed fraction of the interval of the control from which on they begin";
+        place_high: f64 = "", "the fraction before which they begin; 0 and 1: the whole interval";
         jobs: u64 = "", "jobs with such a pulse and a slip to compare";
         advance_mean: Option<f64> = "", "mean advance over the mean interval of the control",
             "advance / ⟨τ⟩" "Advance / ⟨τ⟩", Class::Mean;
@@ -82,11 +82,11 @@ columns! {
 }
 
 tables! {
-    PulseRow = "pulses", "One row per pulse, and one per tenth of the cycle in which it begins; `pulse_start` is that of the first";
+    PulseRow = "pulses", "One row per pulse, and one per tenth of the interval of the control in which it begins; `pulse_start` is that of the first";
 }
 
 impl PulseRow {
-    pub fn is_of_whole_cycle(&self) -> bool {
+    pub fn is_of_whole_interval(&self) -> bool {
         self.place_high - self.place_low > 0.5
     }
 
@@ -99,9 +99,9 @@ impl PulseRow {
     }
 }
 
-/// The cycle of a control in which a pulse begins, with what the drive alone makes of its next slip. Times in s.
+/// The interval of a control in which a pulse begins, with what the drive alone makes of its next slip. Times in s.
 #[derive(Clone, Copy, Debug)]
-struct Cycle {
+struct ControlInterval {
     /// Onsets before and after the pulse begins, and the one after, if there is one.
     last: f64,
     free: f64,
@@ -112,7 +112,7 @@ struct Cycle {
     pulse: [f64; 2],
 }
 
-impl Cycle {
+impl ControlInterval {
     /// Of the slips of the control of a job with these parameters, in order.
     fn of(parameters: &Parameters, control: &[Times]) -> Result<Self, Excluded> {
         let drive = Drive::new(parameters);
@@ -143,7 +143,7 @@ impl Cycle {
         let following = self.following.zip(onsets.get(self.number + 1));
         let is_triggered = |onset: f64| Some(onset <= end && self.free > end);
         Ok(TriggerRow {
-            cycle: Some(interval),
+            control_interval: Some(interval),
             place: Some((start - self.last) / interval),
             advance: Some(self.free - next),
             advance_drive: Some(self.free - self.passage),
@@ -165,8 +165,8 @@ pub(super) fn trigger_rows(set: &Gathered, explained: &Explained) -> Vec<Trigger
         let of_job = slips.of_job(seed).iter();
         let onsets = of_job.map(|slip| slip.onset).collect::<Vec<_>>();
         let control = explained.control.get(&seed).ok_or(Excluded::NoControl);
-        let cycle = control.and_then(|control| Cycle::of(&jobs.parameters, control));
-        let row = cycle.and_then(|cycle| cycle.row(&onsets));
+        let interval = control.and_then(|control| ControlInterval::of(&jobs.parameters, control));
+        let row = interval.and_then(|interval| interval.row(&onsets));
         let parameters = jobs.parameters.with_seed(seed);
         TriggerRow {
             set_id: jobs.set_id.clone(),
@@ -224,8 +224,8 @@ impl TriggerRow {
 
 /// The rows of pulses, in the order of `rows`.
 pub(super) fn pulse_rows(rows: &[TriggerRow]) -> Vec<PulseRow> {
-    let tenth = |part: u32| f64::from(part) / f64::from(PARTS_OF_CYCLE);
-    let parts = (0..PARTS_OF_CYCLE).map(|part| [tenth(part), tenth(part + 1)]);
+    let tenth = |part: u32| f64::from(part) / f64::from(PARTS_OF_INTERVAL);
+    let parts = (0..PARTS_OF_INTERVAL).map(|part| [tenth(part), tenth(part + 1)]);
     let parts: Vec<[f64; 2]> = once([0.0, 1.0]).chain(parts).collect();
     let pulses = Pulses::of(rows);
     let of_pulse = |pulses: &Pulses<'_>| {
@@ -273,7 +273,7 @@ impl<'a> Pulses<'a> {
         all
     }
 
-    /// Those that begin between two shares of the cycle.
+    /// Those that begin between two fractions of the interval.
     pub fn between(&self, [low, high]: [f64; 2]) -> Self {
         let mut some = self.clone();
         some.rows
@@ -371,8 +371,8 @@ mod tests {
             duration: 0.006,
         };
         let parameters = pulsed(start, amplitude);
-        let cycle = Cycle::of(&parameters, &CONTROL.map(slip));
-        let row = cycle.and_then(|cycle| cycle.row(&onsets));
+        let interval = ControlInterval::of(&parameters, &CONTROL.map(slip));
+        let row = interval.and_then(|interval| interval.row(&onsets));
         TriggerRow {
             parameters: Selected::new(parameters),
             ..row.unwrap_or_else(TriggerRow::excluded)
@@ -393,7 +393,7 @@ mod tests {
     fn the_next_onset_is_compared_with_that_of_the_control_and_with_the_drive_alone() {
         let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
         let triggered = row(1.15, 1e-6, &[1.16, 1.28]);
-        assert!(near(triggered.cycle, 0.11) && near(triggered.place, 0.05 / 0.11));
+        assert!(near(triggered.control_interval, 0.11) && near(triggered.place, 0.05 / 0.11));
         assert!(near(triggered.advance, 0.05) && near(triggered.next_advance, 0.02));
         assert_eq!(triggered.triggered, Some(true));
         // The drive rises by 2 Δ = 2 µm, as far as in 20 ms: too early for a slip 60 ms later.
@@ -479,7 +479,7 @@ mod tests {
         rows.extend((0..20).map(|seed| of_seed(seed, 1e-7, 0.01 + 1e-4 * seed as f64)));
         let pulses = pulse_rows(&rows);
         let places = pulses.iter().map(|row| (row.place_low, row.jobs));
-        // All begin in the middle of the cycle.
+        // All begin in the middle of the interval.
         assert_eq!(
             places.collect::<Vec<_>>(),
             [(0.0, 1), (0.4, 1), (0.0, 20), (0.4, 20)]

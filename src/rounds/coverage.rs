@@ -380,13 +380,13 @@ fn of_backbone(pool: &Pool) -> [f64; 2] {
 
 /// Seeds of a repetition of pulses.
 const SEEDS_OF_PULSES: [usize; 3] = [8, 16, 32];
-/// Parts of the cycle in which pulses begin, by name.
+/// Parts of the interval in which pulses begin, by name.
 const THIRDS: [(&str, f64); 3] = [("early", 0.0), ("middle", 1.0 / 3.0), ("late", 2.0 / 3.0)];
 
 /// Shares of triggered slips below this are left out.
 const MIN_TRIGGERED: f64 = 5e-4;
 
-/// A line for each pulse and third of the cycle: the share of slips that are triggered, and by numbers of seeds the
+/// A line for each pulse and third of the interval: the share of slips that are triggered, and by numbers of seeds the
 /// coverage of its intervals and of those of its excess over the drive alone.
 fn of_pulses(rows: &[TriggerRow]) -> String {
     let mut lines = vec![
@@ -686,7 +686,7 @@ fn coverage_is_measured() {
          In 100 repetitions the interval of the mean phase of all slips holds the true value in {slips:.1} %,\n\
          that of the mean of the sets that have a phase in {means:.1} %.\n\n\
          ## Triggered slips\n\n\
-         Shares of slips that pulses trigger, by the third of the cycle in which pulses begin, and coverage with {seeds}\n\
+         Shares of slips that pulses trigger, by the third of the interval in which pulses begin, and coverage with {seeds}\n\
          of 640 seeds. Shares that round to 0.000 are left out.\n\n{}\n\n\
          {}",
         include_str!("coverage.md"),

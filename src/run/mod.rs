@@ -7,7 +7,7 @@
 //!             the log and a display
 //! ```
 //!
-//! Other threads than the calling one use no disk. A killed run resumes by looking which part files are
+//! Only the calling thread touches results on the disk. A killed run resumes by looking which part files are
 //! missing. The same command, started several times, shares the parts. An adaptive sweep runs in rounds: the worker
 //! that first finds all parts done adds those of the next round (`rounds/`), and no worker ends before the last round.
 //! Contract: the bytes of the tables depend on neither threads nor workers nor interruptions. Memory: the parts with a
@@ -144,16 +144,16 @@ impl Joined<'_> {
         let mut events = Events { log: None, display };
         let mut report = RunReport::default();
         let mut retry_failed = self.options.retry_failed;
-        let mut round = (Cow::Borrowed(self.results), Cow::Borrowed(self.parts));
+        let mut results = Cow::Borrowed(self.results);
+        let mut parts = Cow::Borrowed(self.parts);
         loop {
-            let (results, parts) = &round;
             let retry = Retry {
                 all: retry_failed,
                 memory: self.allowed_memory,
             };
-            let pending = Pending::look_up(results, parts, retry)?;
+            let pending = Pending::look_up(&results, &parts, retry)?;
             self.run_parts(&pending, kernel, &mut events, &mut report)?;
-            results.tidy_spill(parts)?;
+            results.tidy_spill(&parts)?;
             // Jobs that failed in this run would fail again.
             retry_failed = false;
             if report.jobs_left > 0 {
@@ -166,17 +166,16 @@ impl Joined<'_> {
             let Some(next) = results.next_round(self.member, rounds::next)? else {
                 break;
             };
-            let parts = next.plan().outlines().collect();
-            round = (Cow::Owned(next), Cow::Owned(parts));
+            parts = Cow::Owned(next.plan().outlines().collect());
+            results = Cow::Owned(next);
         }
-        let (results, parts) = &round;
         report.rounds = results.rounds_so_far();
         if report.jobs_left > 0 {
-            let pending = Pending::look_up(results, parts, Retry::default())?;
+            let pending = Pending::look_up(&results, &parts, Retry::default())?;
             pending.look_at_deaths()?;
             report.marked = pending.marked();
         } else if self.member.others()?.is_empty() {
-            let pending = Pending::look_up(results, parts, Retry::default())?;
+            let pending = Pending::look_up(&results, &parts, Retry::default())?;
             report.jobs_failed = pending.overview(true, |_, _, _| ())?.jobs_failed;
         }
         events.send(&RunEvent::Finished(report.clone()))?;

@@ -21,7 +21,7 @@ pub struct Status {
     #[serde(flatten)]
     pub overview: Overview,
     pub workers: Vec<Present>,
-    /// Measured over predicted CPU time so far, by the logs; null before the first part.
+    /// Wall time of finished parts over their predicted CPU time, by the logs; null before the first.
     pub pace: Option<f64>,
     /// Predicted wall time for the missing jobs, in s, at this pace on the present or last threads; null like the pace.
     pub time_left: Option<f64>,
@@ -62,7 +62,7 @@ fn jobs_kept(pending: &Pending<'_>) -> u64 {
     kept.count() as u64
 }
 
-/// How far a directory is, with this many failed jobs at most.
+/// What is done and what is missing, with at most this many of the failed jobs.
 pub fn status(results: &Results<'_>, max_failures: u64) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
     let mut failure_reasons = Reasons::default();

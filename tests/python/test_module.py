@@ -540,8 +540,8 @@ def test_a_column_of_a_table_has_its_name(opened):
         ("results.plot.phi_eta()", "write phase_eta"),
         ("results.plot('tau-T')", "write intervals"),
         ("results.plot.tau_histograms()", "write histograms"),
-        ("results.plot.overview()", "`stickslip plot {directory}` draws it"),
-        ("results.plot('locking-map')", "`stickslip plot {directory}` draws it"),
+        ("results.plot.overview()", "`stickslip plot {directory}` draws others"),
+        ("results.plot('locking-map')", "`stickslip plot {directory}` draws others"),
         ("one.plot()", r"trace=True write one.trace\(\).to_pandas\(\).plot\('time', 'force'\), or `stickslip simulate --plot"),
         ("one.mean_friction", r"write one.job\['mean_friction'\]"),
         ("one.slip()", r"Simulation has no slip: did you mean slips\?"),
@@ -560,4 +560,4 @@ def test_what_answers_to_guesses_name_is_there(opened):
     assert opened.plot("intervals").get_ylabel() == opened.plot.intervals().get_ylabel()
     sources = "".join(path.read_text() for path in (ROOT / "src" / "figure").glob("*.rs"))
     figures = set(re.findall(r'^pub\(super\) const [A-Z]+: &str = "([\w-]+)";', sources, re.M))
-    assert {figure.replace("-", "_") for figure in figures} == set(guesses.INSTEAD["Plot"])
+    assert {figure.replace("-", "_") for figure in figures} > set(guesses.INSTEAD["Plot"])

@@ -65,7 +65,7 @@ impl<'a> Host<'a> {
         }
     }
 
-    /// What it believes of a path and did not forget.
+    /// What it believes of a path and saw lately.
     fn believed<T>(&self, path: &Path, of: impl FnOnce(&Belief) -> Option<T>) -> Option<T> {
         let beliefs = self.beliefs()?;
         let (since, belief) = beliefs.get(path)?;
@@ -82,7 +82,7 @@ impl<'a> Host<'a> {
         }
     }
 
-    /// Something that this host does to paths, which it then knows.
+    /// Something that this host does to paths: what it believed of them is gone.
     fn change<T>(
         &self,
         action: &'static str,

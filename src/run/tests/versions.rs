@@ -19,7 +19,7 @@ const SEEDS: u64 = 3;
 /// A column that another version did not have.
 const MISSING: &str = "grid_steps";
 
-/// Makes a directory that of another version of the model and the plan, without a column.
+/// Rewrites a directory as another version of model and plan would have left it, without a column.
 fn make_older(root: &Path) {
     let layout = Layout::new(&Disk, root);
     let results = Results::read(&layout).unwrap();

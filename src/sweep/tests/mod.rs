@@ -317,7 +317,7 @@ fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
 
 #[test]
 fn what_an_earlier_sweep_did_is_kept_and_the_rest_belongs_to_the_new_one() {
-    // Dear enough for a part each.
+    // Expensive enough for a part each.
     let record = "[record]\nslips = 10000";
     let wide = sweep(&format!(
         "[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = 4 }}\n{record}"

@@ -45,7 +45,7 @@ pub struct Disorder {
     generator: ChaCha8Rng,
     mean_threshold: f64,
     threshold_deviation: f64,
-    mean_stiffness: f64,
+    contact_stiffness: f64,
     reattachment_time: f64,
     /// The features for which the loop over draws is compiled.
     features: Arch,
@@ -68,7 +68,7 @@ impl Disorder {
             generator: ChaCha8Rng::seed_from_u64(parameters.seed),
             mean_threshold: parameters.mean_threshold,
             threshold_deviation: parameters.threshold_deviation,
-            mean_stiffness: parameters.contact_stiffness,
+            contact_stiffness: parameters.contact_stiffness,
             reattachment_time: parameters.reattachment_time,
             features: Arch::new(),
             buffered: vec![Draws::default(); contacts],
@@ -89,8 +89,8 @@ impl Disorder {
         }
         Contact {
             threshold,
-            stiffness: self.mean_stiffness * (threshold / self.mean_threshold).sqrt(),
-            reach: (threshold * self.mean_threshold).sqrt() / self.mean_stiffness,
+            stiffness: self.contact_stiffness * (threshold / self.mean_threshold).sqrt(),
+            reach: (threshold * self.mean_threshold).sqrt() / self.contact_stiffness,
             delay: draw.delay,
         }
     }

@@ -30,7 +30,7 @@ pub struct Ledger {
     /// Kinetic energy at the end.
     pub kinetic: f64,
     pub damping: f64,
-    /// The part of it that leaps entered: the energy of the free motion that they dropped.
+    /// The part of the damping loss that leaps entered: the energy of the free motion that they dropped.
     pub left_out: f64,
     pub broken: f64,
 }
@@ -64,6 +64,7 @@ pub(super) struct Audit {
     coupling: f64,
     stiffness: f64,
     pub quadrature: Quadrature,
+    /// Without what leaps leave out.
     pub damping: Cell<f64>,
     pub left_out: Cell<f64>,
     pub elastic: Cell<f64>,

@@ -1,15 +1,25 @@
-//! The first pass: from second differences of the force, its noise; from its slopes, the stiffness of the loading; and
-//! whether it was cut off at a largest value. Medians, so that slips do not count.
+//! The first pass over a trace.
+//!
+//! - Noise: the median of the second differences of the force.
+//! - Stiffness of the loading: the median slope of the force against the drive, over as few samples as the noise allows.
+//! - Whether the force was cut off at its largest value: far more samples in a row are equal there than anywhere else.
+//!
+//! Medians ignore slips, which take up few samples.
 
 use super::{Pass, Samples, TraceDrive};
 use crate::model::Drive;
 use std::f64::consts::TAU;
 
-/// Samples over which the slope of the force is taken: the fewest over which it rises by `RISE` times the noise.
+/// Distances in samples over which slopes are taken. The shortest over which the force rises by `RISE` times the noise
+/// gives the stiffness.
 const SLOPES: [usize; 3] = [1, 4, 16];
 const RISE: f64 = 2.0;
 const LONGEST_SLOPE: usize = SLOPES[2];
-/// Samples at the largest force from which on they are cut off there, if no others stay equal for half as long.
+/// Part of the mean velocity that the drive needs for a slope to count: where a modulated drive is slower, the rise is
+/// less and the noise counts more. Below 1, since sampling times are rounded.
+const STEADY: f64 = 0.999;
+/// Equal samples in a row at the largest force that show that it was cut off there, if they are at least twice as many
+/// as at any other force.
 const CLIPPED: u64 = 3;
 
 /// Counts of numbers in classes 1.6 % wide, for a median in constant memory; those below 0 are one class.
@@ -48,24 +58,26 @@ pub struct Survey {
     /// Of the drive, in m/s.
     velocity: f64,
     noise: Histogram,
-    stiffness: [Histogram; 3],
+    stiffness: [Histogram; SLOPES.len()],
     pub low: f64,
     pub high: f64,
     pub samples: u64,
     pub seconds: f64,
-    /// The last samples of the piece before.
+    /// The samples of the present piece, after the last ones of the piece before.
     times: Vec<f64>,
     driven: Vec<f64>,
     forces: Vec<f64>,
-    /// Equal samples in succession: now, and at most at the largest force and at others.
+    /// Equal samples in a row up to the present one.
     equal: u64,
+    /// Most of them at the largest force so far.
     at_high: u64,
+    /// Most of them at any other force.
     elsewhere: u64,
 }
 
 impl Survey {
-    /// The standard deviation of the noise: the median absolute second difference of Gaussian noise is 1/1.4826 of its
-    /// standard deviation, and this the square root of 6 times that of the noise. 0 where it is that of rounding.
+    /// The standard deviation of the noise, if it is Gaussian: 1.4826 times the median absolute second difference, whose
+    /// weights keep it ([`Self::weights`]). 0 where it is no more than rounding.
     pub fn noise(&self) -> f64 {
         let noise = 1.4826 * self.noise.median();
         let rounding = f64::EPSILON * self.low.abs().max(self.high.abs());
@@ -84,14 +96,15 @@ impl Survey {
         scales.find(is_seen).map_or(f64::NAN, |(_, slope)| slope)
     }
 
-    /// Samples in succession at the largest force, if it was cut off there.
+    /// Equal samples in a row at the largest force, if it was cut off there.
     pub fn clipped(&self) -> Option<u64> {
         let is_clipped = self.at_high >= CLIPPED.max(2 * self.elsewhere);
         is_clipped.then_some(self.at_high)
     }
 
-    /// Weights of five samples in a row: their second difference, or under modulation that of what a sine of its period
-    /// leaves at this step; the noise keeps its standard deviation.
+    /// Weights of five samples in a row, `step` s apart, for a difference in which a ramp vanishes, and so does a sine of
+    /// the period of the modulation, if there is one. Their squares add up to 1, so that it has the standard deviation
+    /// of the noise.
     fn weights(drive: &Drive, step: f64) -> [f64; 5] {
         if drive.period == 0.0 {
             return [0.0, 1.0, -2.0, 1.0, 0.0].map(|weight| weight / 6.0_f64.sqrt());
@@ -104,7 +117,8 @@ impl Survey {
         weights.map(|weight| weight / norm.sqrt())
     }
 
-    fn count_equal(&mut self, forces: &[f64]) {
+    /// Takes in the forces, with their range and how many in a row are equal.
+    fn take_forces(&mut self, forces: &[f64]) {
         for &force in forces {
             let is_equal = self.forces.last() == Some(&force);
             self.forces.push(force);
@@ -139,7 +153,7 @@ impl Pass for Survey {
         self.times.extend(samples.times);
         let driven = samples.times.iter().map(|time| loading.driven(*time));
         self.driven.extend(driven);
-        self.count_equal(samples.forces);
+        self.take_forces(samples.forces);
         self.samples += samples.times.len() as u64;
         let times = &self.times;
         let forces = &self.forces;
@@ -153,11 +167,11 @@ impl Pass for Survey {
             self.noise.push(difference.abs());
         }
         for (length, slopes) in SLOPES.into_iter().zip(&mut self.stiffness) {
-            let even = loading.drive.velocity * step * length as f64;
+            let steady = loading.drive.velocity * step * length as f64;
             for end in (known.max(length)..=last).step_by(length) {
                 let begin = end - length;
                 let driven = self.driven[end] - self.driven[begin];
-                if driven >= 0.999 * even {
+                if driven >= STEADY * steady {
                     slopes.push((forces[end] - forces[begin]) / driven);
                 }
             }

@@ -1,4 +1,5 @@
-//! Error bounds and step lengths that follow from the tolerance.
+//! Error bounds and step lengths that follow from the tolerance: of Taylor steps, of the events that are merged into them,
+//! and of leaps.
 
 use crate::model::Parameters;
 use crate::model::equation::largest_frequency;
@@ -9,7 +10,7 @@ const MAX_STEP: f64 = 4.0;
 /// Part of the tolerance that one step's truncation may take at most.
 const TRUNCATION_SHARE: f64 = 0.1;
 /// Multiple of the tolerance that the truncations of all steps may add up to within the slider's memory.
-const REMEMBERED_SHARE: f64 = 4.0;
+const REMEMBERED_MULTIPLE: f64 = 4.0;
 /// Number of steps that an undamped slider is assumed to remember.
 const MAX_REMEMBERED: f64 = 1e6;
 /// Part of a step's error that one merged event may leave out: little, since these errors have one sign.
@@ -42,9 +43,9 @@ impl Tolerances {
         }
     }
 
-    /// How far in a step of `length` s the terms of higher order that follow from an event's δ2 and δ3, in m, stay
-    /// under the error of a step. At the fastest frequency ω they are at most (ωh)² (δ3/20 + γh δ2/60) ξ⁵ and (ωh)⁴
-    /// δ2/720 ξ⁶.
+    /// The largest fraction ξ of a step of `length` s, h, after an event in which what its merging leaves out stays below
+    /// a part of the error of a step: at most (ωh)² (δ3/20 + γh δ2/60) ξ⁵ and (ωh)⁴ δ2/720 ξ⁶ at the fastest frequency ω,
+    /// with the coefficients δ2 and δ3 that the event adds, in m.
     #[inline]
     pub fn merged_window(&self, [second, third]: [f64; 2], length: f64, damping_rate: f64) -> f64 {
         let angle = MAX_STEP * length / self.max_step;
@@ -75,7 +76,7 @@ fn truncation_share(parameters: &Parameters, max_step: f64) -> f64 {
         half
     };
     let remembered = (1.0 / (rate * max_step)).min(MAX_REMEMBERED);
-    TRUNCATION_SHARE.min(REMEMBERED_SHARE / remembered)
+    TRUNCATION_SHARE.min(REMEMBERED_MULTIPLE / remembered)
 }
 
 /// A number somewhat below the N-th root of a positive one, by dividing the logarithm that its bits approximate.

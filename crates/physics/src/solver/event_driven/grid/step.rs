@@ -1,21 +1,23 @@
 //! One step of the grid: a recurrence of two stencils, of fourth order in ω_max h.
 //!
-//! In short: displacements at the next point follow from those at this one and their increments, as the forces at both
-//! points are known ([`march`]). The coefficients lie in a [`GridStep`], and change where a contact does
-//! ([`GridStep::update`]). Steps end where a block reaches a break position, for [`contacts`](super::contacts) to go on;
-//! where the motion leaves the grid, [`velocity`] says how fast it is.
+//! In short: displacements at the next point follow from those at this one, their increments and the forces there
+//! ([`march`]). The coefficients lie in a [`GridStep`], and change where a contact does ([`GridStep::update`]). Steps end
+//! where a block reaches a break position, for [`contacts`](super::contacts) to go on; where the motion leaves the grid,
+//! [`velocity`] says how fast it is.
 //!
-//! With h constant, σ = γh/2, e = exp(-σ), Z = h² S/m and φ_n = h² f_n, where f is all force per mass but the damping,
+//! With h constant, S the stiffness matrix of chain, contacts and driving spring, σ = γh/2, e = exp(-σ), Z = h² S/m, and
+//! φ_n = h² f_n, where f_n is the force per mass at point n without the damping,
 //!
 //! ```text
 //! x_{n+1} - x_n = e² (x_n - x_{n-1}) + e (g1 φ_n - g2 Z φ_n + g2 h² (h² K_d/m) (u'' + γ u')),
 //! g1 = sinh σ/σ,   g2 = (cosh σ - sinh σ/σ)/(4 σ²) = 1/12 + σ²/120 + ...
 //! ```
 //!
-//! the expansion in Z of the exact recurrence of a damped oscillator, 2 e cos(√(Z - σ²)); the last term is what the
-//! drive u adds to the second derivative of the force. It is exact for damping, for equilibrium and for uniform motion.
-//! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present
-//! law: an event changes these two, and no step is taken again.
+//! The factor 2 e cos(√(Z - σ²)) of the exact recurrence of a damped oscillator is expanded in Z; the last term is what
+//! the drive u, through its spring K_d, adds to the second derivative of the force. The recurrence is exact for damping,
+//! for equilibrium and for uniform motion. The law of motion is how φ follows from the displacements: a pull, a diagonal
+//! and couplings. The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under
+//! the present law: an event changes these two, and no step is taken again.
 //!
 //! Steps are written twice: with the motion in registers and in memory. One loop for both costs 3 to 4 % of a run.
 
@@ -96,7 +98,7 @@ pub struct GridStep {
     /// h² K_int/m and h² K_d/m.
     pub coupling: f64,
     pub pulling: f64,
-    /// A row a block: h² times pull; minus h² times the diagonal; e (g1 - g2 h² diagonal).
+    /// The law, a lane for each block: h² times its pull; minus h² times the diagonal of S/m; e (g1 - g2 h² diagonal).
     pull: Vec<Row>,
     diagonal: Vec<Row>,
     own: Vec<Row>,
@@ -112,7 +114,7 @@ pub struct GridStep {
     pub force: Vec<Row>,
     /// Shear force at the points of the last run but the first, in N.
     pub trail: [f64; MAX_RUN],
-    /// φ at the end of a step under its own law, in m; `None` unless [`Self::dissipation`] is kept.
+    /// φ at the end of a step under its own law, in m; `None` unless the run is audited.
     pub end_force: Option<Vec<Row>>,
     /// ∫ X'² ds summed over the blocks, in m²: over all steps of the last run, and over its last step.
     pub dissipation: f64,
@@ -309,7 +311,8 @@ pub(super) fn add<S: Simd>(simd: S, rows: &mut [Row], Slot { row, lane }: Slot, 
     simd.set(&mut rows[row], lane, sum);
 }
 
-/// Takes at most `steps` steps, and none after one in which a block reaches a break position. Returns how many.
+/// Takes at most `steps` steps, and none after one in which a block reaches a break position. Returns how many. `R` is the
+/// number of rows, or 0 for any.
 #[inline(always)]
 pub(super) fn march<S: Simd, const R: usize>(
     simd: S,
@@ -736,7 +739,7 @@ mod tests {
     }
 
     #[test]
-    fn velocities_are_of_fourth_order_and_taking_them_changes_nothing() {
+    fn velocities_are_of_fourth_order_and_taking_them_moves_nothing() {
         let one = Parameters {
             blocks: 1,
             drive_velocity: 1e-30,
