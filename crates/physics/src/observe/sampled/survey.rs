@@ -77,7 +77,7 @@ pub struct Survey {
 
 impl Survey {
     /// The standard deviation of the noise, if it is Gaussian: 1.4826 times the median absolute second difference, whose
-    /// weights keep it ([`Self::weights`]). 0 where it is no more than rounding.
+    /// weights keep it. 0 where it is no more than rounding.
     pub fn noise(&self) -> f64 {
         let noise = 1.4826 * self.noise.median();
         let rounding = f64::EPSILON * self.low.abs().max(self.high.abs());
