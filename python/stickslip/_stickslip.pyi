@@ -86,6 +86,7 @@ class Table:
 def keys() -> dict[str, tuple[str, str, Any]]: ...
 def sweep_text(keys: list[tuple[str, str]]) -> str: ...
 def simulate(
+    *,
     file: str | PathLike[str] | None,
     text: str,
     source: str,
@@ -96,6 +97,7 @@ def simulate(
     contacts: bool,
 ) -> tuple[dict[str, Any], str, list[str], dict[str, Table]]: ...
 def run(
+    *,
     file: str | PathLike[str] | None,
     text: str,
     out: str | PathLike[str] | None,

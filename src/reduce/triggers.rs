@@ -82,7 +82,7 @@ columns! {
 }
 
 tables! {
-    PulseRow = "pulses", "One row per pulse, and one per tenth of the interval of the control in which it begins; `pulse_start` is that of the first";
+    PulseRow = "pulses", "One row per pulse, and one per tenth of the control's interval in which it begins; `pulse_start` is that of the first";
 }
 
 impl PulseRow {

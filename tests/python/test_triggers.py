@@ -53,7 +53,7 @@ def expected(row, control, run, tau_control, noise):
     """The columns of a row that are not parameters, from the slips of its control and its own."""
     start, end = row["pulse_start"], row["pulse_start"] + row["pulse_cycles"] * row["T"]
     found = dict.fromkeys(
-        "cycle place advance advance_drive next_advance triggered triggered_drive excluded".split(), None
+        "control_interval place advance advance_drive next_advance triggered triggered_drive excluded".split(), None
     )
     found |= {"tau_control": tau_control, "noise": noise}
     number = int((control["onset"] <= start).sum())
@@ -71,7 +71,7 @@ def expected(row, control, run, tau_control, noise):
     if number + 1 < min(len(run), len(control)):
         found["next_advance"] = control["onset"].iloc[number + 1] - run["onset"].iloc[number + 1]
     return found | {
-        "cycle": interval,
+        "control_interval": interval,
         "place": (start - last["onset"]) / interval,
         "advance": free["onset"] - next_onset,
         "advance_drive": free["onset"] - passage,
@@ -106,5 +106,5 @@ def test_every_column_follows_from_the_slips(tables):
         assert (before[same].to_numpy() == run[same].iloc[: len(before)].to_numpy()).all(), "before the pulse"
     # Each rule was tried: some of the slips that pulses make have their onset just before them.
     seen = triggers[triggers["advance"].notna()]
-    next_onset = seen["pulse_start"] + (1 - seen["place"]) * seen["cycle"] - seen["advance"]
+    next_onset = seen["pulse_start"] + (1 - seen["place"]) * seen["control_interval"] - seen["advance"]
     assert (next_onset < seen["pulse_start"]).any() and seen["triggered"].any() and triggers["excluded"].notna().any()
