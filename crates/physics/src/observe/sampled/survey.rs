@@ -2,7 +2,7 @@
 //!
 //! - Noise: the median of the second differences of the force.
 //! - Stiffness of the loading: the median slope of the force against the drive, over as few samples as the noise allows.
-//! - Whether the force was cut off at its largest value: far more samples in a row are equal there than anywhere else.
+//! - Whether the force was cut off: at its largest value, at least twice as many samples in a row are equal as elsewhere.
 //!
 //! Medians ignore slips, which take up few samples.
 
