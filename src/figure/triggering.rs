@@ -1,6 +1,6 @@
 //! Triggering: the mean advance of slips by a pulse against where in the control's interval it begins, a panel for each
 //! amplitude; and the share of triggered slips against the amplitude. What the drive alone does is dashed
-//! ([`Quantity`] finds it by the class of a column).
+//! ([`Quantity`] finds it by the class of a column), and so is no advance.
 
 use super::chart::{Chart, ChartParts};
 use super::frame::{LEFT, Layout};
@@ -25,19 +25,19 @@ const MAX_AMPLITUDES: usize = 5;
 /// Where in the control's interval the pulses of a row begin.
 const PLACE: &str = "(place_low + place_high) / 2";
 
-/// `None` without pulses, or if they differ in more than where they begin, amplitude and period.
+/// `None` without pulses, if they differ in more than where they begin, amplitude and period, or in too many of these.
 pub(super) fn triggering(rows: &[PulseRow], look: &Look) -> Option<Picture> {
     let (whole, tenths): (Vec<PulseRow>, Vec<PulseRow>) = rows
         .iter()
         .cloned()
         .partition(PulseRow::is_of_whole_interval);
-    let others = |row: &PulseRow| Parameters {
+    let in_common = |row: &PulseRow| Parameters {
         pulse_cycles: row.pulse().pulse_cycles,
         ..row.pulse().without_modulation()
     };
     let is_one = whole
         .windows(2)
-        .all(|pair| others(&pair[0]) == others(&pair[1]));
+        .all(|pair| in_common(&pair[0]) == in_common(&pair[1]));
     let amplitudes = Values::of(&whole, "Delta").ok()?;
     let periods = Values::of(&whole, "T").ok()?;
     if !is_one || periods.distinct.len() > INKS.len() || amplitudes.distinct.len() > MAX_AMPLITUDES

@@ -136,7 +136,7 @@ impl Disorder {
     }
 }
 
-/// Draws from the words of both deviates of each. A threshold that is not positive, or not a number, is not final.
+/// [`DRAWS_PER_REFILL`] draws at once, each from two words: one for its threshold, one for its delay. A threshold that is not positive, or not a number, is not final.
 struct SideBySide<'a>(&'a Disorder, &'a [[u64; 2]; DRAWS_PER_REFILL as usize]);
 
 impl WithSimd for SideBySide<'_> {
@@ -285,6 +285,7 @@ pub fn standard_normal_quantile(probability: f64) -> f64 {
     }
 }
 
+/// r of AS 241, how far into a tail a probability is.
 #[inline(always)]
 fn depth(probability: f64) -> f64 {
     (-logarithm(probability.min(1.0 - probability))).sqrt()

@@ -2,7 +2,7 @@
 //!
 //! Times fall into bins of a fraction of the mean delay; the present bin is sorted, those ahead are lists, and what
 //! lies beyond a turn of the calendar waits aside. A contact has at most one reattachment, so lists run through the
-//! contacts and nothing is allocated. Contract: reattachments come in order of time, then block, then contact.
+//! contacts and bins allocate nothing. Contract: reattachments come in order of time, then block, then contact.
 
 use super::Parameters;
 use crate::value::floored;

@@ -81,7 +81,7 @@ pub struct Measurements {
     pub precursors: Vec<Precursor>,
     /// Ruptures of any size, start-up included.
     pub ruptures: u64,
-    /// Averages over time; `None` if no cycle was whole.
+    /// Averages over time; `None` if there was nothing to average over.
     pub averages: Option<Averages>,
     /// Time since the last onset when the job gave up, in s; `None` if it did not, or before a slip.
     pub running_interval: Option<f64>,

@@ -35,7 +35,7 @@ pub(super) struct Rupture {
     pub least_at_last_break: f64,
     pub first: RunningTotals,
     pub last: RunningTotals,
-    /// Whether the shear force was rising at the onset.
+    /// Whether the shear force still rose when the rupture reached the leading edge.
     pub onset_cut: bool,
 }
 

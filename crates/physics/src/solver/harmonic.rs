@@ -128,7 +128,8 @@ impl Harmonic {
         }
     }
 
-    /// First instant at or after `from` at which the motion is not below `level`; infinite if never.
+    /// First instant at or after `from` at which the motion is not below `level`; infinite if never. Neither rate nor
+    /// amplitude is negative.
     pub(super) fn first_rise_to(&self, level: f64, from: f64) -> f64 {
         if self.value(from) >= level {
             return from;
@@ -151,7 +152,7 @@ impl Harmonic {
             let latest = (level - self.start + self.amplitude) / self.rate;
             return newton(from, latest.max(from) * (1.0 + f64::EPSILON));
         }
-        // Maxima lie at ψ = asin(p1/Aω) mod 2π and grow by p1 T from one to the next.
+        // Maxima lie at the angle asin(b/Aω) mod 2π and grow by 2π b/ω from one to the next.
         let crest = libm::asin(self.rate / speed);
         let period = TAU / self.angular_frequency;
         let behind = (crest - self.angle(from)).rem_euclid(TAU);
@@ -165,7 +166,7 @@ impl Harmonic {
             return f64::INFINITY;
         };
         let high = first + skipped * period;
-        // The branch that rises to a maximum begins at the minimum before it: π + 2 asin(p1/Aω) earlier in phase.
+        // The branch that rises to a maximum begins at the minimum before it: π + 2 asin(b/Aω) earlier.
         let low = (high - (PI + 2.0 * crest) / self.angular_frequency).max(from);
         if self.value(high) < level {
             high
@@ -175,7 +176,7 @@ impl Harmonic {
     }
 
     /// First instant at or after `from` at which the motion is not above `level`; infinite if never. Minima grow too,
-    /// so it lies within the first period.
+    /// so it lies within the first period. Neither rate nor amplitude is negative.
     pub(super) fn first_fall_to(&self, level: f64, from: f64) -> f64 {
         if self.value(from) <= level {
             return from;

@@ -1,7 +1,7 @@
-//! Solvers: advance a model from contact event to contact event and report to an observer what happens.
+//! Solvers: advance a model and report to an observer what happens.
 //!
 //! The entry point is [`simulate`]. An [`Observer`] sees contact events and, between them, [`Segment`]s: the shear
-//! force as a closed-form function of time. Nothing that it sees depends on which solver runs.
+//! force as a closed-form function of time. It does not know which solver runs.
 //!
 //! ```text
 //! event_driven/      exact times of events: leap to leap, on a grid in time, or by Taylor series
@@ -115,7 +115,7 @@ pub trait Observer {
     /// What is spent up to the break that comes next, if a ledger is kept.
     fn spent(&mut self, _spent: Spent) {}
 
-    /// Whether attachments are reported to it. Without them, no segment ends at one.
+    /// Whether it needs attachments. If not, the grid, which is faster so, may leave them out and ends no segment at one.
     fn follows_attachments(&self) -> bool {
         true
     }
@@ -188,7 +188,7 @@ pub fn simulate(
     run(parameters, solver, limits, observer, None)
 }
 
-/// The same with an energy ledger, which costs several times as much; the simulation itself is the same to the last bit.
+/// The same with an energy ledger, at some twice the cost; the simulation itself is the same to the last bit.
 pub fn simulate_audited(
     parameters: &Parameters,
     solver: Solver,

@@ -633,7 +633,7 @@ fn random_parameters_break_the_same_contacts_in_every_solver() {
         "{draws} draws, {breaks} breaks, {slips} slips, {open} open; compared, and share of the bound: {totals:?}"
     );
     assert!(problems.is_empty(), "\n{problems}");
-    // Not all is vague: a third of the breaks at the loosest.
+    // Not all is vague: a quarter of the breaks at the loosest.
     for (compared, _) in totals {
         assert!(
             4 * compared > breaks,

@@ -15,7 +15,7 @@ fn output_of(example: &str) -> String {
 }
 
 #[test]
-fn the_first_slip_is_that_of_the_sliders_of_the_paper() {
+fn the_first_slip_is_that_of_the_slider_of_the_paper() {
     let shown = output_of("one_slip");
     assert!(shown.starts_with("onset       114.12 ms\n"), "{shown}");
     assert_eq!(shown.lines().count(), 5, "{shown}");

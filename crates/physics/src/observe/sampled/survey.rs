@@ -1,8 +1,10 @@
 //! The first pass over a trace.
 //!
-//! - Noise: the median of the second differences of the force.
-//! - Stiffness of the loading: the median slope of the force against the drive, over as few samples as the noise allows.
-//! - Whether the force was cut off: at its largest value, at least twice as many samples in a row are equal as elsewhere.
+//! - Noise: the median size of a difference of the force in which loading and modulation vanish.
+//! - Stiffness of the loading: the median slope of the force against the drive, over the shortest of [`SLOPES`] that the
+//!   noise allows.
+//! - Whether the force was cut off: at its largest value, at least twice as many samples in a row are equal as elsewhere,
+//!   and at least [`CLIPPED`].
 //!
 //! Medians ignore slips, which take up few samples.
 
@@ -11,7 +13,7 @@ use crate::model::Drive;
 use std::f64::consts::TAU;
 
 /// Distances in samples over which slopes are taken. The shortest over which the force rises by `RISE` times the noise
-/// gives the stiffness.
+/// gives the stiffness, else the longest.
 const SLOPES: [usize; 3] = [1, 4, 16];
 const RISE: f64 = 2.0;
 const LONGEST_SLOPE: usize = SLOPES[2];
@@ -34,7 +36,7 @@ impl Histogram {
         self.0[(number.max(0.0).to_bits() >> Self::BELOW) as usize] += 1;
     }
 
-    /// NaN without numbers.
+    /// Next to 0 without numbers.
     fn median(&self) -> f64 {
         let mut left = self.0.iter().sum::<u64>().div_ceil(2);
         let is_reached = |count: &u64| {
@@ -59,9 +61,11 @@ pub struct Survey {
     velocity: f64,
     noise: Histogram,
     stiffness: [Histogram; SLOPES.len()],
+    /// Range of the force.
     pub low: f64,
     pub high: f64,
     pub samples: u64,
+    /// Duration of all runs, in s.
     pub seconds: f64,
     /// The samples of the present piece, after the last ones of the piece before.
     times: Vec<f64>,
@@ -76,8 +80,8 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// The standard deviation of the noise, if it is Gaussian: 1.4826 times the median absolute second difference, whose
-    /// weights keep it. 0 where it is no more than rounding.
+    /// The standard deviation of the noise, if it is Gaussian: 1.4826 times the median size of the difference that
+    /// `weights` makes, which keep it. 0 where it is no more than rounding.
     pub fn noise(&self) -> f64 {
         let noise = 1.4826 * self.noise.median();
         let rounding = f64::EPSILON * self.low.abs().max(self.high.abs());
@@ -86,12 +90,12 @@ impl Survey {
 
     /// The slope of the loading parts over the velocity of the drive, in N/m.
     pub fn stiffness(&self) -> f64 {
-        let step = self.velocity * self.seconds / self.samples as f64;
+        let distance = self.velocity * self.seconds / self.samples as f64;
         let mut scales = SLOPES
             .into_iter()
             .zip(self.stiffness.iter().map(Histogram::median));
         let is_seen = |&(length, slope): &(usize, f64)| {
-            length == LONGEST_SLOPE || slope * step * length as f64 > RISE * self.noise()
+            length == LONGEST_SLOPE || slope * distance * length as f64 > RISE * self.noise()
         };
         scales.find(is_seen).map_or(f64::NAN, |(_, slope)| slope)
     }
@@ -170,9 +174,9 @@ impl Pass for Survey {
             let steady = loading.drive.velocity * step * length as f64;
             for end in (known.max(length)..=last).step_by(length) {
                 let begin = end - length;
-                let driven = self.driven[end] - self.driven[begin];
-                if driven >= STEADY * steady {
-                    slopes.push((forces[end] - forces[begin]) / driven);
+                let distance = self.driven[end] - self.driven[begin];
+                if distance >= STEADY * steady {
+                    slopes.push((forces[end] - forces[begin]) / distance);
                 }
             }
         }

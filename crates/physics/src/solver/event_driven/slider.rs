@@ -64,7 +64,7 @@ pub(super) struct State {
     pub velocity: Vec<Row>,
 }
 
-/// The chain's coefficients in lanes, all divided by the block mass.
+/// The chain's coefficients in lanes.
 #[derive(Clone, Debug)]
 pub(super) struct Chain {
     pub layout: BlockLayout,

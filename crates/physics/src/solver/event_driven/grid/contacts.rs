@@ -54,13 +54,13 @@ impl Path {
         let rise = q[row][lane];
         let beside = place.beside(x);
         let beside_start = beside - place.beside(q);
-        let last_force = step.force_on(&place, end, beside, drive.displacement());
+        let last_phi = step.phi_on(&place, end, beside, drive.displacement());
         let driven_before = drive.before(step.turn).displacement();
-        let first_force = step.force_on(&place, end - rise, beside_start, driven_before);
+        let first_phi = step.phi_on(&place, end - rise, beside_start, driven_before);
         // x'' = φ - γh x' at both ends, with the slopes of this very path.
         let damping = step.damping;
-        let from = damping.mul_add(-rise, first_force);
-        let to = damping.mul_add(-rise, last_force);
+        let from = damping.mul_add(-rise, first_phi);
+        let to = damping.mul_add(-rise, last_phi);
         let [across, along_first, along_last] = step.damped;
         let first = across.mul_add(to, along_first * from);
         let last = across.mul_add(-from, along_last * to);
@@ -286,10 +286,10 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
         let x = &slider.state.displacement;
         let end = x[row][lane];
         let rise = step.increment[row][lane];
-        let force = step.force_on(&place, end, place.beside(x), drive.displacement());
+        let phi = step.phi_on(&place, end, place.beside(x), drive.displacement());
         // A cubic from the end is enough, as the force of an unstressed contact only grows.
-        let bend = step.damping.mul_add(-rise, force);
-        let jerk = step.rate_of_force(&place, rise, place.beside(&step.increment), drive);
+        let bend = step.damping.mul_add(-rise, phi);
+        let jerk = step.gain_of_phi(&place, rise, place.beside(&step.increment), drive);
         let x = end - left * (rise + s * (0.5 * bend - SIXTH * (1.0 + left) * jerk));
         let change = slider.interface.reattach_running(simd, x);
         if events.wants_attachments {
@@ -300,7 +300,7 @@ fn attach_due<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64
         events.reattachments += 1;
         let slope = rise + (s - 0.5) * bend;
         let third = -SIXTH * step.by_mass * change.stiffness * slope;
-        if step.end_force.is_some() {
+        if step.end_phi.is_some() {
             let mut path = Path::new(slider, step, drive, block);
             path.change_audited(s, [0.0, third, 0.0]);
             step.add_dissipation(path.dissipation);
@@ -377,7 +377,7 @@ fn break_along<S: Simd>(
                 -stiffened * half_curvature,
             ];
             let terms = own_terms(forces, step.damping, own);
-            if step.end_force.is_some() {
+            if step.end_phi.is_some() {
                 path.change_audited(s, terms);
             } else {
                 path.change_by(s, terms);

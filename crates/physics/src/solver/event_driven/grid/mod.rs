@@ -102,7 +102,7 @@ impl Grid {
 
     /// Notes what the observer follows, and whether the dissipation is kept.
     pub fn set_observed(&mut self, observer: &dyn Observer, is_audited: bool) {
-        self.step.end_force = is_audited.then(|| self.step.force.clone());
+        self.step.end_phi = is_audited.then(|| self.step.phi.clone());
         self.events.wants_attachments = observer.follows_attachments();
     }
 
@@ -148,7 +148,7 @@ impl Grid {
         let here = state.displacement[0][0];
         let rise = step.increment[0][0];
         let beside = place.beside(&state.displacement);
-        let own = step.force_on(place, here, beside, drive.displacement());
+        let own = step.phi_on(place, here, beside, drive.displacement());
         // h² x'' at the start of the step and, from the law of motion, at its end.
         let first = start_bend - bend * step.inverse_stiffness;
         let last = (own - step.damping * (rise + first / 6.0)) * step.inverse_end;

@@ -26,7 +26,7 @@ use crate::model::{LANES, Parameters, Row};
 use crate::solver::event_driven::moving_frame::StepDrive;
 use crate::solver::event_driven::slider::{BlockLayout, Chain, FIRST_BLOCK, Slot, State};
 
-/// Longest run of steps without a look at the clock.
+/// Most steps in a call of [`march`].
 pub(super) const MAX_RUN: usize = 64;
 
 /// Row and lane of a block and of those beside.
@@ -100,8 +100,8 @@ pub struct GridStep {
     pub pulling: f64,
     /// The law, a lane for each block: h² times its pull; minus h² times the diagonal of S/m; e (g1 - g2 h² diagonal).
     pull: Vec<Row>,
-    diagonal: Vec<Row>,
-    own: Vec<Row>,
+    minus_diagonal: Vec<Row>,
+    own_weight: Vec<Row>,
     /// Nearest break positions, in m.
     upper: Vec<Row>,
     lower: Vec<Row>,
@@ -110,13 +110,14 @@ pub struct GridStep {
     second_couplings: Vec<Row>,
     /// Increments q_n, in m.
     pub increment: Vec<Row>,
-    /// φ_n of the last step, in m.
-    pub force: Vec<Row>,
+    /// Room for φ_n, in m; steps in registers leave it alone.
+    pub phi: Vec<Row>,
     /// Shear force at the points of the last run but the first, in N.
     pub trail: [f64; MAX_RUN],
     /// φ at the end of a step under its own law, in m; `None` unless the run is audited.
-    pub end_force: Option<Vec<Row>>,
-    /// ∫ X'² ds summed over the blocks, in m²: over all steps of the last run, and over its last step.
+    pub end_phi: Option<Vec<Row>>,
+    /// ∫ X'² ds summed over the blocks, in m²: over all steps of the last run, and over its last step; 0
+    /// unless the run is audited.
     pub dissipation: f64,
     pub last_dissipation: f64,
     /// The blocks that reached a break position in the last step.
@@ -132,7 +133,7 @@ impl GridStep {
         let square = length * length;
         let half = 0.5 * parameters.damping_rate * length;
         let [g1, g2] = weights(half);
-        let decay = libm::exp(-half);
+        let root_decay = libm::exp(-half);
         let mut step = Self {
             length,
             inverse_length: 1.0 / length,
@@ -144,22 +145,22 @@ impl GridStep {
             inverse_stiffness: 1.0 / chain.drive_stiffness,
             by_mass: square / chain.mass,
             turn: [0.0, 1.0],
-            decay: decay * decay,
-            first: decay * g1,
-            second: decay * g2,
+            decay: root_decay * root_decay,
+            first: root_decay * g1,
+            second: root_decay * g2,
             coupling: square * chain.coupling[0][0],
             pulling: square * chain.drive_stiffness / chain.mass,
             pull: layout.filled(0.0),
-            diagonal: layout.filled(0.0),
-            own: layout.filled(0.0),
+            minus_diagonal: layout.filled(0.0),
+            own_weight: layout.filled(0.0),
             upper: layout.filled(f64::INFINITY),
             lower: layout.filled(f64::NEG_INFINITY),
             couplings: chain.coupling.clone(),
             second_couplings: chain.coupling.clone(),
             increment: layout.filled(0.0),
-            force: layout.filled(0.0),
+            phi: layout.filled(0.0),
             trail: [0.0; MAX_RUN],
-            end_force: None,
+            end_phi: None,
             dissipation: 0.0,
             last_dissipation: 0.0,
             reached: Vec::new(),
@@ -169,11 +170,15 @@ impl GridStep {
             saved_displacement: layout.filled(0.0),
             saved_increment: layout.filled(0.0),
         };
-        for (first, second) in step.couplings.iter_mut().zip(&mut step.second_couplings) {
-            for (first, second) in first.iter_mut().zip(second.iter_mut()) {
-                *first *= square;
-                *second *= square * step.second;
-            }
+        for coupling in step.couplings.iter_mut().flat_map(|row| row.iter_mut()) {
+            *coupling *= square;
+        }
+        for coupling in step
+            .second_couplings
+            .iter_mut()
+            .flat_map(|row| row.iter_mut())
+        {
+            *coupling *= square * step.second;
         }
         step
     }
@@ -184,8 +189,8 @@ impl GridStep {
             for lane in 0..LANES {
                 let diagonal = self.square * chain.diagonal[row][lane];
                 self.pull[row][lane] = self.square * chain.pull[row][lane];
-                self.diagonal[row][lane] = -diagonal;
-                self.own[row][lane] = self.first - self.second * diagonal;
+                self.minus_diagonal[row][lane] = -diagonal;
+                self.own_weight[row][lane] = self.first - self.second * diagonal;
             }
         }
         self.upper.copy_from_slice(&chain.upper);
@@ -205,9 +210,9 @@ impl GridStep {
     ) {
         let diagonal = self.by_mass * diagonal;
         simd.set(&mut self.pull[row], lane, self.by_mass * pull);
-        simd.set(&mut self.diagonal[row], lane, -diagonal);
+        simd.set(&mut self.minus_diagonal[row], lane, -diagonal);
         simd.set(
-            &mut self.own[row],
+            &mut self.own_weight[row],
             lane,
             self.first - self.second * diagonal,
         );
@@ -220,7 +225,7 @@ impl GridStep {
         let by_square = 1.0 / self.square;
         for row in 0..chain.layout.rows {
             for lane in 0..LANES {
-                chain.diagonal[row][lane] = -by_square * self.diagonal[row][lane];
+                chain.diagonal[row][lane] = -by_square * self.minus_diagonal[row][lane];
                 chain.pull[row][lane] = by_square * self.pull[row][lane];
             }
         }
@@ -262,7 +267,7 @@ impl GridStep {
 
     /// What φ of a block gains in a step, from the rises of it and of both blocks beside together, in m.
     #[inline(always)]
-    pub(super) fn rate_of_force(
+    pub(super) fn gain_of_phi(
         &self,
         place: &BlockPlace,
         rise: f64,
@@ -275,14 +280,14 @@ impl GridStep {
         } else {
             0.0
         };
-        self.diagonal[row][lane].mul_add(rise, self.coupling.mul_add(beside, pulled))
+        self.minus_diagonal[row][lane].mul_add(rise, self.coupling.mul_add(beside, pulled))
     }
 
     /// φ of a block at the displacements of it, of both blocks beside together, and of the drive, in m.
     #[inline(always)]
-    pub(super) fn force_on(&self, place: &BlockPlace, here: f64, beside: f64, driven: f64) -> f64 {
+    pub(super) fn phi_on(&self, place: &BlockPlace, here: f64, beside: f64, driven: f64) -> f64 {
         let Slot { row, lane } = place.slot;
-        let own = self.diagonal[row][lane].mul_add(here, self.pull[row][lane]);
+        let own = self.minus_diagonal[row][lane].mul_add(here, self.pull[row][lane]);
         let pulls = if place.slot == Slot::FIRST {
             self.pulling
         } else {
@@ -326,7 +331,7 @@ pub(super) fn march<S: Simd, const R: usize>(
     step.reached.clear();
     step.dissipation = 0.0;
     step.last_dissipation = 0.0;
-    if R > 0 && S::HAS_MANY_REGISTERS && step.end_force.is_none() {
+    if R > 0 && S::HAS_MANY_REGISTERS && step.end_phi.is_none() {
         march_in_registers::<S, R>(simd, chain, step, drive, displacement, steps)
     } else {
         march_in_memory::<S, R>(simd, chain, step, drive, displacement, steps)
@@ -346,8 +351,8 @@ fn march_in_registers<S: Simd, const R: usize>(
     let displacement = &mut displacement[..R];
     let increment = &mut step.increment[..R];
     let pull = &step.pull[..R];
-    let diagonal = &step.diagonal[..R];
-    let own = &step.own[..R];
+    let minus_diagonal = &step.minus_diagonal[..R];
+    let own_weight = &step.own_weight[..R];
     let couplings = &step.couplings[..R];
     let second_couplings = &step.second_couplings[..R];
     let upper = &step.upper[..R];
@@ -381,7 +386,7 @@ fn march_in_registers<S: Simd, const R: usize>(
             if r == 0 {
                 own = first_lane.mul_add(simd.splat(push), own);
             }
-            let own = x[r].mul_add(simd.load(&diagonal[r]), own);
+            let own = x[r].mul_add(simd.load(&minus_diagonal[r]), own);
             f[r] = before.plus(after).mul_add(simd.load(&couplings[r]), own);
         }
         for r in 0..R {
@@ -399,7 +404,7 @@ fn march_in_registers<S: Simd, const R: usize>(
             if r == 0 {
                 kept = first_lane.mul_add(simd.splat(correction), kept);
             }
-            let own = f[r].mul_add(simd.load(&own[r]), kept);
+            let own = f[r].mul_add(simd.load(&own_weight[r]), kept);
             q[r] = before
                 .plus(after)
                 .mul_add(simd.load(&second_couplings[r]), own);
@@ -448,9 +453,9 @@ fn march_in_memory<S: Simd, const R: usize>(
     let x = &mut displacement[..rows];
     let last = rows - 1;
     let q = &mut step.increment[..rows];
-    let force = &mut step.force[..rows];
-    let law = [&step.pull, &step.diagonal, &step.couplings].map(|rows_of| &rows_of[..rows]);
-    let own = &step.own[..rows];
+    let phi = &mut step.phi[..rows];
+    let law = [&step.pull, &step.minus_diagonal, &step.couplings].map(|rows_of| &rows_of[..rows]);
+    let own_weight = &step.own_weight[..rows];
     let second_couplings = &step.second_couplings[..rows];
     let upper = &step.upper[..rows];
     let lower = &step.lower[..rows];
@@ -458,15 +463,15 @@ fn march_in_memory<S: Simd, const R: usize>(
     let decay = simd.splat(step.decay);
     for done in 1..=steps {
         let [push, correction] = pushes(step.pulling, step.second, step.damping, drive);
-        forces(simd, x, law, push, force);
+        write_phi(simd, x, law, push, phi);
         // The increments, and where they take the blocks.
-        let mut before = simd.load(&force[last]).to_next_lane();
-        let mut here = simd.load(&force[0]);
+        let mut before = simd.load(&phi[last]).to_next_lane();
+        let mut here = simd.load(&phi[0]);
         let beyond = here.to_lane_before();
         let mut reached = 0;
         for r in 0..rows {
             let after = if r < last {
-                simd.load(&force[r + 1])
+                simd.load(&phi[r + 1])
             } else {
                 beyond
             };
@@ -474,7 +479,7 @@ fn march_in_memory<S: Simd, const R: usize>(
             if r == 0 {
                 kept = first_lane.mul_add(simd.splat(correction), kept);
             }
-            let own = here.mul_add(simd.load(&own[r]), kept);
+            let own = here.mul_add(simd.load(&own_weight[r]), kept);
             let next = before
                 .plus(after)
                 .mul_add(simd.load(&second_couplings[r]), own);
@@ -486,10 +491,9 @@ fn march_in_memory<S: Simd, const R: usize>(
         }
         drive.advance(step.turn);
         step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0][0]);
-        if let Some(end_force) = &mut step.end_force {
-            forces(simd, x, law, step.pulling * drive.displacement(), end_force);
-            step.last_dissipation =
-                dissipation(simd, step.damping, step.damped, [force, end_force], q);
+        if let Some(end_phi) = &mut step.end_phi {
+            write_phi(simd, x, law, step.pulling * drive.displacement(), end_phi);
+            step.last_dissipation = dissipation(simd, step.damping, step.damped, [phi, end_phi], q);
             step.dissipation += step.last_dissipation;
         }
         if reached != 0 {
@@ -502,12 +506,12 @@ fn march_in_memory<S: Simd, const R: usize>(
 
 /// φ of every block at these displacements, under a law of pull, diagonal and coupling, with this push of the drive.
 #[inline(always)]
-fn forces<S: Simd>(
+fn write_phi<S: Simd>(
     simd: S,
     x: &[Row],
-    [pull, diagonal, couplings]: [&[Row]; 3],
+    [pull, minus_diagonal, couplings]: [&[Row]; 3],
     push: f64,
-    force: &mut [Row],
+    phi: &mut [Row],
 ) {
     let last = x.len() - 1;
     let first_lane = simd.load(&FIRST_BLOCK);
@@ -524,11 +528,11 @@ fn forces<S: Simd>(
         if r == 0 {
             own = first_lane.mul_add(simd.splat(push), own);
         }
-        let own = here.mul_add(simd.load(&diagonal[r]), own);
+        let own = here.mul_add(simd.load(&minus_diagonal[r]), own);
         before
             .plus(after)
             .mul_add(simd.load(&couplings[r]), own)
-            .store(&mut force[r]);
+            .store(&mut phi[r]);
         (before, here) = (here, after);
     }
 }
@@ -540,7 +544,7 @@ fn dissipation<S: Simd>(
     simd: S,
     damping: f64,
     damped: [f64; 3],
-    [first_force, last_force]: [&[Row]; 2],
+    [first_phi, last_phi]: [&[Row]; 2],
     increment: &[Row],
 ) -> f64 {
     let damping = simd.splat(-damping);
@@ -548,8 +552,8 @@ fn dissipation<S: Simd>(
     let mut sum = simd.splat(0.0);
     for (r, increment) in increment.iter().enumerate() {
         let q = simd.load(increment);
-        let from = q.mul_add(damping, simd.load(&first_force[r]));
-        let to = q.mul_add(damping, simd.load(&last_force[r]));
+        let from = q.mul_add(damping, simd.load(&first_phi[r]));
+        let to = q.mul_add(damping, simd.load(&last_phi[r]));
         let first = across.mul_add(to, along_first.times(from));
         let last = along_last.times(to).minus(across.times(from));
         let squares = first.mul_add(first, last.times(last));
@@ -559,7 +563,7 @@ fn dissipation<S: Simd>(
     sum.reduce(|a, b| a + b)
 }
 
-/// What the drive adds to φ of block 1, and to its increment beside, in m.
+/// What the drive adds to φ of block 1, and to its increment directly, in m.
 #[inline(always)]
 fn pushes(pulling: f64, second: f64, damping: f64, drive: &StepDrive) -> [f64; 2] {
     [
@@ -598,8 +602,8 @@ pub fn velocity<S: Simd, const R: usize>(
     let mut ahead = *drive;
     march_in_memory::<S, R>(simd, chain, step, &mut ahead, &mut state.displacement, 1);
     state.displacement.copy_from_slice(&step.saved_displacement);
-    // Central differences, in the place of the displacements after the step, and what damping adds to the third
-    // derivative, in that of the increments.
+    // Central differences take the room of the saved displacements, and what damping adds to the third derivative that
+    // of the increments.
     let central = &mut step.saved_displacement[..rows];
     let damped = &mut step.increment[..rows];
     let damping = simd.splat(-step.damping);
@@ -608,12 +612,16 @@ pub fn velocity<S: Simd, const R: usize>(
         let sum = before.plus(simd.load(&damped[r]));
         let mean = sum.times(simd.splat(0.5));
         mean.store(&mut central[r]);
-        let bend = mean.mul_add(damping, simd.load(&step.force[r]));
+        let bend = mean.mul_add(damping, simd.load(&step.phi[r]));
         bend.times(damping).store(&mut damped[r]);
     }
-    let law = [&*damped, &step.diagonal[..rows], &step.couplings[..rows]];
-    let third = &mut step.force[..rows];
-    forces(simd, central, law, step.pulling * drive.increment(), third);
+    let law = [
+        &*damped,
+        &step.minus_diagonal[..rows],
+        &step.couplings[..rows],
+    ];
+    let third = &mut step.phi[..rows];
+    write_phi(simd, central, law, step.pulling * drive.increment(), third);
     for r in 0..rows {
         let third = simd.load(&third[r]);
         let increment = third.mul_add(simd.splat(-1.0 / 6.0), simd.load(&central[r]));
