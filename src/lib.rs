@@ -50,7 +50,7 @@
 //! | contact event | a contact breaks or attaches ([`model::ContactEvent`]) |
 //! | segment | a stretch of time without a contact event ([`solver::Segment`]) |
 //! | rupture | a run of breaks without a gap longer than the wave crossing time |
-//! | slip, precursor | a rupture of all blocks and of enough contacts; any other that is not small ([`observe::Slip`]) |
+//! | slip, precursor | a rupture of all blocks that releases many contacts; any other of enough breaks ([`observe::Slip`]) |
 //! | recording | what a job measures, and when it ends ([`observe::Recording`]) |
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
 //! | job | one point of a sweep, known by a hash of parameters, solver and recording |

@@ -1,5 +1,5 @@
 //! Charts: a dot for each set against a column, with error bars where there are intervals. The overview of a sweep,
-//! custom figures and most standing ones are charts.
+//! custom figures and some standing ones are charts.
 
 use super::axis::Axis;
 use super::beside::Beside;

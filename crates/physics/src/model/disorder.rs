@@ -136,7 +136,8 @@ impl Disorder {
     }
 }
 
-/// [`DRAWS_PER_REFILL`] draws at once, each from two words: one for its threshold, one for its delay. A threshold that is not positive, or not a number, is not final.
+/// [`DRAWS_PER_REFILL`] draws at once, each from two words: one for its threshold, one for its delay. A threshold that is
+/// not positive, or not a number, is not final.
 struct SideBySide<'a>(&'a Disorder, &'a [[u64; 2]; DRAWS_PER_REFILL as usize]);
 
 impl WithSimd for SideBySide<'_> {

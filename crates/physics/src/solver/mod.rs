@@ -115,7 +115,7 @@ pub trait Observer {
     /// What is spent up to the break that comes next, if a ledger is kept.
     fn spent(&mut self, _spent: Spent) {}
 
-    /// Whether it needs attachments. If not, the grid, which is faster so, may leave them out and ends no segment at one.
+    /// Whether it needs attachments. If not, a solver may leave them out, and end no segment at one.
     fn follows_attachments(&self) -> bool {
         true
     }

@@ -255,6 +255,23 @@ mod tests {
     }
 
     #[test]
+    fn the_stiffness_of_runs_too_short_for_the_longest_slope_is_that_of_a_shorter_one() {
+        let mut trace = renewal(0.0, 4.0, 0.0);
+        trace.times.truncate(140);
+        trace.forces.truncate(140);
+        let mut survey = Survey::default();
+        assert_eq!(survey.noise(), 0.0);
+        assert_eq!(survey.stiffness(), 0.0);
+        let loading = loading(0.0);
+        for (times, forces) in trace.times.chunks(14).zip(trace.forces.chunks(14)) {
+            survey.begin();
+            survey.push(&loading, Samples { times, forces });
+        }
+        let stiffness = survey.stiffness() / STIFFNESS;
+        assert!((stiffness - 1.0).abs() < 0.5, "{stiffness}");
+    }
+
+    #[test]
     fn a_plateau_holds_the_size_of_slips_and_none_is_in_a_scale_free_trace() {
         let mut trace = renewal(0.0, 1.0, 0.0);
         let sizes = || (0..60).map(|step| 5.0 * 1.06_f64.powi(step));

@@ -13,10 +13,9 @@ use crate::model::Drive;
 use std::f64::consts::TAU;
 
 /// Distances in samples over which slopes are taken. The shortest over which the force rises by `RISE` times the noise
-/// gives the stiffness, else the longest.
+/// gives the stiffness, else the longest with a slope.
 const SLOPES: [usize; 3] = [1, 4, 16];
 const RISE: f64 = 2.0;
-const LONGEST_SLOPE: usize = SLOPES[2];
 /// Part of the mean velocity that the drive needs for a slope to count: where a modulated drive is slower, the rise is
 /// less and the noise counts more. Below 1, since sampling times are rounded.
 const STEADY: f64 = 0.999;
@@ -36,15 +35,18 @@ impl Histogram {
         self.0[(number.max(0.0).to_bits() >> Self::BELOW) as usize] += 1;
     }
 
-    /// Next to 0 without numbers.
-    fn median(&self) -> f64 {
-        let mut left = self.0.iter().sum::<u64>().div_ceil(2);
+    /// `None` without numbers.
+    fn median(&self) -> Option<f64> {
+        let mut counted = 0;
+        let half = self.0.iter().sum::<u64>().div_ceil(2);
         let is_reached = |count: &u64| {
-            left = left.saturating_sub(*count);
-            left == 0
+            counted += count;
+            counted > 0 && counted >= half
         };
-        let class = self.0.iter().position(is_reached).unwrap_or(0) as u64;
-        f64::from_bits((class << Self::BELOW) | (1 << (Self::BELOW - 1)))
+        let class = self.0.iter().position(is_reached)? as u64;
+        Some(f64::from_bits(
+            (class << Self::BELOW) | (1 << (Self::BELOW - 1)),
+        ))
     }
 }
 
@@ -83,21 +85,26 @@ impl Survey {
     /// The standard deviation of the noise, if it is Gaussian: 1.4826 times the median size of the difference that
     /// `weights` makes, which keep it. 0 where it is no more than rounding.
     pub fn noise(&self) -> f64 {
-        let noise = 1.4826 * self.noise.median();
+        let noise = 1.4826 * self.noise.median().unwrap_or(0.0);
         let rounding = f64::EPSILON * self.low.abs().max(self.high.abs());
         if noise > rounding { noise } else { 0.0 }
     }
 
-    /// The slope of the loading parts over the velocity of the drive, in N/m.
+    /// The slope of the loading parts over the velocity of the drive, in N/m; 0 without slopes.
     pub fn stiffness(&self) -> f64 {
         let distance = self.velocity * self.seconds / self.samples as f64;
-        let mut scales = SLOPES
-            .into_iter()
-            .zip(self.stiffness.iter().map(Histogram::median));
-        let is_seen = |&(length, slope): &(usize, f64)| {
-            length == LONGEST_SLOPE || slope * distance * length as f64 > RISE * self.noise()
-        };
-        scales.find(is_seen).map_or(f64::NAN, |(_, slope)| slope)
+        let noise = self.noise();
+        let mut stiffness = 0.0;
+        for (length, slopes) in SLOPES.into_iter().zip(&self.stiffness) {
+            let Some(slope) = slopes.median() else {
+                break;
+            };
+            stiffness = slope;
+            if slope * distance * length as f64 > RISE * noise {
+                break;
+            }
+        }
+        stiffness
     }
 
     /// Equal samples in a row at the largest force, if it was cut off there.
@@ -180,7 +187,8 @@ impl Pass for Survey {
                 }
             }
         }
-        let old = last.saturating_sub(LONGEST_SLOPE);
+        let [.., longest] = SLOPES;
+        let old = last.saturating_sub(longest);
         self.times.drain(..old);
         self.driven.drain(..old);
         self.forces.drain(..old);
